@@ -60,7 +60,7 @@ def system(bodies: dict[str, ElasticBody], faces: list, modes: int) -> ContactSy
         bodies=bases, drive=Drive(),
         interfaces=[Interface(f"face{k}", face, NORMAL, FRICTION)
                     for k, face in enumerate(faces)],
-        load=Load(300.0, (PointLoad(f"{top}.end", "x", signal=Harmonic(100.0, 800.0)),)))
+        load=Load(300.0, (PointLoad(f"{top}.end", "x", signal=Harmonic(100.0, 127.0)),)))
 
 
 def per_step(systems: dict[str, ContactSystem], t_end: float, rounds: int) -> dict[str, float]:

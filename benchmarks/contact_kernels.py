@@ -22,7 +22,7 @@ def system(nodes: int, modes: int) -> ContactSystem:
                          ExponentialFriction(0.8, 0.55, 1e3),
                          load=Load(10.0),
                          ground=Ground(0.1, 1e-6, 1e-2),
-                         drive=Drive(stiffness_x=1e3, amplitude_x=1e-3, angular_frequency=10.0))
+                         drive=Drive(stiffness_x=1e3, amplitude_x=1e-3, frequency_hz=1.6))
 
 
 def numpy_rhs(system: ContactSystem, t: float, y: np.ndarray) -> np.ndarray:
@@ -45,8 +45,8 @@ def numpy_rhs(system: ContactSystem, t: float, y: np.ndarray) -> np.ndarray:
     mu0, mu, decay, slope = s.friction_parameters[:, :4].T
     friction = ((mu0 - mu) * np.exp(-decay * np.abs(slip)) + mu) * F * (
         2.0 / np.pi) * np.arctan(slope * slip)
-    drive = system.drive
-    pull = s.drive_stiffness[0] * drive.amplitude_x * np.sin(drive.angular_frequency * t)
+    drive, w = system.drive, 2.0 * np.pi * system.drive.frequency_hz
+    pull = s.drive_stiffness[0] * drive.amplitude_x * np.sin(w * t)
     force = (s.constant_load + pull * s.drive_shapes[0] - s.stiffness @ q - s.damping @ v
              + away.T @ F - along.T @ (friction + F * tilt))
     return np.concatenate([v, force])

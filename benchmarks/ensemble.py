@@ -30,9 +30,9 @@ from fecontact.integrate import strobe
 Array = NDArray[np.float64]
 
 LEVELS = (1e-3, 1e-4, 1e-5, 1e-6)
-# Values and periods; lowest and highest frequency of the drive [rad/s].
+# Values and periods; lowest and highest frequency of the drive [Hz].
 USUAL = {"f": (24, 60), "b": (64, 100)}
-RANGES = {"f": (5.0, 80.0), "b": (10.0, 16.0), "b2": (10.0, 16.0)}
+RANGES = {"f": (0.8, 12.7), "b": (1.6, 2.55), "b2": (1.6, 2.55)}
 
 
 def systems_of(name: str, values: Array) -> list[ContactSystem]:
@@ -40,7 +40,7 @@ def systems_of(name: str, values: Array) -> list[ContactSystem]:
     if name == "f":
         return diagram(values)
     system = friction_oscillator(name).system
-    return [system.with_(**{"drive.angular_frequency": float(w)}) for w in values]
+    return [system.with_({"drive.frequency_hz": float(hz)}) for hz in values]
 
 
 def numbalsoda_loop(name: str, values: Array) -> Callable[[float, int], Array]:
@@ -71,8 +71,8 @@ def numbalsoda_loop(name: str, values: Array) -> Callable[[float, int], Array]:
     @njit
     def loop(drive: Array, values: Array, periods: int, rtol: float, out: Array) -> None:
         for k in range(len(values)):
-            drive[:, 1] = values[k]
-            times = np.arange(periods + 1) * (2.0 * np.pi / values[k])
+            drive[:, 1] = 2.0 * np.pi * values[k]
+            times = np.arange(periods + 1) / values[k]
             found, _ = lsoda(address, np.zeros(size), times, rtol=rtol, atol=rtol, mxstep=100000000)
             out[k] = found
 

@@ -84,7 +84,7 @@ class Numpy:
         return R, J
 
     def follow(self, first: float, last: float, step: float, largest: float) -> Array:
-        """Points (k, n + 1) of the branch from rest at one frequency to another."""
+        """Points (k, n + 1) of the branch from rest at one frequency [rad/s] to another."""
         X = np.append(np.zeros(len(self.force)), first)
         for _ in range(30):
             R, J = self.equations(X)
@@ -141,7 +141,7 @@ def duffing_system() -> fc.ContactSystem:
     basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
                                    damping=[[0.05]])
     return fc.ContactSystem(basis, normal=BilateralPolynomial(0.0, 0.1), drive=fc.Drive(
-        stiffness_y=1.0, amplitude_y=0.18, angular_frequency=0.8))
+        stiffness_y=1.0, amplitude_y=0.18, frequency_hz=0.13))
 
 
 def jenkins_system() -> fc.ContactSystem:
@@ -152,7 +152,7 @@ def jenkins_system() -> fc.ContactSystem:
                                    damping=[[0.02]])
     return fc.ContactSystem(
         basis, normal=PrescribedForce(1.0), friction=JenkinsFriction(0.5, 1.0),
-        drive=fc.Drive(stiffness_x=1.0, amplitude_x=1.0, angular_frequency=1.1))
+        drive=fc.Drive(stiffness_x=1.0, amplitude_x=1.0, frequency_hz=0.175))
 
 
 def modes_of_body() -> fc.ModalBasis:
@@ -167,7 +167,7 @@ def body(basis: fc.ModalBasis) -> fc.ContactSystem:
     return fc.ContactSystem(
         basis, normal=RoughSurface(1e6, 1e-4, 300.0),
         friction=ConstantFriction(0.3, smoothing_slope=50.0), load=fc.Load(100.0),
-        drive=fc.Drive(stiffness_x=1e5, damping_x=30.0, amplitude_x=2e-4, angular_frequency=500.0))
+        drive=fc.Drive(stiffness_x=1e5, damping_x=30.0, amplitude_x=2e-4, frequency_hz=80.0))
 
 
 def least_time(
@@ -187,15 +187,16 @@ def oscillator(name: str, rounds: int, points: int) -> None:
     """One row of the first table."""
     if name == "Duffing":
         system, observe, samples, element = duffing_system, ("B", "y"), 72, cubic
-        bounds, damping, force, largest = (0.6, 1.8), 0.05, 0.18, 8.6 / points
+        bounds, damping, force, largest = (0.1, 0.29), 0.05, 0.18, 8.6 / points
     else:
         system, observe, samples, element = jenkins_system, ("B", "x"), 256, jenkins
-        bounds, damping, force, largest = (1.0, 1.5), 0.02, 1.0, 16.0 / points
+        bounds, damping, force, largest = (0.16, 0.24), 0.02, 1.0, 16.0 / points
     load = np.zeros(2 * HARMONICS + 1)
     load[2] = force
     spent, found = least_time(lambda _: Numpy(
         samples, np.eye(1), damping * np.eye(1), np.eye(1), load,
-        [(np.ones(1), element)]).follow(*bounds, 0.01, largest), rounds)
+        [(np.ones(1), element)]).follow(2.0 * np.pi * bounds[0], 2.0 * np.pi * bounds[1], 0.01,
+                                        largest), rounds)
     numpy_each = 1e6 * spent / len(found)
     peak = np.hypot(found[:, 1], found[:, 2]).max()
     print(f"{name:8s} NumPy                    {len(found):5d} points {numpy_each:8.1f} us a point")
@@ -227,18 +228,18 @@ def table_of_body(points: int, intervals: tuple[int, ...]) -> None:
     options = ContinuationOptions(points=points, largest_step=0.03)
 
     def response(harmonics: int, stability: str | None, count: int = points) -> Branch:
-        return frequency_response(body(basis), (500.0, 2000.0), method=HarmonicBalance(
+        return frequency_response(body(basis), (80.0, 320.0), method=HarmonicBalance(
             harmonics, stability=stability), options=ContinuationOptions(
                 points=count, largest_step=0.03)).branches[0]
 
     def collocated(count: int) -> Branch:
         return orbit_branch(
-            contact_field(body(basis), ["drive.angular_frequency"]), start,
-            method=Collocation(count, state_tolerance=None), bounds=(500.0, 2000.0),
+            contact_field(body(basis), ["drive.frequency_hz"]), start,
+            method=Collocation(count, state_tolerance=None), bounds=(80.0, 320.0),
             options=options)
 
     exact = response(25, None, 2)
-    start = exact.points[0].orbit(contact_field(body(basis), ["drive.angular_frequency"]))
+    start = exact.points[0].orbit(contact_field(body(basis), ["drive.frequency_hz"]))
     for stability in (None, "transitions"):
         spent, branch = least_time(lambda _, stability=stability: response(HARMONICS, stability), 1)
         print(f"harmonic balance {stability or 'no stability':14s} {len(branch):4d} points "

@@ -65,32 +65,32 @@ def _observed(basis: ModalBasis, entries: list[tuple[int, int, int]]) -> Array:
 
 
 def impact_oscillator(periods: int = 50, outputs: int = 200) -> Problem:
-    """(a): section 3 at 64.32 rad/s, the rigid mode alone."""
-    w, r = 64.32, 1.0 / np.sqrt(_STOP_MASS)
+    """(a): section 3 at 10.24 Hz (64.32 rad/s), the rigid mode alone."""
+    hz, r = 64.32 / (2.0 * np.pi), 1.0 / np.sqrt(_STOP_MASS)
     basis = _basis([0.0], [0.0], [[0.0], [r]], [[0.0], [r]])
     system = ContactSystem(
         basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0),
         drive=Drive(stiffness_y=99.085, damping_y=0.02046, amplitude_y=0.47e-3,
-                    angular_frequency=w))
-    times = np.linspace(0.0, periods * 2.0 * np.pi / w, periods * outputs + 1)
+                    frequency_hz=hz))
+    times = np.linspace(0.0, periods / hz, periods * outputs + 1)
     return Problem("a", system, np.zeros(2), times, _observed(basis, [(0, 1, 0), (0, 1, 1)]))
 
 
 def diagram(values: Array) -> list[ContactSystem]:
-    """(f): section 3 with two modes at many frequencies of the drive."""
+    """(f): section 3 with two modes at many frequencies of the drive [Hz]."""
     r = 1.0 / np.sqrt(_STOP_MASS)
     shape = [[0.0, 0.0], [r, 0.6 * r]]
     basis = _basis([0.0, 2.0 * np.pi * 230.0], [0.0, 0.03], shape, shape)
     system = ContactSystem(
         basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0),
         drive=Drive(stiffness_y=99.085, damping_y=0.02046, amplitude_y=0.47e-3,
-                    angular_frequency=float(values[0])))
-    return [system.with_(**{"drive.angular_frequency": float(w)}) for w in values]
+                    frequency_hz=float(values[0])))
+    return [system.with_({"drive.frequency_hz": float(hz)}) for hz in values]
 
 
 def friction_oscillator(name: str, periods: int = 20, outputs: int = 500) -> Problem:
     """(b), (b2), (c): section 4 with one, two and three modes; (r): (c) on rigid ground."""
-    w, r = 13.8, 1.0 / np.sqrt(_BELT_MASS)
+    hz, r = 13.8 / (2.0 * np.pi), 1.0 / np.sqrt(_BELT_MASS)
     elastic = 2.0 * np.pi * 30.0
     basis = {
         "b": lambda: _basis([0.0], [0.0], [[r], [0.0]], [[r], [0.0]]),
@@ -105,10 +105,10 @@ def friction_oscillator(name: str, periods: int = 20, outputs: int = 500) -> Pro
     normal = PrescribedForce(14.0) if given else RoughSurface(10e6, 10e-6, 40.0)
     system = ContactSystem(
         basis, normal=normal, friction=FRICTION, ground=Ground(speed=1e-3),
-        drive=Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3, angular_frequency=w),
+        drive=Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3, frequency_hz=hz),
         # (b) and (r) do not move in y: the load is the prescribed force.
         load=Load(0.0 if given else 14.0))
-    times = np.linspace(0.0, periods * 2.0 * np.pi / w, periods * outputs + 1)
+    times = np.linspace(0.0, periods / hz, periods * outputs + 1)
     entries = [(0, 0, 0), (0, 0, 1)] + ([] if given else [(0, 1, 0)])
     return Problem(name, system, np.zeros(2 * basis.modes), times, _observed(basis, entries))
 

@@ -63,8 +63,8 @@ def systems(quick: bool) -> Iterator[tuple[str, Any, Any, float]]:
         return
     for problem in (impact_oscillator(), *map(friction_oscillator, ("b", "b2", "c", "r"))):
         yield problem.name, problem.system, problem.state, 1.0
-    for one in diagram(np.linspace(40.0, 90.0, 4)):
-        yield f"f at {one.drive.angular_frequency:.0f} rad/s", one, np.zeros(one.size), 0.5
+    for one in diagram(np.linspace(6.4, 14.3, 4)):
+        yield f"f at {one.drive.frequency_hz:.1f} Hz", one, np.zeros(one.size), 0.5
     yield "two beams", stack(2, 4, 5), np.zeros(stack(2, 4, 5).size), 2e-3
     yield "solid", solid(4, 8), "rest", 2e-3
 

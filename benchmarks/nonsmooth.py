@@ -83,7 +83,7 @@ def as_mass(problem: Problem) -> nonsmooth_peer.Mass:
     """A problem with a given normal force for the peer."""
     system, arrays = problem.system, problem.system.arrays
     drive, friction = system.drive, system.friction
-    w, size = drive.angular_frequency, drive.amplitude_x
+    w, size = 2.0 * np.pi * drive.frequency_hz, drive.amplitude_x
     return nonsmooth_peer.Mass(
         arrays.stiffness, arrays.damping, arrays.rows[0, 0], arrays.drive_shapes[0],
         arrays.drive_stiffness[0] * size, arrays.drive_damping[0] * size * w, w,

@@ -611,7 +611,7 @@ def random_case(number: int) -> Case:
     system = fc.ContactSystem(
         basis, normal=normal, friction=friction,
         ground=fc.Ground(speed=speed, speed_y=speed_y, amplitude=height, wavelength=length),
-        drive=fc.Drive(angular_frequency=omega, **drive), load=fc.Load(force))
+        drive=fc.Drive(frequency_hz=omega / (2.0 * np.pi), **drive), load=fc.Load(force))
     place = 10.0 ** rng.uniform(-5.5, -3.5) * rng.standard_normal(m)
     deepest = -float((T[2:, d - 1] @ place).min())
     if deepest > DEEPEST * system.penetration_scale:

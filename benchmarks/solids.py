@@ -36,7 +36,7 @@ def plane(modes: int, nodes: int) -> ContactSystem:
     body = ElasticBody(mesh, thickness=WIDTH, fixed={"left": "xy"})
     basis = modal_basis(body, modes, contact_nodes=nodes, B="", C="top", damping=0.01)
     return ContactSystem(basis, ground=Ground(speed=0.5), load=Load(
-        500.0, (PointLoad("C", "x", signal=Harmonic(100.0, 800.0)),)), **PARTS)
+        500.0, (PointLoad("C", "x", signal=Harmonic(100.0, 127.0)),)), **PARTS)
 
 
 def solid(modes: int, nodes: int) -> ContactSystem:
@@ -48,7 +48,7 @@ def solid(modes: int, nodes: int) -> ContactSystem:
     basis = modal_basis(body, modes, contact_nodes=(nodes // across, across), B="", C="top",
                         damping=0.01)
     return ContactSystem(basis, ground=Ground(speed=0.5, speed_y=0.1), load=Load(
-        500.0, (PointLoad("C", "x", signal=Harmonic(100.0, 800.0)),)), **PARTS)
+        500.0, (PointLoad("C", "x", signal=Harmonic(100.0, 127.0)),)), **PARTS)
 
 
 def main(nodes: list[int], quick: bool = False) -> None:

@@ -27,7 +27,7 @@ normal = { stiffness = 0.3e6, roughness_height = 5.2e-6, damping = 6.0 }
 friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55, decay = 1000.0 }
 ground = { speed = 2e-3 }
 load = { normal = 14.0 }
-drive = { stiffness_x = 5610.0, damping_x = 0.768, amplitude_x = 0.5e-3, angular_frequency = 13.8 }
+drive = { stiffness_x = 5610.0, damping_x = 0.768, amplitude_x = 0.5e-3, frequency_hz = 2.196 }
 simulation = { t_end = 1.5, outputs = 201 }
 """
 

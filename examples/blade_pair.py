@@ -34,7 +34,7 @@ LENGTH, HEIGHT, APART = 0.15, 0.008, 0.03  # of a blade, and between the two [m]
 FORCE, COEFFICIENT, RATIO = 0.5, 0.3, 0.002  # N, friction, modal damping
 NORMAL, TANGENTIAL = 2e7, 1.5e5  # stiffness of a contact [N/m]
 BEST = np.pi * FORCE / COEFFICIENT  # load of both blades [N]
-FREQUENCY = "excitation.angular_frequency"  # of both forces
+FREQUENCY = "excitation.frequency_hz"  # of both forces
 
 
 def blade_pair(load: float, angle: float = np.pi, frequency_hz: float = 300.0) -> fc.ContactSystem:
@@ -55,8 +55,7 @@ def blade_pair(load: float, angle: float = np.pi, frequency_hz: float = 300.0) -
     points["plate"] = {"points": {"back": (LENGTH + width, middle)}}
     bases = reduce_bodies(bodies, faces, links, modes={"first": 3, "second": 3, "plate": 3},
                           damping=RATIO, each=points)
-    w = 2.0 * np.pi * frequency_hz
-    forces = [fc.PointLoad(f"{name}.end", "y", signal=Harmonic(FORCE, w, phase))
+    forces = [fc.PointLoad(f"{name}.end", "y", signal=Harmonic(FORCE, frequency_hz, phase))
               for name, phase in zip(places, (0.0, angle), strict=True)]
     return fc.ContactSystem(
         bodies=bases, links=links, load=fc.Load(forces=tuple(forces)), interfaces=[
@@ -65,25 +64,22 @@ def blade_pair(load: float, angle: float = np.pi, frequency_hz: float = 300.0) -
             for name, face in zip(places, faces, strict=True)])
 
 
-
-
-def excited_at(system: fc.ContactSystem, w: float) -> fc.ContactSystem:
-    """The system with both forces at an angular frequency."""
-    return system.with_({f"load.forces.{number}.signal.angular_frequency": w
+def excited_at(system: fc.ContactSystem, frequency_hz: float) -> fc.ContactSystem:
+    """The system with both forces at a frequency."""
+    return system.with_({f"load.forces.{number}.signal.frequency_hz": frequency_hz
                          for number in range(2)})
 
 
 def responses(
-    loads: list[float], angle: float, bounds_hz: tuple[float, float] = (280.0, 430.0),
+    loads: list[float], angle: float, bounds: tuple[float, float] = (280.0, 430.0),
     method: HarmonicBalance | None = None,
 ) -> FrequencyResponse:
-    """Responses of the end of the first blade over the frequency, one for each load [N]."""
-    low, high = (2.0 * np.pi * bound for bound in bounds_hz)
+    """Responses of the end of the first blade over the frequency [Hz], one for each load [N]."""
     found = []
     for load in loads:
-        field = contact_field(blade_pair(load, angle), {FREQUENCY: (low, excited_at)})
+        field = contact_field(blade_pair(load, angle), {FREQUENCY: (bounds[0], excited_at)})
         found.append(frequency_response(
-            field, (low, high), observe=("first.end", "y"),
+            field, bounds, observe=("first.end", "y"),
             method=method or HarmonicBalance(3, 256, stability=None),
             options=ContinuationOptions(points=2000, largest_step=0.1)))
     return FrequencyResponse(tuple(one.branches[0] for one in found), "centrifugal load [N]",
@@ -111,9 +107,8 @@ def draw(response: FrequencyResponse, path: Path) -> None:
     with new_figure(10.0, 4.4, path) as figure:
         left, right = figure.subplots(1, 2)
         for level, colour in zip(range(len(response.levels)), COLOURS, strict=False):
-            left.plot(response.branches[level].parameter / (2.0 * np.pi),
-                      1e6 * response.amplitude(level), color=colour,
-                      label=f"{response.levels[level]:.3g} N")
+            left.plot(response.branches[level].parameter, 1e6 * response.amplitude(level),
+                      color=colour, label=f"{response.levels[level]:.3g} N")
         left.set(xlabel="frequency [Hz]", ylabel="amplitude of a blade [µm]")
         left.legend(title="load")
         loads = np.geomspace(0.57, 3.3, 300) * BEST
@@ -133,7 +128,7 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
     response = responses([ratio * BEST for ratio in ratios], np.pi)
     for level, load in enumerate(response.levels):
         peak = response.peak(level)
-        print(f"load {load:6.2f} N: {peak.parameter / (2.0 * np.pi):.2f} Hz, "
+        print(f"load {load:6.2f} N: {peak.parameter:.2f} Hz, "
               f"{1e6 * peaks(response)[level]:.3f} um, one harmonic {1e6 * estimate(load):.3f} um")
         if response.branches[level].status is not BranchStatus.BOUND:
             print(f"  not the whole response: {response.branches[level].status.value}")

@@ -57,7 +57,7 @@ def sector(columns: int = 8) -> fc.ElasticBody:
         "low": side(0), "high": side(columns)}), thickness=DEPTH)
 
 
-def blades(load: float, w: float) -> fc.ContactSystem:
+def blades(load: float, frequency_hz: float) -> fc.ContactSystem:
     """A blade with its neighbours, pressed on each other at the tips [N]; no load: apart."""
     mesh = fc.generate(fc.Beam(LENGTH, HEIGHT, 0.5 * HEIGHT))
     blade = fc.modal_basis(fc.ElasticBody(mesh, thickness=DEPTH, fixed={"left": "xy"}), 4,
@@ -68,7 +68,8 @@ def blades(load: float, w: float) -> fc.ContactSystem:
               for a, b in (("before", "own"), ("own", "after"))]
     return fc.ContactSystem(
         bodies=dict.fromkeys(("before", "own", "after"), blade), interfaces=joints,
-        load=fc.Load(forces=(fc.PointLoad("own.tip", "y", signal=Harmonic(FORCE, w)),)))
+        load=fc.Load(forces=(fc.PointLoad("own.tip", "y", signal=Harmonic(
+            FORCE, frequency_hz)),)))
 
 
 def stuck_hz() -> float:
@@ -96,24 +97,24 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
 
     free = blades(1.0, 1.0).basis.frequencies_hz.min()
     stuck = stuck_hz()
-    bounds = 2.0 * np.pi * np.array([0.93 * free, 1.04 * stuck])
+    bounds = (0.93 * free, 1.04 * stuck)
     method = HarmonicBalance([0, 1, 3], 12 * N, stability=None, repeats=Repeats(
         "own", {"before": -ORDER / N, "after": ORDER / N}))
-    name = "load.forces.0.signal.angular_frequency"
+    name = "load.forces.0.signal.frequency_hz"
     loads = np.array([1.0, 4.0, 1000.0]) if quick else np.array(
         [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 1000.0])
     with new_figure(7.0, 4.5, folder / "blade_tips.png") as figure:
         axes = figure.subplots()
         for load, colour in zip(loads, COLOURS, strict=False):
             field = contact_field(blades(load, bounds[0]), [name])
-            found = frequency_response(field, tuple(bounds), name, observe=("own.tip", "y"),
+            found = frequency_response(field, bounds, name, observe=("own.tip", "y"),
                                        method=method, options=ContinuationOptions(
                                            points=1000, largest_step=0.1))
             peak = found.peak()
             print(f"{load:6.1f} N: peak {1e6 * found.amplitude().max():.2f} um at "
-                  f"{peak.parameter / (2.0 * np.pi):.2f} Hz")
-            axes.semilogy(found.branches[0].parameter / (2.0 * np.pi), 1e6 * found.amplitude(),
-                          color=colour, label=f"{load:g} N")
+                  f"{peak.parameter:.2f} Hz")
+            axes.semilogy(found.branches[0].parameter, 1e6 * found.amplitude(), color=colour,
+                          label=f"{load:g} N")
         axes.set(xlabel="frequency [Hz]", ylabel="amplitude of a tip [µm]")
         axes.legend(title="normal load")
     print(f"free {free:.2f} Hz, stuck {stuck:.2f} Hz")

@@ -127,7 +127,7 @@ def draw(mode: NonlinearMode, path: Path) -> None:
     with new_figure(9.0, 3.6, path) as figure:
         frequency, damping = figure.subplots(1, 2)
         for axes, own, column, label in (
-                (frequency, 100.0 * (mode.frequency / mode.frequency[0] - 1.0),
+                (frequency, 100.0 * (mode.frequency_hz / mode.frequency_hz[0] - 1.0),
                  100.0 * (PUBLISHED[:, 1] / PUBLISHED[0, 1] - 1.0), "change of frequency [%]"),
                 (damping, 100.0 * mode.damping_ratio, 100.0 * PUBLISHED[:, 2],
                  "damping ratio [%]")):
@@ -169,7 +169,7 @@ def main(deck: Path, folder: Path, quick: bool) -> None:
     for amplitude, hertz, ratio in PUBLISHED:
         if mode.amplitude[0] <= amplitude <= mode.amplitude[-1]:
             own = [np.interp(amplitude, mode.amplitude, found)
-                   for found in (mode.frequency, mode.damping_ratio)]
+                   for found in (mode.frequency_hz, mode.damping_ratio)]
             print(f"{1e6 * amplitude:5.2f} um: {own[0]:.2f} Hz, damping ratio {own[1]:.5f} "
                   f"(published {hertz:.2f} Hz, {ratio:.5f})")
     draw(mode, folder / "brake_reuss_backbone.png")

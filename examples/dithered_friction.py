@@ -45,7 +45,7 @@ def closed_form(ratio: np.ndarray, direction: Direction) -> np.ndarray:
 
 def dithered(ratio: float, direction: Direction, slope: float = 1e6) -> fc.Trajectory:
     """One period of the dither while a mass slides at V = ratio a; k_s is the slope [s/m]."""
-    shaking = HarmonicSpeed(AMPLITUDE, 2.0 * np.pi * FREQUENCY)
+    shaking = HarmonicSpeed(AMPLITUDE, FREQUENCY)
     speed = ratio * AMPLITUDE
     # The ground runs backwards instead.
     ground = fc.Ground(speed=-speed, **{"motion_y" if direction == "across" else "motion": shaking})

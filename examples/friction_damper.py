@@ -52,7 +52,7 @@ def damped_beam(load: float, frequency_hz: float = 100.0, force: float = FORCE) 
             "damper", face, LinearContact(2e7, damping=100.0),
             ConstantFriction(COEFFICIENT, smoothing_slope=1e4), gap=0.0 if load else 1e-3)],
         load=fc.Load(forces=(fc.PointLoad("beam.end", "y", signal=Harmonic(
-            force, 2.0 * np.pi * frequency_hz)),)))
+            force, frequency_hz)),)))
 
 
 def amplitudes(load: float, frequencies: np.ndarray, periods: int) -> np.ndarray:

@@ -32,8 +32,9 @@ from fecontact.laws import (
 )
 from fecontact.plot import plot_contact_map, plot_friction_work, plot_spectrogram
 
-MASS, DRIVE_FREQUENCY, BELT_SPEED, NORMAL_FORCE = 5.632, 13.8, 1e-3, 14.0  # kg, rad/s, m/s, N
-PERIOD = 2.0 * math.pi / DRIVE_FREQUENCY
+MASS, BELT_SPEED, NORMAL_FORCE = 5.632, 1e-3, 14.0  # kg, m/s, N
+DRIVE_HZ = 13.8 / (2.0 * math.pi)  # 13.8 rad/s in the source
+PERIOD = 1.0 / DRIVE_HZ
 ELASTIC_HZ, ELASTIC_DAMPING, AT_DRIVE, AT_CONTACT = 30.0, 0.01, 0.5, -0.5
 
 LAWS: dict[str, Any] = {
@@ -41,7 +42,7 @@ LAWS: dict[str, Any] = {
     "friction": ExponentialFriction(static_coefficient=0.8, kinetic_coefficient=0.55,
                                        decay=1000.0, smoothing_slope=1e6),
     "drive": fc.Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3,
-                      angular_frequency=DRIVE_FREQUENCY),
+                      frequency_hz=DRIVE_HZ),
     "load": fc.Load(normal=NORMAL_FORCE),
 }
 EVEN = fc.Ground(speed=BELT_SPEED)

@@ -11,12 +11,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from impact_oscillator import FREQUENCIES, mesh_system, settled, two_mode_system
+from impact_oscillator import (
+    FREQUENCIES,
+    driven,
+    hertz,
+    mesh_system,
+    settled,
+    two_mode_system,
+)
 
 from fecontact import ContactSystem, Trajectory
 from fecontact.analysis.periodicity import drive_period
 from fecontact.plot import COLOURS, new_figure
 
+# By frequencies of the source [rad/s], as all of what is made for these.
 SHOWN_PERIODS = {64.32: 4, 30.84: 4, 37.41: 4, 23.63: 25, 9.845: 2}
 SECTION_POINTS = 3000
 
@@ -46,7 +54,7 @@ def phase_figure(runs: dict[float, Trajectory]) -> Any:
     with new_figure(10.0, 5.8) as figure:
         for axes, (frequency, run) in zip(figure.subplots(2, 3).flat, runs.items(), strict=False):
             draw_phase(axes, run)
-            axes.set_title(f"{frequency:g} rad/s: {FREQUENCIES[frequency]}", fontsize=9.5)
+            axes.set_title(f"{hertz(frequency):.3f} Hz: {FREQUENCIES[frequency]}", fontsize=9.5)
         empty = figure.axes[-1]
         empty.axis("off")
         empty.legend(handles=[
@@ -88,7 +96,8 @@ def section_figure(points: dict[float, np.ndarray]) -> Any:
             for number, frequency in enumerate(frequencies):
                 height, velocity = points[frequency]
                 axes.plot(height, velocity, "." if axes is chaos else "o", color=COLOURS[number],
-                          markersize=1.5 if axes is chaos else 5, label=f"{frequency:g} rad/s")
+                          markersize=1.5 if axes is chaos else 5,
+                          label=f"{hertz(frequency):.3f} Hz")
             axes.set_xlabel("height [µm]")
             axes.set_ylabel("velocity [mm/s]")
             axes.legend(loc="best", markerscale=5 if axes is chaos else 1)
@@ -104,11 +113,11 @@ def strobed(system: ContactSystem, count: int, transient: int = 200) -> np.ndarr
 def figures(system: ContactSystem, transient: int = 300,
             points: int = SECTION_POINTS) -> dict[str, Any]:
     """All pictures by name: ``phase``, ``chatter`` and ``sections``."""
-    driven = {w: system.with_({"drive.angular_frequency": w}) for w in FREQUENCIES}
+    systems = {w: driven(system, w) for w in FREQUENCIES}
     runs = {w: settled(one, transient=transient, periods=SHOWN_PERIODS[w])
-            for w, one in driven.items()}
+            for w, one in systems.items()}
     sections = {w: strobed(one, points if w == 23.63 else min(points, 40), min(transient, 200))
-                for w, one in driven.items()}
+                for w, one in systems.items()}
     return {"phase": phase_figure(runs), "chatter": chatter_figure(runs[9.845]),
             "sections": section_figure(sections)}
 

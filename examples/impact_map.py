@@ -1,6 +1,6 @@
 """Where the motions of the impact oscillator lie: over the drive's frequency, and over the body.
 
-A bifurcation diagram from 5 to 80 rad/s, followed upwards and downwards, shows which motions exist
+A bifurcation diagram from 0.8 to 12.8 Hz, followed upwards and downwards, shows which motions exist
 side by side. A map over frequency and damping of the bending mode, which the source does not give,
 shows how narrow the window is in which all five reported motions appear. Both take the two-mode
 model and thousands of runs, on all cores.
@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from impact_oscillator import FREQUENCIES, settled, start, two_mode_system
+from impact_oscillator import FREQUENCIES, driven, hertz, settled, start, two_mode_system
 from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from fecontact import ContactSystem
@@ -23,8 +23,8 @@ from fecontact.analysis import count_periods
 from fecontact.integrate import strobe
 from fecontact.plot import COLOURS, new_figure
 
-EXPECTED = {64.32: 1, 30.84: 2, 37.41: 4, 23.63: None, 9.845: 1}
-SWEPT = np.linspace(5.0, 80.0, 600)  # rad/s
+EXPECTED = {64.32: 1, 30.84: 2, 37.41: 4, 23.63: None, 9.845: 1}  # of the source [rad/s]
+SWEPT = np.linspace(0.8, 12.8, 601)  # Hz
 BENDINGS_HZ = np.arange(226.0, 234.1, 0.5)
 DAMPINGS = np.arange(0.010, 0.0501, 0.005)
 LARGEST = 8  # periods; more count as none
@@ -36,7 +36,7 @@ FINE, COARSE = 2e-3, 3e-2  # of the motion's range; the second where rest ends e
 class Diagram:
     """Contact once a period, drive at zero and rising.
 
-    ``frequencies`` (F,) [rad/s]; ``up`` and ``down`` (F, K, 2), heights [m] and velocities [m/s]
+    ``frequencies`` (F,) [Hz]; ``up`` and ``down`` (F, K, 2), heights [m] and velocities [m/s]
     of the contact on the way to higher and to lower frequencies.
     """
 
@@ -55,27 +55,25 @@ def contact_states(system: ContactSystem, states: np.ndarray) -> np.ndarray:
 def bifurcation(system: ContactSystem, frequencies: np.ndarray, *, transient: int = 50,
                 keep: int = 30) -> Diagram:
     """Follow the motion upwards and downwards, each from the end of the one before."""
-    driven = [system.with_({"drive.angular_frequency": float(w)}) for w in frequencies]
+    systems = [system.with_({"drive.frequency_hz": float(one)}) for one in frequencies]
     # Two chains, one on each of two cores.
-    found = strobe(driven + driven[::-1], transient_periods=transient, keep=keep,
-                   initial=start(system, 1e-4), chain=len(driven), progress=True)
+    found = strobe(systems + systems[::-1], transient_periods=transient, keep=keep,
+                   initial=start(system, 1e-4), chain=len(systems), progress=True)
     if not found.finished.all():
         raise RuntimeError(f"{np.count_nonzero(~found.finished)} runs did not reach their end.")
     points = contact_states(system, found.states)
-    return Diagram(frequencies, points[: len(driven)], points[len(driven) :][::-1])
+    return Diagram(frequencies, points[: len(systems)], points[len(systems) :][::-1])
 
 
 def regime_map(bendings_hz: np.ndarray, dampings: np.ndarray, ratio: float = 0.600, *,
                transient: int = 120) -> dict[float, np.ndarray]:
-    """Number of periods (damping, bending) at each frequency of the source, 0 for none."""
+    """Number of periods (damping, bending) at each frequency of the source [rad/s], 0 for none."""
     keep = LARGEST + 2 * LARGEST
     pairs = [(f, D) for D in dampings for f in bendings_hz]
     periods = {}
     for frequency in EXPECTED:
-        systems = [two_mode_system(f, ratio, D).with_({"drive.angular_frequency": frequency})
-                   for f, D in pairs]
-        base = settled(two_mode_system().with_({"drive.angular_frequency": frequency}),
-                       transient=100, periods=10)
+        systems = [driven(two_mode_system(f, ratio, D), frequency) for f, D in pairs]
+        base = settled(driven(two_mode_system(), frequency), transient=100, periods=10)
         scale = np.ptp(contact_states(systems[0], base.states), axis=0)
         rests = frequency == 9.845
         found = strobe(systems, transient_periods=transient // 4 if rests else transient,
@@ -103,10 +101,10 @@ def bifurcation_figure(diagram: Diagram) -> Any:
             axes.plot(np.repeat(diagram.frequencies, heights.shape[1]), heights.ravel(), ".",
                       color=COLOURS[0], markersize=1.0, rasterized=True)
             for frequency in FREQUENCIES:
-                axes.axvline(frequency, color=COLOURS[1], linewidth=0.8, alpha=0.7)
+                axes.axvline(hertz(frequency), color=COLOURS[1], linewidth=0.8, alpha=0.7)
             axes.set_ylabel("height once a period [µm]")
             axes.set_title(f"{words}; lines: frequencies of the source", fontsize=9.5)
-        axes.set_xlabel("angular frequency of the drive [rad/s]")
+        axes.set_xlabel("frequency of the drive [Hz]")
     return figure
 
 
@@ -122,7 +120,8 @@ def map_figure(bendings_hz: np.ndarray, dampings: np.ndarray,
             image = axes.pcolormesh(bendings_hz, dampings, classes(found), cmap=colours, norm=norm)
             expected = EXPECTED[frequency]
             agree += found == (expected or 0)
-            axes.set_title(f"{frequency:g} rad/s: {expected or 'none'} expected", fontsize=9.5)
+            axes.set_title(f"{hertz(frequency):.3f} Hz: {expected or 'none'} expected",
+                           fontsize=9.5)
         bar = figure.colorbar(image, ax=panels[0], ticks=range(len(CLASSES)),
                               label="repeats after periods")
         bar.ax.set_yticklabels(CLASSES)

@@ -1,7 +1,7 @@
 """A million starts and a hundred thousand frequencies of an impact oscillator.
 
 A mass on a spring strikes a rough stop, the rigid mode of the oscillator of section 4.2 in W.
-Sextro, Dynamical Contact Problems with Friction. At 42.5 rad/s an orbit of two periods with impacts
+Sextro, Dynamical Contact Problems with Friction. At 6.764 Hz an orbit of two periods with impacts
 and one of one period lie beside each other; which one a run settles on depends on where it starts,
 in ever finer threads towards the stop. Over the frequency the states once a period show periodic
 motions as lines and chaos as shades, up and down.
@@ -27,17 +27,17 @@ import fecontact as fc
 from fecontact.bifurcation import Axis, basins, poincare_scan
 from fecontact.plot import plot_basins, plot_poincare_scan
 
-FREQUENCY = "drive.angular_frequency"
+FREQUENCY = "drive.frequency_hz"
 
 
-def oscillator(w: float) -> fc.ContactSystem:
-    """A mass on a spring that is moved to and fro, w rad/s, beside a stop."""
+def oscillator(frequency_hz: float = 6.764) -> fc.ContactSystem:
+    """A mass on a spring that is moved to and fro beside a stop."""
     rows = np.array([[0.0], [1.0], [0.0]])
     basis = fc.basis_from_matrices([[0.092]], [[0.0]], {"contact": rows[None], "B": rows})
     return fc.ContactSystem(
         basis, normal=fc.laws.RoughSurface(0.3e6, 5.2e-6, 6.0),
         drive=fc.Drive(stiffness_y=99.085, damping_y=0.02046, amplitude_y=0.47e-3,
-                       angular_frequency=w))
+                       frequency_hz=frequency_hz))
 
 
 @contextlib.contextmanager
@@ -54,21 +54,21 @@ def map_of_starts(count: int, periods: int, **settings: Any) -> None:
     """Basins of count x count starts, and their picture."""
     begin = time.perf_counter()
     place, speed = Axis("B", "y"), Axis("B", "y", "velocity")
-    found = basins(oscillator(42.5), (place, np.linspace(-1e-4, 2e-3, count)),
+    found = basins(oscillator(), (place, np.linspace(-1e-4, 2e-3, count)),
                    (speed, np.linspace(-0.08, 0.08, count)), transient_periods=periods, keep=4,
                    **settings)
     print(f"{found.label.size} starts, {time.perf_counter() - begin:.0f} s")
     for one in found.attractors:
         print(f"  {one.kind}, {len(one.points)} states: {100.0 * one.share:.2f} %")
     plot_basins(found, x_label="y at the start [m]", y_label="y' at the start [m/s]",
-                rows=[axis.row(oscillator(42.5)) for axis in (place, speed)],
+                rows=[axis.row(oscillator()) for axis in (place, speed)],
                 path="million_starts.png")
 
 
 def diagram(count: int, periods: int, **settings: Any) -> None:
     """States once a period over the frequency, up and down, and their picture."""
     begin = time.perf_counter()
-    found = poincare_scan(oscillator(42.5), FREQUENCY, np.linspace(20.0, 50.0, count),
+    found = poincare_scan(oscillator(), FREQUENCY, np.linspace(3.2, 8.0, count),
                           transient_periods=periods, keep=32, initial=np.zeros(2), **settings)
     up, down = found.observed("B", "y")
     print(f"{count} frequencies, {time.perf_counter() - begin:.0f} s")
@@ -76,7 +76,7 @@ def diagram(count: int, periods: int, **settings: Any) -> None:
         shares = [np.mean((np.abs(y[:, p:] - y[:, :-p]) < 1e-7).all(axis=1)) for p in (1, 2, 3, 4)]
         print(f"  {way}: repeats after 1, 2, 3 or 4 periods at "
               + ", ".join(f"{100.0 * share:.1f}" for share in shares) + " %")
-    plot_poincare_scan(found, "B", "y", x_label="frequency of the drive [rad/s]",
+    plot_poincare_scan(found, "B", "y", x_label="frequency of the drive [Hz]",
                        y_label="y once a period [m]", path="hundred_thousand_frequencies.png")
 
 

@@ -8,7 +8,6 @@ contact presses into it locally.
 Usage: python examples/sliding_beam.py [FOLDER] [--quick]   (half a minute; prints, draws, films)
 """
 
-import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -49,7 +48,7 @@ def system(beam: fc.ElasticBody, nodes: int = 40, modes: int = 12, **basis: Any
                                         decay=2.0, smoothing_slope=1e4),
         ground=fc.Ground(speed=2.0, amplitude=30e-6, wavelength=0.12),
         drive=fc.Drive(stiffness_x=2e5, damping_x=50.0, amplitude_x=0.3e-3,
-                       angular_frequency=2.0 * math.pi * 60.0),
+                       frequency_hz=60.0),
         load=fc.Load(normal=400.0),
     )
 

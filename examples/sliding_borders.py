@@ -89,7 +89,7 @@ def driven(quick: bool) -> tuple[ContactField, Branch]:
     system = fc.ContactSystem(
         basis, normal=PrescribedForce(1.0), friction=ConstantFriction(0.4),
         ground=fc.Ground(speed=0.8),
-        drive=fc.Drive(stiffness_x=0.5, amplitude_x=2.0, angular_frequency=1.5))
+        drive=fc.Drive(stiffness_x=0.5, amplitude_x=2.0, frequency_hz=1.5 / (2.0 * np.pi)))
     field = contact_field(system, ["ground.speed"])
     motion = periodic_motion(system, solver=SetValued())
     return field, orbit_branch(field, motion, method=Shooting(1, solver=SetValued()),

@@ -141,13 +141,13 @@ def spheres(rings: int, poisson_ratio: float = RATIO, part: float = PART, angle:
         tributary=area, damping=0.5)
     # The face is so stiff that the spheres alone give way.
     face = 1e6 * exact.peak / WIDTH * area.sum()
-    w = 2.0 * np.pi * frequency
-    speed = exact.displacement(part) * w
+    speed = 2.0 * np.pi * frequency * exact.displacement(part)
+    sway = [HarmonicSpeed(speed * along, frequency, phase=0.5 * np.pi)
+            for along in (np.cos(angle), np.sin(angle))]
     return fc.ContactSystem(
         basis, LinearContact(face), JenkinsFriction(
             stiffness=1e4 * MU * exact.load / exact.displacement(part), friction_coefficient=MU),
-        ground=fc.Ground(motion=HarmonicSpeed(speed * np.cos(angle), w, phase=0.5 * np.pi),
-                         motion_y=HarmonicSpeed(speed * np.sin(angle), w, phase=0.5 * np.pi)),
+        ground=fc.Ground(motion=sway[0], motion_y=sway[1]),
         # The mean of r^2 over each ring.
         load=fc.Load(normal=exact.load), gap=(edges[1:]**2 + edges[:-1]**2) / (2.0 * RADIUS))
 

@@ -9,10 +9,10 @@ basis = { modes = 3, select = [0, 1], contact_nodes = 1, B = "B", C = "top" }
 normal = { law = "linear", stiffness = 10e6, damping = 40.0 }
 friction = { law = "jenkins", stiffness = 2e4, friction_coefficient = 0.4 }
 load = { normal = 14.0 }
-drive = { stiffness_x = 5610.0, damping_x = 30.0, amplitude_x = 1e-4, angular_frequency = 50.0 }
+drive = { stiffness_x = 5610.0, damping_x = 30.0, amplitude_x = 1e-4, frequency_hz = 7.95775 }
 
 [response]
-bounds_hz = [8.0, 13.0]
+bounds = [8.0, 13.0]
 levels = { "drive.amplitude_x" = [2e-5, 3e-4] }
 harmonics = 3
 samples = 128

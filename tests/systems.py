@@ -25,6 +25,8 @@ from fecontact.laws import (
     RoughSurface,
 )
 
+# Of angular frequencies over frequencies [Hz].
+TURN = 2.0 * np.pi
 SURFACE = RoughSurface(0.3e6, 5.2e-6, 6.0)
 
 
@@ -61,7 +63,7 @@ def impact_oscillator(modes=2, w=64.32):
         basis([0.0, 230.0][:modes], [0.0, 0.03][:modes], shape, shape),
         normal=SURFACE,
         drive=Drive(stiffness_y=99.085, damping_y=0.02046, amplitude_y=0.47e-3,
-                    angular_frequency=w))
+                    frequency_hz=w / TURN))
 
 
 def friction_oscillator(modes=2, **changes):
@@ -74,7 +76,7 @@ def friction_oscillator(modes=2, **changes):
         normal=RoughSurface(10e6, 10e-6, 40.0),
         friction=ExponentialFriction(0.8, 0.55, 1e3, 1e6), ground=Ground(speed=1e-3),
         drive=Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3,
-                    angular_frequency=13.8),
+                    frequency_hz=13.8 / TURN),
         load=Load(14.0))
     return system.with_(**changes) if changes else system
 
@@ -175,7 +177,7 @@ def beam(n=4, modes=6, **parts):
 
 
 DRIVEN = {"ground": Ground(speed=0.05), "drive": Drive(
-    stiffness_x=1e5, damping_x=5.0, amplitude_x=1e-4, angular_frequency=300.0)}
+    stiffness_x=1e5, damping_x=5.0, amplitude_x=1e-4, frequency_hz=300.0 / TURN)}
 
 
 def belt_of_unit_mass(speed=0.2, dashpot=0.0, **parts):

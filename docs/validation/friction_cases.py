@@ -59,7 +59,7 @@ def den_hartog() -> list[Comparison]:
         system = mass_in_plane(
             stiffness=np.diag([0.5, 0.0]), normal=GENTLE, load=Load(1.0),
             friction=ConstantFriction(beta),
-            drive=Drive(stiffness_x=0.5, amplitude_x=2.0, angular_frequency=ratio))
+            drive=Drive(stiffness_x=0.5, amplitude_x=2.0, frequency_hz=ratio / (2.0 * np.pi)))
         periods = 150
         times = np.concatenate([[0.0], np.linspace(periods - 1, periods, 401)])
         times *= 2.0 * np.pi / ratio

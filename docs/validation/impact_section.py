@@ -11,7 +11,9 @@ from impact_calibration import body_of, calibrate, modal_numbers, pendulum_basis
 from impact_oscillator import (
     FREQUENCIES,
     Regime,
+    driven,
     exponent,
+    hertz,
     in_words,
     mesh_system,
     regime,
@@ -22,7 +24,7 @@ from pictures import save
 
 from fecontact import ContactSystem
 
-SHOWN = {
+SHOWN = {  # by frequencies of the source [rad/s]
     64.32: "one closed curve with one contact; bending strong just after separation, all but "
            "gone before the next impact",
     30.84: "two loops that differ a little: period two",
@@ -35,7 +37,7 @@ SHOWN = {
 
 @dataclass(frozen=True)
 class Row:
-    """What one model does at one frequency."""
+    """What one model does at one frequency of the source [rad/s]."""
 
     frequency: float
     modes: int
@@ -44,9 +46,8 @@ class Row:
 
 
 def measured(system: ContactSystem, frequency: float, with_exponent: bool) -> Row:
-    """Settled motion of a model at a frequency."""
-    driven = system.with_({"drive.angular_frequency": frequency})
-    run = settled(driven)
+    """Settled motion of a model at a frequency of the source [rad/s]."""
+    run = settled(driven(system, frequency))
     found = regime(run)
     return Row(frequency, system.basis.modes, found,
                in_words(*exponent(run, found)) if with_exponent else "")
@@ -67,12 +68,18 @@ def section(images: Path) -> str:
     return TEXT.format(
         calibration=calibration_table(), regimes=regimes_table(rows),
         figures=table(("figure", "the source shows", "shown here"),
-                      [(f"4.2-2, {w:g} rad/s", reported, SHOWN[w])
+                      [(f"4.2-2, {both(w)}", reported, SHOWN[w])
                        for w, reported in FREQUENCIES.items()] + [
-                          ("4.2-3, 9.845 rad/s", "displacement, velocity and phase diagram of the "
-                           "chatter", "the same three, and both close to the stop")]),
+                          (f"4.2-3, {both(9.845)}",
+                           "displacement, velocity and phase diagram of the chatter",
+                           "the same three, and both close to the stop")]),
         impacts=impacts_table([row for row in rows if row.modes == 4]),
         window=window(periods), hysteresis=hysteresis(diagram))
+
+
+def both(frequency: float) -> str:
+    """A frequency of the source [rad/s] in both units."""
+    return f"{hertz(frequency):.3f} Hz ({frequency:g} rad/s)"
 
 
 def calibration_table() -> str:
@@ -93,11 +100,11 @@ def regimes_table(rows: list[Row]) -> str:
     lines = []
     for number, row in enumerate(rows):
         found = row.found
-        lines.append((f"{row.frequency:g}", model(number, row), found.name,
+        lines.append((f"{hertz(row.frequency):.3f}", model(number, row), found.name,
                       f"{found.periodicity.misfit:.0e}", span(found.per_period),
                       f"{len(found.rests) / len(found.per_period):g}", row.growth))
     return table(
-        ("w_E [rad/s]", "model", "found", "misfit of the repetition", "impacts a period",
+        ("drive [Hz]", "model", "found", "misfit of the repetition", "impacts a period",
          "rests a period", "largest Lyapunov exponent [1/s]"), lines)
 
 
@@ -118,10 +125,10 @@ def impacts_table(rows: list[Row]) -> str:
     for row in rows:
         count = int(row.found.per_period[: row.found.periodicity.periods or 6].sum())
         impacts = row.found.impacts[np.isfinite(row.found.impacts.restitution)][:count]
-        lines.append((f"{row.frequency:g}", " ".join(f"{v:.2f}" for v in
+        lines.append((f"{hertz(row.frequency):.3f}", " ".join(f"{v:.2f}" for v in
                                                     1e3 * impacts.impact_velocity),
                       " ".join(f"{e:.2f}" for e in impacts.restitution)))
-    return table(("w_E [rad/s]", "impact velocities [mm/s]", "restitution of each"), lines)
+    return table(("drive [Hz]", "impact velocities [mm/s]", "restitution of each"), lines)
 
 
 def window(periods: dict[float, np.ndarray]) -> str:
@@ -138,11 +145,11 @@ def hysteresis(diagram: impact_map.Diagram) -> str:
     low, high = (np.stack([reduce(points[:, :, 0], axis=1) for points in
                            (diagram.up, diagram.down)]) for reduce in (np.min, np.max))
     apart = (np.abs(np.diff(low, axis=0)[0]) + np.abs(np.diff(high, axis=0)[0]) > 20e-6) & (
-        diagram.frequencies > 27.0)
+        diagram.frequencies > 4.3)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], apart.astype(int), [0]])))
     spans = [(diagram.frequencies[first], diagram.frequencies[last - 1])
              for first, last in zip(edges[::2], edges[1::2], strict=True) if last - first > 3]
-    return ", ".join(f"{first:.1f} to {last:.1f} rad/s" for first, last in spans)
+    return ", ".join(f"{first:.2f} to {last:.2f} Hz" for first, last in spans)
 
 
 TEXT = """## Section 4.2: impact oscillator
@@ -159,7 +166,7 @@ What the source does not give, and what is taken here:
   f* = s^2 / 2 and h* = s up to s = 1.
 - The pendulum's dimensions. An aluminium arm with a square bob is calibrated in finite elements
   (`examples/impact_calibration.py`) to the reduced mass 0.092 kg and to the bending mode above. A
-  strip of 6 mm touches the stop; if the whole bottom of the bob did, 37.41 rad/s would give
+  strip of 6 mm touches the stop; if the whole bottom of the bob did, 5.954 Hz would give
   period two.
 
 {calibration}
@@ -173,7 +180,7 @@ growths over 400 periods of motions that do not repeat to 0.1 %.
 
 {regimes}
 
-At 9.845 rad/s the rough contact is hardly damped at small penetrations, and with the rotation and
+At 1.567 Hz the rough contact is hardly damped at small penetrations, and with the rotation and
 one bending mode some ripple is left when the spring lifts the pendulum off. It differs from period
 to period: with two modes these are alike to 1 or 2 % only, and the exponent is not decided: runs of
 different lengths and tolerances give values from -0.3 to +1.4 1/s, the longest ones the smallest.
@@ -203,8 +210,8 @@ impact takes, so that restitution may exceed one.
 
 ### How narrow it is
 
-Two-mode model, followed upwards and downwards over 600 frequencies, 80 periods at each. Chaos
-fills most of the range from 11 to 27 rad/s, and grows out of the chatter; above, different motions
+Two-mode model, followed upwards and downwards over 601 frequencies, 80 periods at each. Chaos
+fills most of the range from 1.75 to 4.3 Hz, and grows out of the chatter; above, different motions
 exist side by side: {hysteresis}.
 
 ![Bifurcation diagram](images/validation/impact-bifurcation.png)
@@ -212,7 +219,7 @@ exist side by side: {hysteresis}.
 Frequency and damping of the bending mode around the fit (cross): periods found at the five
 frequencies ("none" up to 8), and how many agree.
 {window}
-At 37.41 rad/s the source says "higher periodic", which period four is taken for.
+At 5.954 Hz the source says "higher periodic", which period four is taken for.
 
 ![Map of regimes](images/validation/impact-map.png)
 

@@ -26,7 +26,7 @@ from fecontact.laws import JenkinsFriction, LinearContact
 from fecontact.plot import plot_response
 
 TURN = 2.0 * np.pi
-FREQUENCY = "drive.angular_frequency"
+FREQUENCY = "drive.frequency_hz"
 HARMONICS = (1, 3, 5, 9, 15, 25)
 FEW = ContinuationOptions(points=2)
 
@@ -56,7 +56,7 @@ def unilateral() -> ContactSystem:
     rows = np.array([[0.0], [1.0], [0.0]])
     basis = basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows})
     return ContactSystem(basis, normal=LinearContact(3.0, 0.0), drive=Drive(
-        stiffness_y=1.0, damping_y=0.1, amplitude_y=1.0, angular_frequency=0.9))
+        stiffness_y=1.0, damping_y=0.1, amplitude_y=1.0, frequency_hz=0.9 / TURN))
 
 
 def published() -> list[Comparison]:
@@ -75,8 +75,8 @@ def published() -> list[Comparison]:
     rows.append(Comparison("Duffing, P = 0.01, W = 0.6: third harmonic (to leading order)",
                            float(third), float(abs(low.harmonic(3)[0]))))
     for w, amplitude in ((1.1, 5.70250434), (1.2, 3.88731412)):
-        one = frequency_response(jenkins(), (w, 1.3), method=HarmonicBalance(1, 4096),
-                                 options=FEW)
+        one = frequency_response(jenkins(), (w / TURN, 1.3 / TURN),
+                                 method=HarmonicBalance(1, 4096), options=FEW)
         rows.append(Comparison(f"Jenkins element, one harmonic, w = {w:g}: amplitude", amplitude,
                                float(abs(one.harmonic(1)[0]))))
     return [*rows, *mathieu()]
@@ -109,14 +109,15 @@ def convergence() -> str:
     strong = vector_field(example.hardening, {"W": 1.0, "P": 2.0}, ["x", "v"],
                           period=lambda p: TURN / p["W"])
     rows = []
-    for name, field, parameter, w, seen in (
+    for name, field, parameter, value, seen in (
             ("Duffing, P = 2, W = 1", strong, "W", 1.0, None),
             ("Duffing, P = 0.18, W = 1", duffing(), "W", 1.0, None),
-            ("mass that leaves a stop, w = 0.9", _field(unilateral()), FREQUENCY, 0.9, "y"),
-            ("mass with a Jenkins element, w = 1.2", _field(jenkins()), FREQUENCY, 1.2, "x")):
+            ("mass that leaves a stop, w = 0.9", _field(unilateral()), FREQUENCY, 0.9 / TURN, "y"),
+            ("mass with a Jenkins element, w = 1.2", _field(jenkins()), FREQUENCY, 1.2 / TURN,
+             "x")):
         samples = 512 if seen is None else 2048
-        exact = motion(field, parameter, w, HarmonicBalance(61, samples), seen)
-        errors = [apart(motion(field, parameter, w, HarmonicBalance(H, samples), seen), exact)
+        exact = motion(field, parameter, value, HarmonicBalance(61, samples), seen)
+        errors = [apart(motion(field, parameter, value, HarmonicBalance(H, samples), seen), exact)
                   for H in HARMONICS]
         rows.append((name, *(f"{error:.1e}" for error in errors)))
     return table(("", *(f"H = {H}" for H in HARMONICS)), rows)
@@ -127,11 +128,11 @@ def _field(system: ContactSystem) -> ContactField:
 
 
 def motion(
-    field: Any, parameter: str, w: float, method: HarmonicBalance, seen: str | None
+    field: Any, parameter: str, value: float, method: HarmonicBalance, seen: str | None
 ) -> np.ndarray:
-    """Displacement (501,) of the orbit from rest at a frequency."""
+    """Displacement (501,) of the orbit from rest at a value of the parameter."""
     row = np.eye(field.dimension)[0] if seen is None else field.displacement_row("B", seen)
-    found = frequency_response(field, (w, 1.05 * w), parameter, method=method, options=FEW,
+    found = frequency_response(field, (value, 1.05 * value), parameter, method=method, options=FEW,
                                observe=row if seen is None else ("B", seen))
     return np.asarray(found.branches[0].points[0].orbit(samples=501).states @ row)
 
@@ -144,12 +145,12 @@ def apart(one: np.ndarray, other: np.ndarray) -> float:
 def methods() -> str:
     """Half the range of the displacement by harmonic balance, collocation, shooting and a run."""
     rows = []
-    for name, system, w, component in (
-            ("mass that leaves a stop, w = 0.9", unilateral(), 0.9, "y"),
-            ("mass with a Jenkins element, w = 1.2", jenkins(), 1.2, "x")):
+    for name, system, hz, component in (
+            ("mass that leaves a stop, w = 0.9", unilateral(), 0.9 / TURN, "y"),
+            ("mass with a Jenkins element, w = 1.2", jenkins(), 1.2 / TURN, "x")):
         field = _field(system)
         start = frequency_response(
-            system, (w, 1.05 * w), observe=("B", component), options=FEW,
+            system, (hz, 1.05 * hz), observe=("B", component), options=FEW,
             method=HarmonicBalance(40, 2048)).branches[0].points[0]
         given, row = start.orbit(field), field.displacement_row("B", component)
         found = [half_range(given.states @ row)]
@@ -158,9 +159,10 @@ def methods() -> str:
             if isinstance(method, Collocation) and component == "x":
                 found.append(np.nan)
                 continue
-            other = orbit_branch(field, given, method=method, bounds=(w, 1.05 * w), options=FEW)
+            other = orbit_branch(field, given, method=method, bounds=(hz, 1.05 * hz),
+                                 options=FEW)
             found.append(half_range(other.points[0].orbit(field, 4001).states @ row))
-        found.append(half_range(settled(field.system(start.parameter_values(field)), TURN / w,
+        found.append(half_range(settled(field.system(start.parameter_values(field)), 1.0 / hz,
                                         given.states[0], 200) @ row))
         rows.append((name, *("" if np.isnan(one) else f"{one:.7f}" for one in found)))
     return table(("", "harmonic balance", "collocation", "shooting", "run in time"), rows)
@@ -186,12 +188,11 @@ def half_range(values: np.ndarray) -> float:
 
 def bodies() -> str:
     """Amplitudes of elastic bodies with friction dampers beside runs."""
-    name = "load.forces.0.signal.angular_frequency"
+    name = "load.forces.0.signal.frequency_hz"
     beam = friction_damper.damped_beam(friction_damper.BEST, 101.0).with_(
         **{"interfaces.damper.friction.smoothing_slope": 200.0})
-    w = TURN * 357.0
     pair = contact_field(blade_pair.blade_pair(5.236), {blade_pair.FREQUENCY: (
-        w, blade_pair.excited_at)})
+        357.0, blade_pair.excited_at)})
     rows = []
     for what, field, parameter, seen, hz, kinds, periods in (
             ("beam with a friction damper, 101 Hz", contact_field(beam, [name]), name,
@@ -201,7 +202,7 @@ def bodies() -> str:
         amplitudes, row = [], field.displacement_row(*seen)
         for H, samples in kinds:
             point = frequency_response(
-                field, (TURN * hz, 1.02 * TURN * hz), parameter, observe=seen,
+                field, (hz, 1.02 * hz), parameter, observe=seen,
                 method=HarmonicBalance(H, samples, stability=None),
                 options=ContinuationOptions(points=1)).branches[0].points[0]
             amplitudes.append((H, float(point.values["observed_amplitude"])))

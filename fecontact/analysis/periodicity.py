@@ -26,7 +26,7 @@ _TRIED, _MOST_LINES = 8, 33  # candidates of a lag, and multiples of the period 
 
 def drive_period(system: ContactSystem) -> float:
     """Period of the drive at B [s]; InputError if it has none."""
-    frequency = system.drive.frequency_hz
+    frequency = system.drive.fundamental_hz
     if not frequency > 0.0:
         raise InputError("The drive of the system does not repeat, so it has no period; give the "
                          "period.")
@@ -139,7 +139,7 @@ def strobed_states(
     """
     require_kind("strobed_states", Trajectory, trajectory=trajectory)
     t = trajectory.time
-    if period is None and not trajectory.system.drive.frequency_hz > 0.0:
+    if period is None and not trajectory.system.drive.fundamental_hz > 0.0:
         return section_states(trajectory, t_start=t_start)
     if period is None:
         period = drive_period(trajectory.system)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from fecontact.bifurcation.harmonic.method import HarmonicBalance
     from fecontact.bifurcation.orbit_methods import Method
 
-_FREQUENCY = "angular_frequency"
+_FREQUENCY = "frequency_hz"
 
 
 @dataclass(frozen=True)
@@ -26,15 +26,12 @@ class ResponseSettings:
     Parameters
     ----------
     parameter : str
-        Dotted name of the number of the study that changes along a response, an angular frequency
-        or any other, such as the amplitude of a force.
+        Dotted name of the number of the study that changes along a response, a frequency or any
+        other, such as the amplitude of a force.
     bounds : (float, float), optional
-        Its least and largest value, an angular frequency in rad/s.
-    bounds_hz : (float, float), optional
-        The same of an angular frequency, in Hz, in place of ``bounds``.
+        Its least and largest value, of a frequency in Hz.
     start : float, optional
-        Where responses start, in the unit of the bounds; the least value by default, inside they
-        are followed both ways.
+        Where responses start; the least value by default, inside they are followed both ways.
     levels : table of one list, optional
         Another parameter and its values, a response for each:
         ``levels = { "drive.amplitude_x" = [1e-5, 2e-5] }``.
@@ -84,9 +81,8 @@ class ResponseSettings:
         ``["C x", "B y"]``: a point or number of a contact node, and a component.
     """
 
-    parameter: str = "drive.angular_frequency"
+    parameter: str = "drive.frequency_hz"
     bounds: tuple[float, float] | None = None
-    bounds_hz: tuple[float, float] | None = None
     start: float | None = None
     levels: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     amplitudes: tuple[float, ...] = ()
@@ -115,13 +111,6 @@ class ResponseSettings:
         if self.step > self.largest_step:
             raise InputError(f"ResponseSettings: step = {self.step:g} must not be above "
                              f"largest_step = {self.largest_step:g}.")
-        if self.bounds is not None and self.bounds_hz is not None:
-            raise InputError(f"ResponseSettings: bounds = {list(self.bounds)} and bounds_hz = "
-                             f"{list(self.bounds_hz)} mean the same; leave out one of them.")
-        if self.bounds_hz is not None and not self.over_frequency:
-            raise InputError(f"ResponseSettings: bounds_hz = {list(self.bounds_hz)} is for an "
-                             f"angular frequency, but parameter = '{self.parameter}'; give its "
-                             f"bounds by the key 'bounds'.")
         self._check_levels()
         self._check_amplitudes()
         _ = self.also_observed
@@ -159,18 +148,16 @@ class ResponseSettings:
                              f"responses go; take another one.")
 
     def _check_bounds(self) -> None:
-        given = self.bounds if self.bounds_hz is None else self.bounds_hz
-        if given is None:
+        if self.bounds is None:
             return
-        name = "bounds" if self.bounds_hz is None else "bounds_hz"
-        low, high = given
-        require_finite(f"ResponseSettings: {name}", low=low, high=high)
+        low, high = self.bounds
+        require_finite("ResponseSettings: bounds", low=low, high=high)
         if not low < high:
-            raise InputError(f"ResponseSettings: {name} = {list(given)} must be two values, the "
-                             f"smaller one first.")
+            raise InputError(f"ResponseSettings: bounds = {list(self.bounds)} must be two values, "
+                             f"the smaller one first.")
         if self.over_frequency and low <= 0.0:
-            raise InputError(f"ResponseSettings: {name} = {list(given)} must be frequencies above "
-                             f"zero.")
+            raise InputError(f"ResponseSettings: bounds = {list(self.bounds)} must be frequencies "
+                             f"above zero [Hz].")
         if self.start is not None:
             require_finite("ResponseSettings", start=self.start)
             if not low <= self.start <= high:
@@ -179,28 +166,21 @@ class ResponseSettings:
 
     @property
     def over_frequency(self) -> bool:
-        """Whether the parameter is an angular frequency."""
+        """Whether the parameter is a frequency [Hz]."""
         return self.parameter.rpartition(".")[2] == _FREQUENCY
 
     @property
-    def _factor(self) -> float:
-        return 1.0 if self.bounds_hz is None else 2.0 * math.pi
-
-    @property
     def checked_bounds(self) -> tuple[float, float]:
-        """The bounds in the unit of the parameter; InputError where there are none."""
-        given = self.bounds if self.bounds_hz is None else self.bounds_hz
-        if given is None:
-            key, option = (("bounds_hz", "--hz LOW HIGH") if self.over_frequency
-                           else ("bounds", "--bounds LOW HIGH"))
-            raise InputError(f"[response] lacks the key '{key}', the least and largest value of "
-                             f"{self.parameter}; give it, or {option}.")
-        return given[0] * self._factor, given[1] * self._factor
+        """The bounds; InputError where there are none."""
+        if self.bounds is None:
+            raise InputError(f"[response] lacks the key 'bounds', the least and largest value of "
+                             f"{self.parameter}; give it, or --bounds LOW HIGH.")
+        return self.bounds
 
     @property
     def first(self) -> float:
-        """Where responses start, in the unit of the parameter."""
-        return self.checked_bounds[0] if self.start is None else self.start * self._factor
+        """Where responses start."""
+        return self.checked_bounds[0] if self.start is None else self.start
 
     @property
     def also_observed(self) -> tuple[tuple[str | int, str], ...]:

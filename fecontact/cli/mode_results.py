@@ -15,7 +15,7 @@ _COLUMNS = ("kind", "amplitude", "frequency_hz", "damping_ratio", "loss", "energ
             "truncation_error")
 _SHOWN = 8  # rows of the table
 # Keys of [response] that a mode does not read.
-_OF_RESPONSES = ("parameter", "bounds", "bounds_hz", "start", "levels", "most_harmonics",
+_OF_RESPONSES = ("parameter", "bounds", "start", "levels", "most_harmonics",
                  "stability", "step", "largest_step", "points")
 _SAME = 1e-3  # relative difference of amplitudes that mean the same
 
@@ -130,7 +130,7 @@ def mode_csv(mode: "NonlinearMode") -> str:
     return csv_text([_COLUMNS, *([
         point.kind or "",
         *(repr(float(column[place])) for column in (
-            mode.amplitude, mode.frequency, mode.damping_ratio, mode.loss)),
+            mode.amplitude, mode.frequency_hz, mode.damping_ratio, mode.loss)),
         "" if energy is None else repr(float(energy[place])),
         "" if stable is None else int(stable[place]),
         repr(float(point.values["truncation_error"]))]
@@ -149,6 +149,6 @@ def mode_table(mode: "NonlinearMode") -> Any:
     return table(
         "", f"amplitude of {mode.observed}", "frequency [Hz]", "damping ratio",
         rows=((mode.branch.points[place].kind or "",
-               quantity(float(mode.amplitude[place]), unit, 5), f"{mode.frequency[place]:.6g}",
+               quantity(float(mode.amplitude[place]), unit, 5), f"{mode.frequency_hz[place]:.6g}",
                "none" if mode.conservative else f"{mode.damping_ratio[place]:.4g}")
               for place in sorted(chosen)))

@@ -18,10 +18,9 @@ Folder = Annotated[Path | None, Parameter(
 Branches = Annotated[str | None, Parameter(
     name="--branch", help="Of a file of branches: name of one, or its number from 0; of a level.")]
 At = Annotated[float | None, Parameter(
-    help="Of a file of branches: the orbit at this value of the parameter, of a nonlinear mode "
-    "that of this amplitude [m]; by default that of the largest observed amplitude.")]
-AtHz = Annotated[float | None, Parameter(
-    name="--at-hz", help="The same of an angular frequency, in Hz.")]
+    help="Of a file of branches: the orbit at this value of the parameter, a frequency in Hz; of a "
+    "nonlinear mode that of this amplitude [m]; by default that of the largest observed "
+    "amplitude.")]
 Which = Annotated[int, Parameter(
     help="Which of several orbits at this value, counted along the branch from 0.")]
 All = Annotated[bool, Parameter(

@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from fecontact.study.sections import RenderSettings
 
 DIAGRAMS = ("branches", "response", "mode")  # plots of whole files
-_TURN, _FREQUENCY = 2.0 * np.pi, "angular_frequency"
 _OUTPUTS = 1001  # of an orbit
-_NEAR = 1e-9  # what rounding may do to a frequency
 
 
 @dataclass(frozen=True)
@@ -35,15 +33,14 @@ class OrbitChoice:
     ----------
     branch : str or None
         Name or number of a branch.
-    at, at_hz : float or None
-        Value of the parameter, or of an angular frequency in Hz.
+    at : float or None
+        Value of the parameter, of a frequency in Hz.
     which : int
         Which of several there, counted along the branch.
     """
 
     branch: str | None = None
     at: float | None = None
-    at_hz: float | None = None
     which: int = 0
 
 
@@ -66,7 +63,7 @@ def stored_orbit_or_run(
 
     if not holds_branches(file):
         if choice != OrbitChoice():
-            raise InputError(f"--branch, --at, --at-hz and --which choose an orbit of a file of "
+            raise InputError(f"--branch, --at and --which choose an orbit of a file of "
                              f"branches, NAME-branch.h5 or NAME-response.h5, but {file} is none.")
         return stored_run(file, trust, changes)
     require_stored(file, changes)
@@ -80,7 +77,7 @@ def stored_orbit_or_run(
     settings = _settings(model)
     if settings.title is None:
         period = float(point.values["period"])
-        place = ("" if branch.parameter_name.endswith((_FREQUENCY, "xi"))
+        place = ("" if branch.parameter_name.endswith(("frequency_hz", "xi"))
                  else f"{branch.parameter_name} = {point.parameter:.5g}, ")
         settings = replace(settings, title=f"{_called(name, branch)}{place}{1.0 / period:.5g} Hz")
     return StoredRun(file, run, settings, True, model.study, model.versions)
@@ -97,9 +94,6 @@ def _motion(
     from fecontact.bifurcation.nonlinear_modes.linear_start import unforced, with_mass_damping
     from fecontact.bifurcation.orbits.motions import sampled_run
 
-    if choice.at_hz is not None:
-        raise InputError(f"--at-hz = {choice.at_hz:g} is for branches over an angular frequency, "
-                         f"but {file} holds a nonlinear mode; give its amplitude by --at.")
     amplitudes = np.asarray(branch.column("observed_amplitude"))
     wanted = amplitudes.max() if choice.at is None else choice.at
     point = branch.points[int(np.argmin(np.abs(amplitudes - wanted)))]
@@ -151,25 +145,11 @@ def _point(
     file: Path, branch: "Branch", field: "ContactField", choice: OrbitChoice
 ) -> "BranchPoint":
     """The orbit that is chosen; of the largest observed amplitude where nothing is."""
-    name = branch.parameter_name
-    if choice.at is not None and choice.at_hz is not None:
-        raise InputError("--at and --at-hz mean the same; give one of them.")
-    if choice.at_hz is not None and not name.endswith(_FREQUENCY):
-        raise InputError(f"--at-hz = {choice.at_hz:g} is for branches over an angular frequency, "
-                         f"but those of {file} are over {name}; give --at.")
-    value = choice.at if choice.at_hz is None else _TURN * choice.at_hz
-    if choice.at_hz is not None:
-        low, high = branch.parameter.min() / _TURN, branch.parameter.max() / _TURN
-        if not low * (1.0 - _NEAR) <= choice.at_hz <= high * (1.0 + _NEAR):
-            raise InputError(f"--at-hz = {choice.at_hz:g}: the branch lies between {low:.6g} and "
-                             f"{high:.6g} Hz; choose a frequency there, or follow it further.")
-        value = float(np.clip(_TURN * choice.at_hz, branch.parameter.min(),
-                              branch.parameter.max()))
-    if value is None:
+    if choice.at is None:
         amplitudes = [float(point.values.get("observed_amplitude", 0.0)) if point.is_orbit else -1.0
                       for point in branch.points]
         return branch.points[int(np.argmax(amplitudes))]
-    return branch.at(field, value, choice.which)
+    return branch.at(field, choice.at, choice.which)
 
 
 def _settings(model: "StoredModel") -> "RenderSettings":

@@ -131,8 +131,8 @@ def require_kind_of_plot(kind: str | None, file: Path, choice: OrbitChoice) -> s
                          f"which fecontact branch and response write, but {file} holds a run; "
                          f"its plots are: {known}.")
     if kind in DIAGRAMS and choice != OrbitChoice():
-        raise InputError(f"The plot '{kind}' is one of the whole file, without --branch, --at, "
-                         f"--at-hz and --which; plots of an orbit are: {of_runs}.")
+        raise InputError(f"The plot '{kind}' is one of the whole file, without --branch, --at "
+                         f"and --which; plots of an orbit are: {of_runs}.")
     if kind not in KINDS and kind not in DIAGRAMS:
         near = nearest(kind, (*KINDS, *(DIAGRAMS if holds_branches(file) else ())))
         raise InputError(f"There is no plot '{kind}'{near}; there are: {known}.")

@@ -113,8 +113,8 @@ def response_table(
     from fecontact.output.plots.responses.response import drawn, drawn_label, level_texts
 
     label, _, unit = drawn_label(response).removesuffix("]").rpartition(" [")
-    # An angular frequency is told in Hz; the frequency of the response is then the same.
-    over_frequency = response.parameter_name.endswith("angular_frequency")
+    # The frequency of the response is then the same.
+    over_frequency = response.parameter_name.endswith("frequency_hz")
     name, texts = ("", [""]) if response.level_name is None else level_texts(response)
     rows = []
     for level, branch in enumerate(response.branches):

@@ -244,7 +244,7 @@ class ResponseData(FitData):
         Parameters of the model in this measurement, such as its level:
         ``{"drive.amplitude_x": 2e-3}``.
     parameter : str
-        Dotted name of the angular frequency of the excitation.
+        Dotted name of the frequency of the excitation [Hz].
     method : HarmonicBalance, optional
         Harmonics and samples.
     options : ContinuationOptions, optional
@@ -262,7 +262,7 @@ class ResponseData(FitData):
     point: str | int = "B"
     component: str = "x"
     changes: Any = None
-    parameter: str = "drive.angular_frequency"
+    parameter: str = "drive.frequency_hz"
     method: HarmonicBalance | None = None
     options: ContinuationOptions | None = None
 
@@ -287,7 +287,7 @@ class ResponseData(FitData):
 
     def predicted(self, system: ContactSystem) -> Array:
         """Amplitudes of the model (n,)."""
-        wanted = 2.0 * np.pi * self.frequency_hz
+        wanted = self.frequency_hz
         low, high = float(wanted.min()), float(wanted.max())
         method = self.method or HarmonicBalance(stability=None)
         found = frequency_response(
@@ -303,18 +303,18 @@ class ResponseData(FitData):
                       slice(0, len(self.amplitude)))]
 
 
-def _spline(w: Array, A: Array) -> tuple[Array, Any]:
-    """Places s (k,) of the points of a branch, and a cubic spline of w and log A over s."""
+def _spline(f: Array, A: Array) -> tuple[Array, Any]:
+    """Places s (k,) of the points of a branch, and a cubic spline of f and log A over s."""
     from scipy.interpolate import CubicSpline
 
-    points = np.column_stack([w / np.mean(w), np.log(A)])
+    points = np.column_stack([f / np.mean(f), np.log(A)])
     chords = np.hypot(*np.diff(points, axis=0).T)
     # Special points repeat their neighbours.
     kept = np.append(True, chords > 1e-9)
     s = np.append(0.0, np.cumsum(chords[kept[1:]]))
     if len(s) < 2:
         raise AnalysisError("The response of the model has a single point.")
-    return s, CubicSpline(s, np.column_stack([w, np.log(A)])[kept])
+    return s, CubicSpline(s, np.column_stack([f, np.log(A)])[kept])
 
 
 def _nearest(s: Array, curve: Any, at: float, seen: float) -> float:
@@ -327,5 +327,5 @@ def _nearest(s: Array, curve: Any, at: float, seen: float) -> float:
     found += [float(np.exp(curve(brentq(lambda x: float(curve(x)[0]) - at, s[k], s[k + 1]))[1]))
               for k in np.flatnonzero(off[:-1] * off[1:] < 0.0)]
     if not found:
-        raise AnalysisError(f"The response of the model ends before {at / (2.0 * np.pi):.5g} Hz.")
+        raise AnalysisError(f"The response of the model ends before {at:.5g} Hz.")
     return min(found, key=lambda value: abs(value - seen))

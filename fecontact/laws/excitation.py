@@ -1,6 +1,5 @@
 """Excitation at B and loads."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -34,7 +33,7 @@ _COMPONENTS = ("x", "y", "z", "phi", "phi_x", "phi_y", "phi_z")
 class Drive:
     r"""Base excitation of B through springs and dashpots (4.1-8..11).
 
-    .. math:: F_{Bx} = c_x (x_B - u_x(t)) + b_x x_B', \qquad u_x(t) = x_0 \sin w_E t
+    .. math:: F_{Bx} = c_x (x_B - u_x(t)) + b_x x_B', \qquad u_x(t) = x_0 \sin 2 \pi f_E t
 
     acts on the body in -x, and likewise in y and, of solids, in z; u_x may be another motion. By
     default the dashpots act on the absolute velocity of B, as here; relative ones on ``x_B' -
@@ -48,8 +47,8 @@ class Drive:
         b_x, b_y, b_z, zero or above [N s/m].
     amplitude_x, amplitude_y, amplitude_z : float
         x_0, y_0, z_0 [m].
-    angular_frequency : float
-        w_E, zero or above [rad/s].
+    frequency_hz : float
+        f_E, zero or above [Hz].
     motion_x, motion_y, motion_z : Signal, optional
         u_x(t), u_y(t), u_z(t) [m], instead of the harmonic motion.
     dashpots : 'absolute' or 'relative'
@@ -71,7 +70,7 @@ class Drive:
     amplitude_x: Annotated[float, Unit("m")] = 0.0
     amplitude_y: Annotated[float, Unit("m")] = 0.0
     amplitude_z: Annotated[float, Unit("m")] = field(default=0.0, kw_only=True)
-    angular_frequency: Annotated[float, Unit("rad/s")] = 0.0
+    frequency_hz: Annotated[float, Unit("Hz")] = 0.0
     motion_x: Annotated[Signal | None, Unit("m")] = None
     motion_y: Annotated[Signal | None, Unit("m")] = None
     motion_z: Annotated[Signal | None, Unit("m")] = field(default=None, kw_only=True)
@@ -79,7 +78,7 @@ class Drive:
 
     def __post_init__(self) -> None:
         given = vars(self)
-        require_not_negative("Drive", angular_frequency=self.angular_frequency,
+        require_not_negative("Drive", frequency_hz=self.frequency_hz,
                              **{name: given[name] for name in _SUPPORTS})
         require_choice("Drive", "dashpots", self.dashpots, ("absolute", "relative"))
         require_finite("Drive", **{name: given[name] for _, name in _MOTIONS})
@@ -91,10 +90,10 @@ class Drive:
             if given[amplitude] != 0.0:
                 raise InputError(f"Drive: {amplitude} = {given[amplitude]!r} cannot be combined "
                                  f"with {name}; give one of them.")
-        if self.motion_x is not None and self.motion_y is not None and self.angular_frequency and (
+        if self.motion_x is not None and self.motion_y is not None and self.frequency_hz and (
                 self.motion_z is not None or not self.amplitude_z):
-            raise InputError(f"Drive: angular_frequency = {self.angular_frequency!r} has no "
-                             f"effect beside motion_x and motion_y; leave it out.")
+            raise InputError(f"Drive: frequency_hz = {self.frequency_hz!r} has no effect "
+                             f"beside motion_x and motion_y; leave it out.")
 
     @property
     def stiffness(self) -> tuple[float, float, float]:
@@ -109,10 +108,10 @@ class Drive:
     @cached_property
     def motions(self) -> tuple[Signal, Signal, Signal]:
         """Motions of the driven ends of the springs in x, y and z [m]."""
-        w = self.angular_frequency
-        return (self.motion_x or Harmonic(self.amplitude_x, w),
-                self.motion_y or Harmonic(self.amplitude_y, w),
-                self.motion_z or Harmonic(self.amplitude_z, w))
+        f = self.frequency_hz
+        return (self.motion_x or Harmonic(self.amplitude_x, f),
+                self.motion_y or Harmonic(self.amplitude_y, f),
+                self.motion_z or Harmonic(self.amplitude_z, f))
 
     @property
     def moves(self) -> tuple[bool, bool, bool]:
@@ -129,19 +128,19 @@ class Drive:
                     or self.motion_z is not None)
 
     @property
-    def frequency_hz(self) -> float:
+    def fundamental_hz(self) -> float:
         """Frequency of the excitation [Hz]; zero without one.
 
         That of the harmonic motion if it has an amplitude, else the lowest one of motion_x,
-        motion_y and motion_z, else w_E / (2 pi).
+        motion_y and motion_z, else f_E.
         """
         given = [motion for motion in (self.motion_x, self.motion_y, self.motion_z)
                  if motion is not None]
-        harmonic = self.angular_frequency > 0.0 and (
+        harmonic = self.frequency_hz > 0.0 and (
             self.amplitude_x or self.amplitude_y or self.amplitude_z)
         if harmonic or not given:
-            return self.angular_frequency / (2.0 * math.pi)
-        return min((motion.frequency_hz for motion in given if motion.frequency_hz is not None),
+            return self.frequency_hz
+        return min((motion.fundamental_hz for motion in given if motion.fundamental_hz is not None),
                    default=0.0)
 
 
@@ -335,4 +334,4 @@ class Load:
 def _require_signal(owner: str, name: str, given: object, or_number: str = "") -> None:
     if not isinstance(given, Signal):
         raise InputError(f"{owner}: {name} = {given!r} must be a Signal, such as "
-                         f"Harmonic(amplitude, angular_frequency){or_number}.")
+                         f"Harmonic(amplitude, frequency_hz){or_number}.")

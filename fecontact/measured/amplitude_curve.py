@@ -125,7 +125,7 @@ def mode_curve(mode: NonlinearMode) -> AmplitudeCurve:
         Mode of :func:`fecontact.bifurcation.nonlinear_mode`.
     """
     require_kind("mode_curve", NonlinearMode, mode=mode)
-    return AmplitudeCurve(mode.amplitude, mode.frequency, mode.damping_ratio, unit=_unit(
+    return AmplitudeCurve(mode.amplitude, mode.frequency_hz, mode.damping_ratio, unit=_unit(
         mode.observed), observed=mode.observed)
 
 
@@ -164,8 +164,8 @@ def backbone_curve(curve: ResonanceCurve, force: Array | None = None, *, modal_m
     if P.shape != (len(curve),):
         raise InputError(f"backbone_curve: force has the shape {P.shape}; it must have one value "
                          f"for each of the {len(curve)} points.")
-    w, X = curve.angular_frequency, np.abs(curve.harmonic(1))
-    return AmplitudeCurve(curve.amplitude, curve.frequency, P / (2.0 * modal_mass * w**2 * X),
+    w, X = 2.0 * np.pi * curve.frequency_hz, np.abs(curve.harmonic(1))
+    return AmplitudeCurve(curve.amplitude, curve.frequency_hz, P / (2.0 * modal_mass * w**2 * X),
                           unit=_unit(curve.observed), observed=curve.observed)
 
 

@@ -25,7 +25,7 @@ LawGroup = tuple[slice, Array, Any]
 _RETURN_PART = 1e-6
 
 # Numbers of a drive and a load of which the arrays are multilinear functions.
-_MULTILINEAR = frozenset({"load.normal", "drive.angular_frequency", *(
+_MULTILINEAR = frozenset({"load.normal", "drive.frequency_hz", *(
     f"drive.{part}_{axis}" for part in ("stiffness", "damping", "amplitude") for axis in AXES)})
 
 

@@ -242,7 +242,8 @@ class ContactSystem(Summarised):
         low, high = ground.height_range
         stiffness = [f"{quantity(value, 'N/m')} in {axis}"
                      for axis, value in zip("xyz", drive.stiffness, strict=True) if value]
-        moved = drive.frequency_hz if any(motion.largest > 0.0 for motion in drive.motions) else 0.0
+        moves = any(motion.largest > 0.0 for motion in drive.motions)
+        moved = drive.fundamental_hz if moves else 0.0
         return [
             *((name, own[name]) for name in ("bodies", "modes", "frequencies", "contact nodes")
               if name in own),

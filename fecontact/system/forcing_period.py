@@ -33,7 +33,7 @@ def common_period(system: ContactSystem) -> float | None:
 
 
 def drive_sets_period(system: ContactSystem) -> bool:
-    """Whether nothing repeats in time but the drive's motion with its angular frequency.
+    """Whether nothing repeats in time but the drive's motion with its frequency.
 
     Raises
     ------
@@ -58,10 +58,10 @@ def _periods(system: ContactSystem) -> list[tuple[str, float]]:
         if isinstance(source, Constant) or (isinstance(source, _REPEATING)
                                             and source.shortest_period is None):
             continue
-        if source.frequency_hz is None:
+        if source.fundamental_hz is None:
             raise AnalysisError(f"{name} is not periodic; periodic orbits need a drive and loads "
                                 f"that repeat.")
-        periods.append((name, 1.0 / source.frequency_hz))
+        periods.append((name, 1.0 / source.fundamental_hz))
     if not system.prescribed_motion.constant:
         raise AnalysisError("A motion of the ground, or of a side that slides, makes its speed "
                             "depend on time; periodic orbits are computed for constant speed.")

@@ -39,7 +39,7 @@ def parameter_label(
         return _force_label(int(found[1]), found[2], system)
     inner = re.sub(r"^links\.[^.]+\.", "links.", re.sub(r"^interfaces\.[^.]+\.", "", name))
     units = _units(owner).get(inner, frozenset())
-    words = re.sub(r"\b(\w+) \1\b", r"\1", re.sub(r"[._]", " ", name.removeprefix("interfaces.")))
+    words = re.sub(r"\b(\w+) \1\b", r"\1", _words(name.removeprefix("interfaces.")))
     return f"{words} [{next(iter(units))}]" if len(units) == 1 else words
 
 
@@ -54,9 +54,14 @@ def _force_label(number: int, key: str, system: Loaded | None) -> str:
         what = f"{key} of force {number}"
     if key not in _SIZES:
         units = _units(ContactSystem).get(f"load.forces.signal.{key}", frozenset())
-        what = f"{key.replace('_', ' ')} of the {what}"
+        what = f"{_words(key)} of the {what}"
         unit = next(iter(units)) if len(units) == 1 else ""
     return f"{what} [{unit}]" if unit else what
+
+
+def _words(name: str) -> str:
+    """A dotted name as words; the unit is said beside them."""
+    return re.sub(r"[._]", " ", re.sub(r"_hz\b", "", name))
 
 
 def _place(point: Any) -> str:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from systems import TURN
 
 from fecontact import (
     AnalysisError,
@@ -273,7 +274,7 @@ def test_impacts_per_period_of_a_driven_mass():
     rows = np.array([[0.0], [1.0], [0.0]])
     basis = basis_from_matrices([[0.092]], [[0.0]], {"contact": rows[None], "B": rows})
     system = ContactSystem(basis, normal=RoughSurface(0.3e6, 5.2e-6, 6.0), drive=Drive(
-        stiffness_y=99.085, damping_y=0.02046, amplitude_y=0.47e-3, angular_frequency=w))
+        stiffness_y=99.085, damping_y=0.02046, amplitude_y=0.47e-3, frequency_hz=w / TURN))
     period = 2.0 * np.pi / w
     run = simulate(system, 60.0 * period, outputs=60 * 400 + 1)
     found = find_impacts(run)

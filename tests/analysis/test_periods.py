@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from systems import belt
+from systems import TURN, belt
 
 from fecontact import ContactSystem, Drive, InputError, ModalBasis, simulate
 from fecontact.analysis import count_periods, periodicity, section_states, strobed_states
@@ -103,7 +103,7 @@ def linear_oscillator(w, damping=0.4):
     basis = ModalBasis([0.0], [[0.0]], T, np.zeros((3, 2)), [1.0])
     return ContactSystem(basis, RoughSurface(1e6, 1e-5, 0.0), ConstantFriction(0.0), gap=1.0,
                          drive=Drive(stiffness_x=1.0, damping_x=damping, amplitude_x=1.0,
-                                     angular_frequency=w))
+                                     frequency_hz=w / TURN))
 
 
 @pytest.mark.parametrize("outputs", [2001, 2344])

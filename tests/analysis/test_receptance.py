@@ -118,7 +118,7 @@ def test_run_in_time_moves_as_the_response_says():
     pushed = ContactSystem(
         system.basis, normal=system.normal, friction=system.friction, ground=system.ground,
         drive=system.drive, load=Load(50.0, (PointLoad("C", "y", signal=Harmonic(
-            force, 2.0 * np.pi * f)),)))
+            force, f)),)))
     response = receptance(pushed, f, [("C", "y")], [(0, "x"), ("B", "y")],
                           linearised_at="sliding").values[0, :, 0]
     times = np.concatenate([[0.0], np.linspace(20.0, 21.0, 601) / f])

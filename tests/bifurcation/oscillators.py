@@ -2,6 +2,7 @@
 
 import numpy as np
 from scipy.special import ellipk
+from systems import TURN
 
 from fecontact import ContactSystem, Drive, basis_from_matrices
 from fecontact.bifurcation import contact_field, vector_field
@@ -38,12 +39,12 @@ def jenkins_system(w=1.1, amplitude=1.0):
     return ContactSystem(
         one_mode(), normal=PrescribedForce(1.0),
         friction=JenkinsFriction(stiffness=0.5, friction_coefficient=1.0),
-        drive=Drive(stiffness_x=1.0, damping_x=0.02, amplitude_x=amplitude, angular_frequency=w))
+        drive=Drive(stiffness_x=1.0, damping_x=0.02, amplitude_x=amplitude, frequency_hz=w / TURN))
 
 
 def jenkins(w=1.1, **options):
     """The same over its frequency."""
-    return contact_field(jenkins_system(w, **options), ["drive.angular_frequency"])
+    return contact_field(jenkins_system(w, **options), ["drive.frequency_hz"])
 
 
 def jenkins_amplitude(w, amplitude=1.0):
@@ -71,5 +72,5 @@ def unilateral(w=1.0, **options):
     basis = basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows})
     return contact_field(ContactSystem(
         basis, normal=LinearContact(3.0, 0.0),
-        drive=Drive(stiffness_y=1.0, damping_y=0.1, amplitude_y=1.0, angular_frequency=w)),
-        ["drive.angular_frequency"])
+        drive=Drive(stiffness_y=1.0, damping_y=0.1, amplitude_y=1.0, frequency_hz=w / TURN)),
+        ["drive.frequency_hz"])

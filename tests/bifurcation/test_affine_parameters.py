@@ -4,6 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 import pytest
+from systems import TURN
 
 import fecontact as fc
 from fecontact.bifurcation import HarmonicBalance, contact_field, frequency_response
@@ -23,7 +24,7 @@ from fecontact.laws import (
 from fecontact.system.arrays import multilinear
 from fecontact.system.contact_system import ContactSystem
 
-FREQUENCY = "drive.angular_frequency"
+FREQUENCY = "drive.frequency_hz"
 
 
 def masses(**parts):
@@ -44,21 +45,21 @@ def test_names_of_parameters_from_an_iterator():
 
 def driven(**more):
     return fc.Drive(**{"stiffness_x": 1.0, "stiffness_y": 0.5, "damping_x": 0.2, "amplitude_x": 0.3,
-                       "amplitude_y": 0.1, "angular_frequency": 1.3, **more})
+                       "amplitude_y": 0.1, "frequency_hz": 1.3 / TURN, **more})
 
 
 def loaded():
     return fc.Load(2.0, forces=(
-        fc.PointLoad("C", "x", signal=Harmonic(0.4, 0.9, 0.3)),
-        fc.PointLoad("B", "y", signal=Harmonics((1.0, 0.2), (1.0, 3.0)))))
+        fc.PointLoad("C", "x", signal=Harmonic(0.4, 0.9 / TURN, 0.3)),
+        fc.PointLoad("B", "y", signal=Harmonics((1.0, 0.2), (1.0 / TURN, 3.0 / TURN)))))
 
 
 @pytest.mark.parametrize("names", [
     *[(f"drive.{entry.name}",) for entry in fields(fc.Drive)
-      if entry.name.startswith(("stiffness", "damping", "amplitude", "angular"))
+      if entry.name.startswith(("stiffness", "damping", "amplitude", "frequency"))
       and not entry.name.endswith("_z")],
     ("load.normal",), ("load.forces.0.signal.amplitude",),
-    ("load.forces.0.signal.angular_frequency",), ("load.forces.0.signal.phase",),
+    ("load.forces.0.signal.frequency_hz",), ("load.forces.0.signal.phase",),
     ("drive.stiffness_x", "drive.damping_x", "drive.amplitude_x"),
     (FREQUENCY, "drive.amplitude_y", "load.normal", "load.forces.0.signal.amplitude"),
 ])
@@ -79,7 +80,7 @@ def test_arrays_between_two_systems_are_those_of_systems_made_there(names, dashp
 def test_a_field_over_a_drive_looks_at_the_ends_of_its_range_alone(monkeypatch):
     made, plain = [], ContactSystem.arrays_with
     monkeypatch.setattr(ContactSystem, "arrays_with", lambda self, parts: made.append(
-        parts["drive"].angular_frequency) or plain(self, parts))
+        parts["drive"].frequency_hz) or plain(self, parts))
     field_between(masses(drive=driven(), load=fc.Load(20.0)), ((FREQUENCY, (0.5, 1.5)),))
     assert made == pytest.approx([0.48, 1.52], rel=1e-12)
 
@@ -98,8 +99,9 @@ class Unbalance(fc.Drive):
 
     @property
     def motions(self):
-        w = self.angular_frequency
-        return tuple(Harmonic(getattr(self, f"amplitude_{axis}") * w**2, w) for axis in "xyz")
+        f = self.frequency_hz
+        return tuple(Harmonic(getattr(self, f"amplitude_{axis}") * (TURN * f) ** 2, f)
+                     for axis in "xyz")
 
 
 @dataclass(frozen=True)
@@ -107,20 +109,20 @@ class Turning(Harmonic):
     """A sine of twice the frequency that it is given."""
 
     def parameters(self):
-        return np.array([self.amplitude, self.angular_frequency**2, self.phase])
+        return np.array([self.amplitude, (TURN * self.frequency_hz) ** 2, self.phase])
 
 
 @pytest.mark.parametrize(("drive", "name"), [
-    (Unbalance(stiffness_x=1.0, amplitude_x=0.3, angular_frequency=1.3), FREQUENCY),
-    (fc.Drive(stiffness_x=1.0, motion_x=Turning(0.3, 1.2)), "drive.motion_x.angular_frequency"),
+    (Unbalance(stiffness_x=1.0, amplitude_x=0.3, frequency_hz=1.3 / TURN), FREQUENCY),
+    (fc.Drive(stiffness_x=1.0, motion_x=Turning(0.3, 1.2 / TURN)), "drive.motion_x.frequency_hz"),
 ])
 def test_drives_and_signals_of_other_classes_are_looked_at(drive, name):
     system = masses(drive=drive)
     assert not multilinear([name], system.drive, system.load)
     assert not multilinear(["friction.coefficient"], system.drive, system.load)
-    field = field_between(system, ((name, (0.5, 2.0)),))
+    field = field_between(system, ((name, (0.5 / TURN, 2.0 / TURN)),))
     times, x = np.linspace(0.0, 7.0, 8), np.random.default_rng(3).normal(size=(8, 4))
-    for value in (0.6, 1.0, 1.9):
+    for value in (0.6 / TURN, 1.0 / TURN, 1.9 / TURN):
         made = system.with_(**{name: value})
         expected = np.array([made.rhs(t, y) for t, y in zip(times, x, strict=True)])
         found = field.rates(times, x, np.array([value]))
@@ -128,35 +130,35 @@ def test_drives_and_signals_of_other_classes_are_looked_at(drive, name):
 
 
 @pytest.mark.parametrize(("parts", "turn", "period"), [
-    ({"drive": driven()}, 2.0 * np.pi, None),
-    ({"drive": driven(), "load": fc.Load(2.0)}, 2.0 * np.pi, None),
+    ({"drive": driven()}, 1.0, None),
+    ({"drive": driven(), "load": fc.Load(2.0)}, 1.0, None),
     # A drive that does not act, and loads and waves at frequencies of their own.
-    ({"drive": fc.Drive(angular_frequency=1.3, amplitude_x=0.1), "load": loaded()}, None, "load"),
+    ({"drive": fc.Drive(frequency_hz=1.3 / TURN, amplitude_x=0.1), "load": loaded()}, None, "load"),
     ({"drive": driven(), "load": fc.Load(forces=(
-        fc.PointLoad("C", "x", signal=Harmonic(0.4, 1.3)),))}, None, None),
+        fc.PointLoad("C", "x", signal=Harmonic(0.4, 1.3 / TURN)),))}, None, None),
     ({"drive": driven(), "ground": fc.Ground(0.1, profile=Sine(1e-3, 0.05))}, None, None),
 ])
 def test_the_period_over_the_frequency_of_the_drive(parts, turn, period):
     """Known where nothing else repeats, else found by comparison or not at all."""
     if period == "load":
         parts = {**parts, "load": fc.Load(forces=(
-            fc.PointLoad("C", "x", signal=Harmonic(0.4, 0.9)),))}
+            fc.PointLoad("C", "x", signal=Harmonic(0.4, 0.9 / TURN)),))}
         period = 2.0 * np.pi / 0.9
-    field = field_between(masses(**parts), ((FREQUENCY, (0.5, 2.0)),))
-    found = timing_of(field, np.array([1.3]), 0)
+    field = field_between(masses(**parts), ((FREQUENCY, (0.5 / TURN, 2.0 / TURN)),))
+    found = timing_of(field, np.array([1.3 / TURN]), 0)
     assert found == (pytest.approx(turn, rel=1e-15) if turn else None,
                      pytest.approx(period, rel=1e-15) if period else None)
 
 
 def test_a_function_of_the_user_may_have_the_name_of_a_parameter():
-    def in_turns(system, value):
-        return system.with_(**{FREQUENCY: 2.0 * np.pi * value})
+    def in_radians(system, value):
+        return system.with_(**{FREQUENCY: value / TURN})
 
     system = masses(drive=driven())
-    field = contact_field(system, {FREQUENCY: (0.2, in_turns)})
+    field = contact_field(system, {FREQUENCY: (1.3, in_radians)})
     assert not field._family.multilinear
-    turn, period = timing_of(field, np.array([0.2]), 0)
-    assert (turn, period) == (pytest.approx(1.0, rel=1e-14), None)
+    turn, period = timing_of(field, np.array([1.3]), 0)
+    assert (turn, period) == (pytest.approx(TURN, rel=1e-14), None)
 
 
 @pytest.mark.parametrize(("load", "rests"), [(fc.Load(), True), (fc.Load(0.3), False)])
@@ -165,14 +167,14 @@ def test_forces_at_rest_have_a_mean_only_where_a_load_is_constant(load, rests):
     rows[1, 0] = 1.0
     basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
                                    damping=[[0.05]])
-    drive = fc.Drive(stiffness_y=1.0, amplitude_y=0.18, angular_frequency=0.8)
+    drive = fc.Drive(stiffness_y=1.0, amplitude_y=0.18, frequency_hz=0.8 / TURN)
     system = fc.ContactSystem(basis, normal=BilateralPolynomial(0.0, 0.1), load=load, drive=drive)
-    field = field_between(system, ((FREQUENCY, (0.6, 1.8)),))
-    problem = problem_for(field, np.array([0.8]), 0, HarmonicBalance(5), np.ones(4))
-    e = problem.equations(0.8)
+    field = field_between(system, ((FREQUENCY, (0.6 / TURN, 1.8 / TURN)),))
+    problem = problem_for(field, np.array([0.8 / TURN]), 0, HarmonicBalance(5), np.ones(4))
+    e = problem.equations(0.8 / TURN)
     assert bool(e.numbers[RESTS]) == rests
     times = 2.0 * np.pi / 0.8 * problem.series.times
-    pushed = e.given[0, :, 0] + 0.8 * e.given[1, :, 0]
+    pushed = e.given[0, :, 0] + 0.8 / TURN * e.given[1, :, 0]
     assert pushed == pytest.approx(0.18 * np.sin(0.8 * times) - load.normal, abs=1e-15)
     assert e.body[:, 0, 0] == pytest.approx([1.0, 0.05, 0.0, 0.0], abs=1e-15)
 
@@ -183,8 +185,9 @@ def test_over_a_stiffness_that_grows_from_nothing_the_amplitude_is_that_of_a_mas
     rows[0, 0] = 1.0
     basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
                                    damping=[[0.1]])
-    system = ContactSystem(basis, normal=PrescribedForce(0.0), friction=ConstantFriction(0.0),
-                           drive=fc.Drive(stiffness_x=0.5, amplitude_x=1.0, angular_frequency=2.0))
+    system = ContactSystem(
+        basis, normal=PrescribedForce(0.0), friction=ConstantFriction(0.0),
+        drive=fc.Drive(stiffness_x=0.5, amplitude_x=1.0, frequency_hz=2.0 / TURN))
     found = frequency_response(system, (0.1, 9.0), parameter="drive.stiffness_x",
                                method=HarmonicBalance(3, stability=None))
     c = found.branches[0].parameter

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
+from systems import TURN
 from test_event_branches import skew
 from test_sliding_bifurcations import DAMPING, STOPS, impact_orbit, impacting
 
@@ -31,7 +32,7 @@ from fecontact.integrate.nonsmooth.problem import STICK
 from fecontact.laws import ConstantFriction, LinearContact
 
 INELASTIC, HALF = SetValued(restitution=0.0), SetValued(restitution=0.5)
-AMPLITUDE, FREQUENCY = "drive.amplitude_y", "drive.angular_frequency"
+AMPLITUDE, FREQUENCY = "drive.amplitude_y", "drive.frequency_hz"
 BRIEF = ContinuationOptions(step=0.1, largest_step=0.2)
 
 
@@ -144,7 +145,7 @@ def resting(amplitude, w=1.3):
         {"contact": rows[:1], "B": rows[1], "C": rows[0]}, damping=[[0.2, -0.1], [-0.1, 0.2]])
     return fc.ContactSystem(
         basis, normal=LinearContact(1e6), friction=ConstantFriction(0.0), load=fc.Load(1.0),
-        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, angular_frequency=w))
+        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, frequency_hz=w / TURN))
 
 
 def lifting(w):
@@ -164,8 +165,8 @@ def test_lift_off_from_a_stop():
     assert np.sort(np.abs(end.values["multipliers"])) == pytest.approx(
         [0.0, 0.0, *np.abs(known)], rel=1e-8)
     curve = codim2_curve(field, end, FREQUENCY, bounds={
-        AMPLITUDE: (0.5, 10.0), FREQUENCY: (1.0, 2.0)}, options=BRIEF)
-    w = curve.column(FREQUENCY)
+        AMPLITUDE: (0.5, 10.0), FREQUENCY: (1.0 / TURN, 2.0 / TURN)}, options=BRIEF)
+    w = TURN * curve.column(FREQUENCY)
     assert np.ptp(w) > 0.9
     assert curve.parameter == pytest.approx(lifting(w), rel=1e-8)
 
@@ -205,7 +206,7 @@ def pair(amplitude, w=2.4, lift=0.5):
                                    damping=2.0 * DAMPING * np.eye(2))
     return fc.ContactSystem(
         basis, normal=LinearContact(1e6), friction=ConstantFriction(0.0), load=fc.Load(-lift),
-        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, angular_frequency=w))
+        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, frequency_hz=w / TURN))
 
 
 def both_at_once(w, lift, e=0.8):

@@ -47,7 +47,7 @@ def test_block_on_a_belt(study, capsys):
     (["ground.sped", "--bounds", "1", "2"], "did you mean 'ground.speed'"),
     (["ground.speed", "--bounds", "1", "1"], "bounds = [1.0, 1.0] must be two values"),
     (["ground.speed", "--bounds", "0.01", "0.02", "--set", "drive.amplitude_x=1e-3",
-      "--set", "drive.angular_frequency=10.0"], "take the drive's amplitude"),
+      "--set", "drive.frequency_hz=1.5"], "take the drive's amplitude"),
     ([], "block.toml: [branch] lacks the key 'parameter'"),
     (["ground.speed"], "block.toml: [branch] lacks the key 'bounds'"),
 ])

@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from meshes_for_tests import rectangle
+from systems import TURN
 from test_plain_contact_forces import duffing_in_y
 
 import fecontact as fc
@@ -30,7 +31,7 @@ from fecontact.laws import (
     RoughSurface,
 )
 
-BOUNDS = (500.0, 1500.0)
+BOUNDS = (500.0 / TURN, 1500.0 / TURN)
 
 
 def block(stiffness=1e6, damping=0.02):
@@ -41,7 +42,8 @@ def block(stiffness=1e6, damping=0.02):
     return fc.ContactSystem(
         basis, normal=RoughSurface(stiffness, 1e-4, 300.0),
         friction=ConstantFriction(0.3, smoothing_slope=50.0), load=fc.Load(100.0),
-        drive=fc.Drive(stiffness_x=1e5, damping_x=30.0, amplitude_x=2e-4, angular_frequency=500.0))
+        drive=fc.Drive(
+            stiffness_x=1e5, damping_x=30.0, amplitude_x=2e-4, frequency_hz=500.0 / TURN))
 
 
 @pytest.fixture
@@ -65,7 +67,7 @@ def test_steps_of_a_body_are_those_of_plain_code(strides, monkeypatch):
     assert sum(strides) >= 20
     monkeypatch.setattr(CompiledBalance, "of", lambda problem: None)
     slow = frequency_response(block(), BOUNDS, options=options).branches[0]
-    field = contact_field(block(), ["drive.angular_frequency"])
+    field = contact_field(block(), ["drive.frequency_hz"])
     end = min(fast.parameter[-1], slow.parameter[-1])
     for part in (0.3, 0.9):
         value = BOUNDS[0] + part * (end - BOUNDS[0])
@@ -92,16 +94,16 @@ def test_steps_of_a_body_are_those_of_plain_code(strides, monkeypatch):
 
 def test_the_tangent_of_a_compiled_step_is_that_of_all_equations(strides):
     """Modes are solved for apart; iteration makes good what that neglects."""
-    field = contact_field(block(), ["drive.angular_frequency"])
+    field = contact_field(block(), ["drive.frequency_hz"])
     options = ContinuationOptions(bounds=BOUNDS, step=0.01, largest_step=0.01)
     response = frequency_response(block(), BOUNDS, options=ContinuationOptions(points=1),
                                   method=HarmonicBalance(9, stability=None))
     problem, u, _ = restored(field, response.branches[0].points[0])
     start = start_of(problem, u, options, None, 1.0)
-    far = replace(start, u=np.append(start.u[:-1], 1400.0))
+    far = replace(start, u=np.append(start.u[:-1], 1400.0 / TURN))
     found = problem.strider(options).stride(problem, start, 0.01, 6, far)
     assert strides[0] >= 3
-    room = problem.equations(500.0).room
+    room = problem.equations(500.0 / TURN).room
     assert 1 <= room.coupled[0] < 12
     for at in found.points:
         unit = np.zeros(len(u))
@@ -120,7 +122,8 @@ def test_contact_as_stiff_as_the_modes_is_left_to_plain_code(strides):
     """Then modes cannot be solved for apart."""
     options = ContinuationOptions(points=4, largest_step=0.05)
     method = HarmonicBalance(9, stability=None)
-    found = frequency_response(block(1e11), (2e4, 3e4), method=method, options=options)
+    found = frequency_response(block(1e11), (2e4 / TURN, 3e4 / TURN), method=method,
+                               options=options)
     assert len(found.branches[0]) == 4
     assert sum(strides) == 0
 
@@ -136,11 +139,11 @@ def masses(friction):
                                    damping=0.04 * K)
     return fc.ContactSystem(
         basis, normal=PrescribedForce((1.0, 0.4)), friction=friction,
-        drive=fc.Drive(stiffness_x=1.0, damping_x=0.2, amplitude_x=0.8, angular_frequency=0.9,
+        drive=fc.Drive(stiffness_x=1.0, damping_x=0.2, amplitude_x=0.8, frequency_hz=0.9 / TURN,
                        dashpots="relative"))
 
 
-@pytest.mark.parametrize("name", ["drive.angular_frequency", "drive.amplitude_x",
+@pytest.mark.parametrize("name", ["drive.frequency_hz", "drive.amplitude_x",
                                   "drive.stiffness_x", "friction.friction_coefficient"])
 @pytest.mark.parametrize("friction", [JenkinsFriction((0.5, 0.3), 0.5),
                                       ConstantFriction(0.3, smoothing_slope=3.0)])
@@ -175,18 +178,20 @@ def test_residual_and_forces_are_those_of_plain_code(friction, affine, monkeypat
     """
     if not affine:
         monkeypatch.setattr(compiled, "_AFFINE", -1.0)
-    field = contact_field(masses(friction), ["drive.angular_frequency"])
+    field = contact_field(masses(friction), ["drive.frequency_hz"])
     method, scales = HarmonicBalance(4, 64), np.ones(field.dimension + 2)
     fast = problem_for(field, field.values, 0, method, scales)
-    u = np.append(np.random.default_rng(3).normal(size=fast.size), 0.7)
+    u = np.append(np.random.default_rng(3).normal(size=fast.size), 0.7 / TURN)
     one = fast.linearise(u)
-    assert fast.equations(0.7).body.any() == affine
+    assert fast.equations(0.7 / TURN).body.any() == affine
     monkeypatch.setattr(CompiledBalance, "of", lambda problem: None)
     other = problem_for(field, field.values, 0, method, scales).linearise(u)
     assert isinstance(one, CompiledLinearisation)
     assert one.residual == pytest.approx(other.residual, abs=1e-12)
     assert one.memory == pytest.approx(other.memory, abs=1e-12)
-    assert one.condensed == pytest.approx(other.condensed, abs=1e-7)
+    # The last derivatives are those to the angular frequency.
+    unit = np.append(np.ones(fast.size), TURN)
+    assert one.condensed / unit == pytest.approx(other.condensed / unit, abs=1e-7)
     for mine, theirs in zip(one._samples(), other._samples(), strict=True):
         assert mine == pytest.approx(theirs, abs=1e-12)
 
@@ -197,33 +202,34 @@ def test_problems_with_equations_of_their_own_are_evaluated_by_these():
             return "its own"
 
     field = contact_field(masses(ConstantFriction(0.3, smoothing_slope=3.0)),
-                          ["drive.angular_frequency"])
+                          ["drive.frequency_hz"])
     plain = problem_for(field, field.values, 0, HarmonicBalance(2), np.ones(field.dimension + 2))
     other = Other(**{entry.name: getattr(plain, entry.name) for entry in fields(plain)})
-    u = np.append(np.zeros(plain.size), 0.9)
+    u = np.append(np.zeros(plain.size), 0.9 / TURN)
     assert other.evaluate(u) == "its own"
     assert isinstance(plain.evaluate(u), CompiledLinearisation)
 
 
 @pytest.mark.parametrize(("name", "bounds", "rests"), [
-    ("drive.amplitude_y", (0.1, 1.8), True), ("drive.angular_frequency", (0.6, 1.8), True),
+    ("drive.amplitude_y", (0.1, 1.8), True),
+    ("drive.frequency_hz", (0.6 / TURN, 1.8 / TURN), True),
     # The value in the midst of the range at which forces are taken is zero.
     ("load.normal", (-0.31, 0.69), False), ("normal.preload", (-0.31, 0.69), False),
     ("load.normal", (-0.3024, 0.6976), False), ("normal.preload", (-0.3024, 0.6976), False)])
 def test_bodies_rest_at_zero_only_if_no_value_of_the_parameter_moves_them(name, bounds, rests):
     """A load or preload of 0.6 N moves the mass though one of 0 N does not."""
-    system = duffing_in_y()
+    system, value = duffing_in_y(), 0.6 / TURN if name.endswith("hz") else 0.6
     field = field_between(system, ((name, bounds),))
-    problem = problem_for(field, np.array([0.6]), 0, HarmonicBalance(3), np.ones(4))
-    assert bool(problem.equations(0.6).numbers[RESTS]) == rests
-    first = frequency_response(system, bounds, name, start=0.6, observe=("B", "y"),
+    problem = problem_for(field, np.array([value]), 0, HarmonicBalance(3), np.ones(4))
+    assert bool(problem.equations(value).numbers[RESTS]) == rests
+    first = frequency_response(system, bounds, name, start=value, observe=("B", "y"),
                                options=ContinuationOptions(points=1)).branches[0].points[0]
     mean = float(first.u[0])
     assert (abs(mean) < 1e-9) == rests
 
 
 @pytest.mark.parametrize(("name", "product", "period"), [
-    ("drive.angular_frequency", 2.0 * np.pi, None), ("drive.amplitude_x", None, 2.0 * np.pi / 0.9),
+    ("drive.frequency_hz", 1.0, None), ("drive.amplitude_x", None, 2.0 * np.pi / 0.9),
     ("drive.stiffness_x", None, 2.0 * np.pi / 0.9)])
 def test_how_the_period_depends_on_a_parameter(name, product, period):
     field = contact_field(masses(ConstantFriction(0.3, smoothing_slope=3.0)), [name])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from oscillators import duffing, jenkins_amplitude, jenkins_system, one_mode
+from systems import TURN
 
 from fecontact import ContactSystem, Drive, basis_from_matrices, io, plot, simulate
 from fecontact.bifurcation import (
@@ -16,7 +17,7 @@ from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.core.errors import InputError
 from fecontact.laws import BilateralPolynomial, JenkinsFriction, PrescribedForce
 
-TURN = 2.0 * np.pi
+BOUNDS = (0.6 / TURN, 1.8 / TURN)
 
 
 def cubic_system(force=0.18):
@@ -29,7 +30,7 @@ def cubic_system(force=0.18):
     basis = basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
                                 damping=[[0.05]])
     return ContactSystem(basis, normal=BilateralPolynomial(0.0, 0.1), drive=Drive(
-        stiffness_y=1.0, amplitude_y=force, angular_frequency=0.8))
+        stiffness_y=1.0, amplitude_y=force, frequency_hz=0.8 / TURN))
 
 
 def row_of_masses():
@@ -42,19 +43,19 @@ def row_of_masses():
     basis = basis_from_matrices(np.eye(3), K, {"contact": rows, "B": B, "C": B}, damping=0.04 * K)
     return ContactSystem(
         basis, normal=PrescribedForce((1.0, 0.4)), friction=JenkinsFriction((0.5, 0.3), 0.5),
-        drive=Drive(stiffness_x=1.0, amplitude_x=0.8, angular_frequency=0.9))
+        drive=Drive(stiffness_x=1.0, amplitude_x=0.8, frequency_hz=0.9 / TURN))
 
 
 def test_the_cubic_spring_has_the_published_fold_and_amplitudes():
-    found = frequency_response(cubic_system(), (0.6, 1.8), observe=("B", "y"))
+    found = frequency_response(cubic_system(), BOUNDS, observe=("B", "y"))
     plain = frequency_response(duffing(), (0.6, 1.8), "W")
     branch, other = found.branches[0], plain.branches[0]
     assert [point.kind for point in branch.special] == ["fold", "fold"]
-    assert branch.special[1].parameter == pytest.approx(1.11570025, abs=1e-8)
-    assert branch.parameter[[0, -1]] == pytest.approx([0.6, 1.8])
-    field = contact_field(cubic_system(), ["drive.angular_frequency"])
+    assert TURN * branch.special[1].parameter == pytest.approx(1.11570025, abs=1e-8)
+    assert branch.parameter[[0, -1]] == pytest.approx(BOUNDS)
+    field = contact_field(cubic_system(), ["drive.frequency_hz"])
     for which in range(3):
-        mine, theirs = branch.at(field, 1.2, which), other.at(duffing(), 1.2, which)
+        mine, theirs = branch.at(field, 1.2 / TURN, which), other.at(duffing(), 1.2, which)
         assert mine.values["maximum"] == pytest.approx(theirs.values["maximum"], rel=1e-9)
         pairs = (np.sort(one.values["multipliers"].imag) for one in (mine, theirs))
         assert next(pairs) == pytest.approx(next(pairs), abs=1e-9)
@@ -64,8 +65,8 @@ def test_the_cubic_spring_has_the_published_fold_and_amplitudes():
 @pytest.mark.parametrize("system", [cubic_system, jenkins_system])
 def test_compiled_steps_are_those_of_plain_code(system, monkeypatch):
     """Points, what they store and special points, however the branch was followed."""
-    bounds, observe = ((0.6, 1.8), ("B", "y")) if system is cubic_system else (
-        (1.02, 1.3), ("B", "x"))
+    bounds, observe = (BOUNDS, ("B", "y")) if system is cubic_system else (
+        (1.02 / TURN, 1.3 / TURN), ("B", "x"))
     method = HarmonicBalance(5, samples=128)
     fast = frequency_response(system(), bounds, observe=observe, method=method)
     monkeypatch.setattr(CompiledBalance, "of", lambda problem: None)
@@ -74,7 +75,7 @@ def test_compiled_steps_are_those_of_plain_code(system, monkeypatch):
     assert [point.kind for point in one.special] == [point.kind for point in other.special]
     for mine, theirs in zip(one.special, other.special, strict=True):
         assert mine.parameter == pytest.approx(theirs.parameter, rel=1e-9)
-    field = contact_field(system(), ["drive.angular_frequency"])
+    field = contact_field(system(), ["drive.frequency_hz"])
     for part in (0.2, 0.5, 0.8):
         value = bounds[0] + part * (bounds[1] - bounds[0])
         mine, theirs = one.at(field, value), other.at(field, value)
@@ -104,10 +105,10 @@ def test_derivatives_of_several_modes_with_memory_are_those_of_the_residual():
     from fecontact.bifurcation.harmonic.problem import CompiledLinearisation
     from fecontact.bifurcation.harmonic.starts import problem_for
 
-    field = contact_field(row_of_masses(), ["drive.angular_frequency"])
+    field = contact_field(row_of_masses(), ["drive.frequency_hz"])
     problem = problem_for(field, field.values, 0, HarmonicBalance(3, 48),
                           np.ones(field.dimension + 2))
-    u = np.append(np.random.default_rng(2).normal(size=problem.size), 0.9)
+    u = np.append(np.random.default_rng(2).normal(size=problem.size), 0.9 / TURN)
     here = problem.linearise(u)
     assert isinstance(here, CompiledLinearisation)
     differences = np.empty(here.condensed.shape)
@@ -120,14 +121,14 @@ def test_derivatives_of_several_modes_with_memory_are_those_of_the_residual():
 
 def test_folds_are_found_without_stability(tmp_path):
     options = {"observe": ("B", "y")}
-    found = [frequency_response(cubic_system(), (0.6, 1.8), method=HarmonicBalance(
+    found = [frequency_response(cubic_system(), BOUNDS, method=HarmonicBalance(
         9, stability=stability), **options) for stability in ("transitions", None)]
     places = [[point.parameter for point in one.branches[0].special] for one in found]
-    assert places[1] == pytest.approx(places[0], abs=1e-9)
+    assert places[1] == pytest.approx(places[0], abs=1e-9 / TURN)
     assert "stable" not in found[1].branches[0].points[3].values
     stored = io.read_response(io.write_response(tmp_path / "response.h5", found[1]))
-    on = orbit_branch(contact_field(cubic_system(), ["drive.angular_frequency"]),
-                      stored.branches[0].points[20], bounds=(0.6, 1.8),
+    on = orbit_branch(contact_field(cubic_system(), ["drive.frequency_hz"]),
+                      stored.branches[0].points[20], bounds=BOUNDS,
                       options=ContinuationOptions(points=3))
     assert on.attributes["stability"] == "none"
     plot.plot_response(stored, path=tmp_path / "response.png")
@@ -140,9 +141,9 @@ def test_steps_pass_the_corners_of_a_jenkins_element():
 
     Below 2 N / (k_d) the element sticks, and the response is that of a spring.
     """
-    found = frequency_response(jenkins_system(amplitude=0.6), (0.8, 1.6),
+    found = frequency_response(jenkins_system(amplitude=0.6), (0.8 / TURN, 1.6 / TURN),
                                method=HarmonicBalance(1, samples=512))
-    W, A = found.branches[0].parameter, np.abs(found.harmonic(1))
+    W, A = TURN * found.branches[0].parameter, np.abs(found.harmonic(1))
     exact = [jenkins_amplitude(w, 0.6) if slides(w) else stuck(w) for w in W[::6]]
     assert A[::6] == pytest.approx(np.array(exact), rel=2e-3)
     assert (A > 2.0).any()
@@ -163,10 +164,11 @@ def preloaded(left):
     system = jenkins_system(0.5, amplitude=1.0)
     rest = 0.5 * left / 1.5
     state = np.array([rest, 0.0, rest - left])
-    found = frequency_response(system, (0.45, 0.55), method=HarmonicBalance(9, samples=256),
-                               preload=state, options=ContinuationOptions(largest_step=0.2))
-    field = contact_field(system, ["drive.angular_frequency"])
-    return system, state, found.branches[0].at(field, 0.5)
+    found = frequency_response(system, (0.45 / TURN, 0.55 / TURN), preload=state,
+                               method=HarmonicBalance(9, samples=256),
+                               options=ContinuationOptions(largest_step=0.2))
+    field = contact_field(system, ["drive.frequency_hz"])
+    return system, state, found.branches[0].at(field, 0.5 / TURN)
 
 
 def test_an_element_keeps_the_deflection_of_its_preload():
@@ -201,7 +203,7 @@ def test_an_element_under_static_load_is_at_rest_without_deflection():
     """Without a preload the elements have no deflection at rest: static loads rest on springs."""
     system = ContactSystem(
         one_mode(), normal=PrescribedForce(1.0), friction=JenkinsFriction(0.5, 1.0),
-        drive=Drive(stiffness_x=1.0, damping_x=0.1, amplitude_x=0.2, angular_frequency=0.5))
-    found = frequency_response(system, (0.45, 0.55), method=HarmonicBalance(3),
+        drive=Drive(stiffness_x=1.0, damping_x=0.1, amplitude_x=0.2, frequency_hz=0.5 / TURN))
+    found = frequency_response(system, (0.45 / TURN, 0.55 / TURN), method=HarmonicBalance(3),
                                options=ContinuationOptions(largest_step=0.2))
     assert np.abs(found.harmonic(0)).max() < 1e-9

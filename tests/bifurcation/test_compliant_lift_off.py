@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 from test_borders_of_stops import (
     AMPLITUDE,
     BRIEF,
@@ -28,7 +29,7 @@ def pressed(amplitude, friction, dashpot, w=1.3):
     return fc.ContactSystem(
         basis, normal=LinearContact(6.0, dashpot), friction=ConstantFriction(friction),
         ground=fc.Ground(speed=5.0), load=fc.Load(1.5),
-        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, angular_frequency=w))
+        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, frequency_hz=w / TURN))
 
 
 def opening(w, dashpot):
@@ -53,8 +54,8 @@ def test_first_opening_of_a_contact_with_stiffness(friction, dashpot):
     assert np.sort(np.abs(branch.points[0].values["multipliers"])) == pytest.approx(
         sorted([across, across, along, along]), rel=1e-9)
     curve = codim2_curve(field, end, FREQUENCY, bounds={
-        AMPLITUDE: (0.2, 20.0), FREQUENCY: (0.8, 2.0)}, options=BRIEF)
-    w = curve.column(FREQUENCY)
+        AMPLITUDE: (0.2, 20.0), FREQUENCY: (0.8 / TURN, 2.0 / TURN)}, options=BRIEF)
+    w = TURN * curve.column(FREQUENCY)
     assert np.ptp(w) > 1.1
     assert curve.parameter == pytest.approx(opening(w, dashpot), rel=1e-7)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from oscillators import duffing, jenkins_amplitude, jenkins_system
 from response_study import STUDY, linear_amplitude
+from systems import TURN
 from test_list_of_harmonics import hardening
 
 from fecontact import Study
@@ -31,19 +32,19 @@ def controlled(system, bounds, amplitudes, **options):
 
 def test_force_of_one_harmonic():
     """The force that holds an amplitude, in closed form, on both sides of two free folds."""
-    found = controlled(hardening(), (0.7, 1.6), [0.5, 3.0], method=HarmonicBalance(1))
+    found = controlled(hardening(), (0.7 / TURN, 1.6 / TURN), [0.5, 3.0], method=HarmonicBalance(1))
     assert found.level_name == "amplitude"
     assert found.force_name == "drive.amplitude_y"
     for level, a in enumerate((0.5, 3.0)):
-        w, force = found.branches[level].parameter, found.force(level)
-        assert w[[0, -1]].tolist() == [0.7, 1.6]
+        w, force = TURN * found.branches[level].parameter, found.force(level)
+        assert found.branches[level].parameter[[0, -1]].tolist() == [0.7 / TURN, 1.6 / TURN]
         assert found.branches[level].status is BranchStatus.BOUND
         np.testing.assert_allclose(found.amplitude(level), a, rtol=1e-6)
         exact = a * np.hypot(1.0 - w**2 + 0.075 * a**2, 0.05 * w)
         np.testing.assert_allclose(force, exact, rtol=5e-6)
         assert found.peak_reached(level)
         # Smallest force: w^2 = 1 + .075 a^2 - .05^2 / 2.
-        assert found.peak(level).parameter == pytest.approx(
+        assert TURN * found.peak(level).parameter == pytest.approx(
             np.sqrt(1.0 + 0.075 * a**2 - 0.00125), abs=0.03)
 
 
@@ -55,10 +56,11 @@ def test_orbits_are_those_of_free_responses():
         return {"options": ContinuationOptions(
             points=600, largest_step=0.1, events={"met": lambda found: found[name] - wanted})}
 
-    held = controlled(hardening(), (1.0, 1.8), [a], method=method,
+    held = controlled(hardening(), (1.0 / TURN, 1.8 / TURN), [a], method=method,
                       **meets("drive.amplitude_y", force)).branches[0].of_kind("met")
-    free = frequency_response(hardening(force=force), (0.8, 1.6), method=method, observe=("B", "y"),
-                              **meets("observed_amplitude", a)).branches[0].of_kind("met")
+    free = frequency_response(
+        hardening(force=force), (0.8 / TURN, 1.6 / TURN), method=method, observe=("B", "y"),
+        **meets("observed_amplitude", a)).branches[0].of_kind("met")
     assert len(held) == len(free) == 2
     for one, other in zip(sorted(held, key=lambda point: point.parameter),
                           sorted(free, key=lambda point: point.parameter), strict=True):
@@ -72,12 +74,12 @@ def test_orbits_are_those_of_free_responses():
 def test_force_of_a_friction_damper():
     """One harmonic of a Jenkins element, against its describing function."""
     found = controlled_response(
-        jenkins_system(), (1.05, 1.25), [3.0, 6.0], options=STEPS,
+        jenkins_system(), (1.05 / TURN, 1.25 / TURN), [3.0, 6.0], options=STEPS,
         method=HarmonicBalance(1, 512, stability=None))
     for level, a in enumerate((3.0, 6.0)):
         for point in found.branches[level].points[::5]:
             force = point.values["drive.amplitude_x"]
-            assert jenkins_amplitude(point.parameter, force) == pytest.approx(a, rel=1e-3)
+            assert jenkins_amplitude(TURN * point.parameter, force) == pytest.approx(a, rel=1e-3)
         assert "stable" not in found.branches[level].points[0].values
 
 
@@ -99,13 +101,13 @@ def test_vector_fields_and_other_parameters():
 def test_held_phases(lag):
     """w^2 and F of one harmonic whose displacement is an angle behind the force, closed forms."""
     curve = resonance_curve(
-        hardening(force=0.02), (0.02, 0.3), "drive.amplitude_y", (0.7, 1.6), observe=("B", "y"),
-        condition="phase", lag=lag, method=HarmonicBalance(1), options=STEPS)
-    w, a, force = curve.angular_frequency, curve.amplitude, curve.parameter
+        hardening(force=0.02), (0.02, 0.3), "drive.amplitude_y", (0.7 / TURN, 1.6 / TURN),
+        observe=("B", "y"), condition="phase", lag=lag, method=HarmonicBalance(1), options=STEPS)
+    w, a, force = TURN * curve.frequency_hz, curve.amplitude, curve.parameter
     np.testing.assert_allclose(0.05 * w * a, force * np.sin(lag), rtol=1e-6)
     np.testing.assert_allclose((1.0 - w**2 + 0.075 * a**2) * a, force * np.cos(lag), rtol=0.0,
                                atol=1e-6)
-    field = contact_field(hardening(), ["drive.angular_frequency", "drive.amplitude_y"])
+    field = contact_field(hardening(), ["drive.frequency_hz", "drive.amplitude_y"])
     run = curve.branch.points[3].trajectory(field)
     assert run.time[-1] == pytest.approx(2.0 * np.pi / w[3])
 
@@ -114,26 +116,27 @@ def test_held_phases(lag):
     ({"amplitudes": []}, "must be one or several numbers above zero"),
     ({"amplitudes": [1.0, 0.0]}, "must be one or several numbers above zero"),
     ({"amplitudes": "a"}, "amplitudes"),
-    ({"force": "drive.angular_frequency"}, "parameter and force are both"),
+    ({"force": "drive.frequency_hz"}, "parameter and force are both"),
     ({"force": "drive.amplitud_y"}, "did you mean 'drive.amplitude_y'"),
     ({"force": 1}, "force"),
     ({"method": 3}, "method"),
 ])
 def test_bad_arguments(change, told):
-    known = {"system": hardening(), "bounds": (0.7, 0.8), "amplitudes": [0.5],
+    known = {"system": hardening(), "bounds": (0.7 / TURN, 0.8 / TURN), "amplitudes": [0.5],
              "force": "drive.amplitude_y", "observe": ("B", "y")}
     with pytest.raises(InputError, match=told):
         controlled_response(**known | change)
 
 
 def test_amplitudes_and_phases_that_are_not_reached():
-    with pytest.raises(AnalysisError, match=r"0\.5 was not reached at drive\.angular"):
-        controlled_response(hardening(), (0.7, 0.8), [0.5], "normal.stiffness", observe=("B", "y"))
+    with pytest.raises(AnalysisError, match=r"0\.5 was not reached at drive\.frequency_hz"):
+        controlled_response(hardening(), (0.7 / TURN, 0.8 / TURN), [0.5], "normal.stiffness",
+                            observe=("B", "y"))
     with pytest.raises(InputError, match="lag = 4 must be an angle between 0 and pi rad"):
-        resonance_curve(hardening(), (0.1, 0.2), "drive.amplitude_y", (0.7, 1.4), lag=4,
-                        observe=("B", "y"))
+        resonance_curve(hardening(), (0.1, 0.2), "drive.amplitude_y", (0.7 / TURN, 1.4 / TURN),
+                        lag=4, observe=("B", "y"))
     with pytest.raises(InputError, match="those of controlled_response are held"):
-        frequency_response(hardening(), (0.7, 0.8), observe=("B", "y")).force()
+        frequency_response(hardening(), (0.7 / TURN, 0.8 / TURN), observe=("B", "y")).force()
 
 
 @pytest.fixture
@@ -156,7 +159,7 @@ def test_command(cli, file, how):
     assert code == 0
     assert "drive amplitude x" in said
     found = read_response(file.parent / "results" / "block-response.h5")
-    w = found.branches[0].parameter
+    w = TURN * found.branches[0].parameter
     assert found.levels.tolist() == [1e-6, 2e-6]
     exact = 1e-6 / linear_amplitude(w, 1.0, Study.read(file))
     assert found.force(0) == pytest.approx(exact, rel=5e-4)
@@ -174,7 +177,7 @@ def test_command(cli, file, how):
     (["--amplitudes", "1", "--levels", "load.normal=1"], "are held, so that the force has no"),
     (["--amplitudes", "1", "--method", "shooting"], "cannot hold amplitudes; take 'harmonic bal"),
     (["--force", "drive.amplitude_x"], "is the level that is free where amplitudes are held"),
-    (["--amplitudes", "1", "--force", "drive.angular_frequency"], "over which the responses go"),
+    (["--amplitudes", "1", "--force", "drive.frequency_hz"], "over which the responses go"),
     (["--amplitudes", "1e-6", "--force", "drive.amplitud_x"], "did you mean 'drive.amplitude_x'"),
 ])
 def test_bad_settings(cli, file, changes, told):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from oscillators import one_mode
 from scipy.optimize import brentq
+from systems import TURN
 
 import fecontact as fc
 from fecontact.bifurcation import (
@@ -150,20 +151,20 @@ def stiff_jenkins():
     """A spring of 50 N/m that slides at 1 N, on a mass on a spring of 1 N/m."""
     return fc.ContactSystem(
         one_mode(), normal=PrescribedForce(1.0), friction=JenkinsFriction(50.0, 1.0),
-        drive=fc.Drive(stiffness_x=1.0, damping_x=0.02, amplitude_x=1.0, angular_frequency=1.0))
+        drive=fc.Drive(stiffness_x=1.0, damping_x=0.02, amplitude_x=1.0, frequency_hz=1.0 / TURN))
 
 
 def test_few_samples_pass_the_onset_of_slip():
     """Coarse samples give a branch with corners, some of which lead back: none may stall it."""
-    amplitudes = []
+    amplitudes, bounds = [], (0.5 / TURN, 10.0 / TURN)
     for samples in (64, 128, 1024):
         method = HarmonicBalance(5, samples, stability=None)
-        branch = frequency_response(stiff_jenkins(), (0.5, 10.0), method=method).branches[0]
+        branch = frequency_response(stiff_jenkins(), bounds, method=method).branches[0]
         assert branch.status is BranchStatus.BOUND
         assert len(branch) < 500
         # The largest amplitude by steps that do not depend on how the corners are passed.
         short = ContinuationOptions(largest_step=0.02, points=2000)
         amplitudes.append(frequency_response(
-            stiff_jenkins(), (0.5, 10.0), method=method, options=short).amplitude().max())
+            stiff_jenkins(), bounds, method=method, options=short).amplitude().max())
     assert amplitudes[0] == pytest.approx(amplitudes[2], rel=1.2e-2)
     assert amplitudes[1] == pytest.approx(amplitudes[2], rel=5e-3)

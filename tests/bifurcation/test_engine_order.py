@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 from fecontact import ContactSystem, InputError, Interface, Load, PointLoad, basis_from_matrices
 from fecontact.bifurcation import (
@@ -32,7 +33,7 @@ def damper(first, second):
 
 def force(name, shift, w=1.1):
     """cos(w (t - shift T)) on a mass."""
-    return PointLoad(f"{name}.P", "x", signal=Harmonic(1.0, w, 0.5 * np.pi - 2.0 * np.pi * shift))
+    return PointLoad(f"{name}.P", "x", signal=Harmonic(1.0, w / TURN, 0.5 * np.pi - TURN * shift))
 
 
 def spring(first, second):
@@ -62,7 +63,7 @@ def repeats(order):
 
 def excited_at(system, w):
     """The system with all forces at an angular frequency."""
-    return system.with_({f"load.forces.{number}.signal.angular_frequency": w
+    return system.with_({f"load.forces.{number}.signal.frequency_hz": w / TURN
                          for number in range(len(system.load.forces))})
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from systems import (
+    TURN,
     belt,
     friction_slope,
     lorenz_field,
@@ -242,7 +243,7 @@ def test_kind_errors():
         find_equilibrium(field, start=[0.3])
     with pytest.raises(InputError, match="must have 1 values"):
         find_equilibrium(field, start=[0.3, 1.0])
-    driven = belt().with_(**{"drive.amplitude_x": 1e-3, "drive.angular_frequency": 10.0})
+    driven = belt().with_(**{"drive.amplitude_x": 1e-3, "drive.frequency_hz": 10.0 / TURN})
     with pytest.raises(AnalysisError, match=r"driven with the period 0\.628319 s"):
         find_equilibrium(contact_field(driven, []))
     free = belt().with_(drive=Drive())

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 from test_sliding_bifurcations import (
     DAMPING,
     FILIPPOV,
@@ -40,7 +41,7 @@ def skew(drive):
     return fc.ContactSystem(
         basis, normal=LinearContact(1e6), friction=ConstantFriction(0.3),
         ground=fc.Ground(speed=0.3), load=fc.Load(1.0),
-        drive=fc.Drive(stiffness_y=0.5, amplitude_y=drive, angular_frequency=2.0))
+        drive=fc.Drive(stiffness_y=0.5, amplitude_y=drive, frequency_hz=2.0 / TURN))
 
 
 @pytest.mark.parametrize("law", ["newton", "poisson"])
@@ -137,7 +138,7 @@ def test_messages_say_why_runs_are_differenced():
 def stop():
     """The oscillator over a stop that it does not touch, and its orbit."""
     system = impacting()
-    field = contact_field(system, ["drive.amplitude_y", "drive.angular_frequency"])
+    field = contact_field(system, ["drive.amplitude_y", "drive.frequency_hz"])
     return field, periodic_motion(system, solver=STOPS, initial=[2.0, 0.0], rtol=1e-9)
 
 
@@ -194,8 +195,8 @@ def test_a_failure_beyond_a_border_keeps_the_branch(stop, monkeypatch):
 def test_what_borders_take(stop):
     field, _ = stop
     grazing, = over_amplitude(stop, bounds=(1.0, GRAZING + 1e-5), step=0.02).of_kind("grazing")
-    over = "drive.angular_frequency"
-    box = {"drive.amplitude_y": (0.1, 8.0), over: (0.7, 1.2)}
+    over = "drive.frequency_hz"
+    box = {"drive.amplitude_y": (0.1, 8.0), over: (0.7 / TURN, 1.2 / TURN)}
     brief = ContinuationOptions(points=2)
     curve = codim2_curve(field, grazing, over, bounds=box, scales=[3.0, 7.0], options=brief)
     assert curve.attributes["scales"][:2].tolist() == [3.0, 7.0]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from meshes_for_tests import rectangle
+from systems import TURN
 
 import fecontact as fc
 from fecontact.bifurcation import (
@@ -25,15 +26,15 @@ def beam():
     return fc.ContactSystem(
         basis, normal=RoughSurface(1e6, 1e-4, 30.0), friction=JenkinsFriction(2e5, 0.3),
         load=fc.Load(100.0), drive=fc.Drive(stiffness_x=1e5, damping_x=30.0, amplitude_x=4e-4,
-                                            angular_frequency=500.0))
+                                            frequency_hz=500.0 / TURN))
 
 
 def test_systems_of_few_contact_displacements_are_those_of_all():
-    field = contact_field(beam(), ["drive.angular_frequency"])
+    field = contact_field(beam(), ["drive.frequency_hz"])
     problem = problem_for(field, field.values, 0, HarmonicBalance(9, 96),
                           np.ones(field.dimension + 2))
     rng = np.random.default_rng(4)
-    u = np.append(1e-5 * rng.normal(size=problem.size), 500.0)
+    u = np.append(1e-5 * rng.normal(size=problem.size), 500.0 / TURN)
     here, row = problem.linearise(u), rng.normal(size=problem.size + 1)
     directions = problem.directions
     assert directions.shape == (24, 4)
@@ -51,7 +52,7 @@ def test_a_response_does_not_depend_on_how_it_is_solved_for(monkeypatch):
     options = ContinuationOptions(points=4, largest_step=0.1, step=0.05)
 
     def response():
-        return frequency_response(beam(), (500.0, 900.0), options=options,
+        return frequency_response(beam(), (500.0 / TURN, 900.0 / TURN), options=options,
                                   method=HarmonicBalance(9, samples=96, stability=None))
 
     few = response()
@@ -62,6 +63,6 @@ def test_a_response_does_not_depend_on_how_it_is_solved_for(monkeypatch):
 
 
 def test_many_contact_nodes_or_few_modes_leave_all_unknowns():
-    field = contact_field(beam(), ["drive.angular_frequency"])
+    field = contact_field(beam(), ["drive.frequency_hz"])
     assert contact_directions(field, field.values, 9) is not None
     assert contact_directions(field, field.values, 5) is None  # 264 unknowns

@@ -6,6 +6,7 @@ from itertools import islice
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from systems import TURN
 from test_borders_of_stops import (
     AMPLITUDE,
     BRIEF,
@@ -38,7 +39,7 @@ from fecontact.bifurcation.events.phases import Phase
 from fecontact.integrate import ContactEvents, SetValued
 from fecontact.laws import ConstantFriction, LinearContact
 
-OVER = {AMPLITUDE: (0.5, 10.0), FREQUENCY: (1.0, 2.0)}
+OVER = {AMPLITUDE: (0.5, 10.0), FREQUENCY: (1.0 / TURN, 2.0 / TURN)}
 
 
 @pytest.mark.parametrize(("start", "bounds", "direction"), [
@@ -56,7 +57,7 @@ def test_rest_turns_into_flight_and_back(start, bounds, direction):
     assert len(flying) > 1
     check_multipliers(field, nearest(branch, 1.805), INELASTIC)
     curve = codim2_curve(field, border, FREQUENCY, bounds=OVER, options=BRIEF)
-    w = curve.column(FREQUENCY)
+    w = TURN * curve.column(FREQUENCY)
     assert np.ptp(w) > 0.9
     assert curve.parameter == pytest.approx(lifting(w), rel=1e-11)
 
@@ -88,8 +89,9 @@ def test_a_mass_that_rests_all_the_time():
     assert point.orbit(field, 2001).states[:, 0].max() == pytest.approx(known, rel=1e-4)
     assert np.abs(point.values["multipliers"]).max() < 1e-12
     curve = codim2_curve(field, border, FREQUENCY, bounds={
-        AMPLITUDE: (0.5, 3.0), FREQUENCY: (1.0, 3.0)}, options=replace(BRIEF, locate=False))
-    assert np.ptp(curve.column(FREQUENCY)) > 1.9
+        AMPLITUDE: (0.5, 3.0), FREQUENCY: (1.0 / TURN, 3.0 / TURN)},
+        options=replace(BRIEF, locate=False))
+    assert TURN * np.ptp(curve.column(FREQUENCY)) > 1.9
     assert curve.parameter == pytest.approx(np.ones(len(curve.points)), rel=1e-10)
 
 
@@ -107,7 +109,7 @@ def held_down(amplitude):
     return fc.ContactSystem(
         basis, normal=LinearContact(1e6), friction=ConstantFriction(0.173),
         ground=fc.Ground(speed=0.468), load=fc.Load(1.294),
-        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, angular_frequency=0.4234))
+        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, frequency_hz=0.4234 / TURN))
 
 
 def flights_of(amplitude, periods=30):
@@ -150,7 +152,7 @@ def sliding(amplitude):
     return fc.ContactSystem(
         basis, normal=LinearContact(1e6), friction=ConstantFriction(0.3),
         ground=fc.Ground(speed=5.0), load=fc.Load(1.5),
-        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, angular_frequency=1.3))
+        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, frequency_hz=1.3 / TURN))
 
 
 def test_lift_off_of_a_contact_that_slips():

@@ -230,7 +230,7 @@ def test_separation_agrees_with_collocation_and_shooting():
                             problem.states(u, TURN, np.zeros((1024, 0))))
     times = np.append(motion.times, TURN)
     motion = PeriodicMotion(times, np.vstack([motion.states, motion.states[:1]]))
-    found = [orbit_branch(field, motion, method=method, bounds=(1.0, 1.1),
+    found = [orbit_branch(field, motion, method=method, bounds=(1.0 / TURN, 1.1 / TURN),
                           options=ContinuationOptions(points=2)).points[0]
              for method in (HarmonicBalance(60, 1024), Collocation(200), Shooting(2))]
     mine, collocated, shot = (point.values for point in found)

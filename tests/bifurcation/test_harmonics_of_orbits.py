@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from oscillators import duffing, jenkins_system
 from scipy.interpolate import CubicSpline
+from systems import TURN
 
 from fecontact import AnalysisError, ContactSystem, Drive, InputError, basis_from_matrices
 from fecontact.bifurcation import (
@@ -25,7 +26,8 @@ def linear(w=1.7):
     rows[0, 0] = rows[1, 1] = 1.0
     basis = basis_from_matrices(2.0 * np.eye(2), np.diag([8.0, 18.0]), {"B": rows, "C": rows},
                                 damping=0.5 * np.eye(2))
-    return ContactSystem(basis, drive=Drive(stiffness_x=1.0, amplitude_x=0.1, angular_frequency=w))
+    return ContactSystem(basis, drive=Drive(
+        stiffness_x=1.0, amplitude_x=0.1, frequency_hz=w / TURN))
 
 
 def test_coefficients_of_a_motion_in_closed_form():
@@ -50,10 +52,11 @@ def test_coefficients_of_a_motion_in_closed_form():
 
 @pytest.mark.parametrize("method", [Collocation(), Shooting(), HarmonicBalance()])
 def test_coefficients_of_a_linear_orbit(method):
-    field = contact_field(linear(), ["drive.angular_frequency"])
-    branch = orbit_branch(field, periodic_motion(linear()), method=method, bounds=(1.5, 1.8))
+    field = contact_field(linear(), ["drive.frequency_hz"])
+    branch = orbit_branch(field, periodic_motion(linear()), method=method,
+                          bounds=(1.5 / TURN, 1.8 / TURN))
     for point in (branch.points[0], branch.points[-1]):
-        w = point.parameter
+        w = TURN * point.parameter
         orbit = point.orbit(field, 200)
         # A drive A sin w t.
         exact = -0.1j / (8.0 + 1.0 - 2.0 * w**2 + 0.5j * w)
@@ -100,7 +103,7 @@ def test_duffing_response_is_that_of_harmonic_balance(method):
 
 def test_jenkins_response_by_shooting_is_that_of_harmonic_balance():
     """Levels at which the element slides: amplitudes and third harmonics of the first points."""
-    levels, bounds = {"drive.amplitude_x": [4.0, 5.0]}, (0.9, 1.3)
+    levels, bounds = {"drive.amplitude_x": [4.0, 5.0]}, (0.9 / TURN, 1.3 / TURN)
     found = frequency_response(jenkins_system(), bounds, levels=levels,
                                options=ContinuationOptions(points=4), method=Shooting(segments=1))
     exact = frequency_response(jenkins_system(), bounds, levels=levels,
@@ -118,5 +121,5 @@ def test_jenkins_response_by_shooting_is_that_of_harmonic_balance():
 def test_elements_that_stick_are_told():
     """Below the limit of sliding the deflection of the element is free."""
     with pytest.raises(AnalysisError, match="never slide keep any deflection"):
-        frequency_response(jenkins_system(), (0.8, 0.9), levels={"drive.amplitude_x": [0.5]},
-                           method=Shooting(segments=1))
+        frequency_response(jenkins_system(), (0.8 / TURN, 0.9 / TURN),
+                           levels={"drive.amplitude_x": [0.5]}, method=Shooting(segments=1))

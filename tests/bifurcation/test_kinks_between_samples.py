@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from systems import TURN
 
 from fecontact import ContactSystem, Drive, basis_from_matrices, simulate
 from fecontact.bifurcation import (
@@ -17,8 +18,10 @@ from fecontact.bifurcation.harmonic.balance import Linearised
 from fecontact.bifurcation.harmonic.starts import problem_for
 from fecontact.laws import BilateralPlay, ConstantFriction, LinearContact
 
-# Folds of seven harmonics, the same to all digits with 1024 samples and more.
+# Angular frequencies of the folds of seven harmonics, the same to all digits with 1024 samples and
+# more.
 FOLDS = (8.56761, 6.99774)
+BOUNDS = (2.0 / TURN, 15.0 / TURN)
 
 
 def stop(w=2.0):
@@ -28,11 +31,11 @@ def stop(w=2.0):
     return ContactSystem(
         basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows}),
         normal=LinearContact(1000.0), gap=10.0,
-        drive=Drive(stiffness_y=40.0, damping_y=0.632, amplitude_y=2.5, angular_frequency=w))
+        drive=Drive(stiffness_y=40.0, damping_y=0.632, amplitude_y=2.5, frequency_hz=w / TURN))
 
 
-def response(system=None, observe=("B", "y"), **method):
-    return frequency_response(system or stop(), (2.0, 15.0), observe=observe,
+def response(system=None, bounds=BOUNDS, observe=("B", "y"), **method):
+    return frequency_response(system or stop(), bounds, observe=observe,
                               method=HarmonicBalance(7, **method)).branches[0]
 
 
@@ -46,7 +49,7 @@ def turns(branch):
 def test_both_folds_are_found_by_default(stability):
     branch = response(stability=stability)
     assert [point.kind for point in branch.special] == ["fold", "fold"]
-    assert [point.parameter for point in branch.special] == pytest.approx(FOLDS, abs=1e-3)
+    assert [TURN * point.parameter for point in branch.special] == pytest.approx(FOLDS, abs=1e-3)
     assert turns(branch) == 2
     assert branch.attributes["sampling_error"] < 5e-4
 
@@ -54,13 +57,13 @@ def test_both_folds_are_found_by_default(stability):
 def test_wrong_stability_is_left_out_and_said():
     branch = response()
     assert "stable" not in branch.points[0].values
-    assert "Stability is left out: at the fold at drive.angular_frequency = 8.567" in branch.message
+    assert "Stability is left out: at the fold at drive.frequency_hz = 1.363" in branch.message
     assert response(stability=None).message == ""
 
 
 def test_enough_harmonics_give_stability():
     """One multiplier passes 1 at each fold, none does elsewhere; doublings but no riddles."""
-    branch = frequency_response(stop(), (2.0, 15.0), observe=("B", "y"),
+    branch = frequency_response(stop(), BOUNDS, observe=("B", "y"),
                                 method=HarmonicBalance(25)).branches[0]
     kinds = [point.kind for point in branch.special]
     assert kinds == ["period doubling", "period doubling", "fold", "fold"]
@@ -76,7 +79,8 @@ def test_parameter_turns_twice_or_a_sentence_says_why_not(samples):
     assert sum(point.kind == "fold" for point in branch.points) == turns(branch)
     if samples >= 128:
         assert branch.message == ""
-        assert [point.parameter for point in branch.special] == pytest.approx(FOLDS, abs=5e-4)
+        assert [TURN * point.parameter for point in branch.special] == pytest.approx(
+            FOLDS, abs=5e-4)
 
 
 def _stop(t, x, p, out):
@@ -88,7 +92,7 @@ def _stop(t, x, p, out):
 def test_corners_of_functions_are_folds():
     """Kinks of functions of users are not known; where the slope jumps the parameter turns too."""
     field = vector_field(_stop, {"W": 2.0}, ("x", "v"), period=lambda p: 2.0 * np.pi / p["W"])
-    branch = response(field, (1.0, 0.0), stability=None, samples=2048)
+    branch = response(field, (2.0, 15.0), (1.0, 0.0), stability=None, samples=2048)
     first, last = (point for point in branch.points if point.kind == "fold")
     assert [first.parameter, last.parameter] == pytest.approx(FOLDS, abs=4e-3)
 
@@ -96,16 +100,16 @@ def test_corners_of_functions_are_folds():
 def test_runs_beside_the_fold():
     """Below the fold a run stays on the upper branch, beyond it falls to the lower one."""
     branch = response(stability=None)
-    fold = branch.special[0].parameter
-    places = [k for k, point in enumerate(branch.points) if point.parameter > 8.3]
+    fold = TURN * branch.special[0].parameter
+    places = [k for k, point in enumerate(branch.points) if TURN * point.parameter > 8.3]
     upper = next(branch.points[k] for k in places)
-    field = contact_field(stop(), ["drive.angular_frequency"])
+    field = contact_field(stop(), ["drive.frequency_hz"])
     start = upper.orbit(field).states[0]
-    peaks = {}
-    for w in (upper.parameter, fold + 0.1):
+    peaks, known = {}, TURN * upper.parameter
+    for w in (known, fold + 0.1):
         run = simulate(stop(w), 60.0, initial=start, outputs=6001)
         peaks[w] = np.abs(run.states[-600:, 0]).max()
-    assert peaks[upper.parameter] == pytest.approx(
+    assert peaks[known] == pytest.approx(
         float(np.abs([upper.values["minimum"][0], upper.values["maximum"][0]]).max()), rel=0.01)
     # Linear amplitude 100 / |40 - w^2|, below the gap.
     w = fold + 0.1
@@ -122,10 +126,10 @@ def sliding(**parts):
                             {"contact": rows[None], "B": rows}),
         **{"normal": LinearContact(30.0, 0.8), "friction": ConstantFriction(0.4, 0.2), "gap": 0.2,
            "drive": Drive(stiffness_x=1.0, stiffness_y=1.0, damping_y=0.2, amplitude_y=1.0,
-                          amplitude_x=0.3, angular_frequency=1.3), **parts})
+                          amplitude_x=0.3, frequency_hz=1.3 / TURN), **parts})
 
 
-@pytest.mark.parametrize("parameter", ["drive.angular_frequency", "normal.stiffness"])
+@pytest.mark.parametrize("parameter", ["drive.frequency_hz", "normal.stiffness"])
 @pytest.mark.parametrize("law", [LinearContact(30.0, 0.8), BilateralPlay(20.0, 0.3)])
 def test_derivatives_are_those_of_the_equations(law, parameter):
     """By compiled code and one by one, against central differences of the residual."""
@@ -150,14 +154,14 @@ def test_derivatives_are_those_of_the_equations(law, parameter):
 
 def test_forces_between_samples_add_up_to_the_integral():
     """Mean force of a prescribed motion: third order in the distance of samples."""
-    field = contact_field(stop(), ["drive.angular_frequency"])
+    field = contact_field(stop(), ["drive.frequency_hz"])
     errors = []
     for samples in (40, 80, 160):
         off = []
         for turn in np.linspace(0.0, 2.0 * np.pi, 7, endpoint=False):
             problem = problem_for(field, field.values, 0, HarmonicBalance(1, samples), np.ones(4))
             # x = -12 cos(w t + turn) touches at 10.
-            u = np.array([0.0, -12.0 * np.cos(turn), 12.0 * np.sin(turn), 2.0])
+            u = np.array([0.0, -12.0 * np.cos(turn), 12.0 * np.sin(turn), 2.0 / TURN])
             force = -Linearised(problem, u).residual[0]
             half = np.arccos(10.0 / 12.0)
             exact = 1000.0 * (12.0 * np.sin(half) - 10.0 * half) / np.pi
@@ -172,13 +176,13 @@ def test_laws_without_kinks_have_no_onsets():
     from fecontact.laws import RoughSurface
 
     system = replace(stop(), normal=RoughSurface(1e6, 1e-5, 6.0))
-    field = contact_field(system, ["drive.angular_frequency"])
+    field = contact_field(system, ["drive.frequency_hz"])
     problem = problem_for(field, field.values, 0, HarmonicBalance(3), np.ones(4))
     assert problem.onsets.size == 0
 
 
 def test_samples_that_are_given_are_kept():
     branch = frequency_response(
-        stop(), (2.0, 6.0), observe=("B", "y"), method=HarmonicBalance(3, samples=24),
+        stop(), (2.0 / TURN, 6.0 / TURN), observe=("B", "y"), method=HarmonicBalance(3, samples=24),
         options=ContinuationOptions(largest_step=0.1)).branches[0]
     assert branch.attributes["samples"] == 24

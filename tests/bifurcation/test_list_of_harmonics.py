@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from oscillators import duffing, duffing_frequency, jenkins_system, unilateral
 from scipy.optimize import fsolve
+from systems import TURN
 
 from fecontact import ContactSystem, Drive, Load, PointLoad, basis_from_matrices
 from fecontact.bifurcation import (
@@ -28,14 +29,16 @@ def hardening(damping=0.05, force=0.18):
     return ContactSystem(
         basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows}),
         normal=BilateralPolynomial(0.0, 0.1), drive=Drive(
-            stiffness_y=1.0, damping_y=damping, amplitude_y=force, angular_frequency=0.8))
+            stiffness_y=1.0, damping_y=damping, amplitude_y=force, frequency_hz=0.8 / TURN))
 
 
 def followed(system, harmonics, bounds, **options):
+    """Response over angular frequencies."""
     contact = isinstance(system, ContactSystem)
     observe = ("B", "y" if system.drive.stiffness_y else "x") if contact else [1.0, 0.0]
+    low, high = np.array(bounds) / (TURN if contact else 1.0)
     return frequency_response(
-        system, bounds, None if contact else "W", observe=observe,
+        system, (low, high), None if contact else "W", observe=observe,
         method=HarmonicBalance(harmonics, **options),
         options=ContinuationOptions(points=400, largest_step=0.05, locate=False))
 
@@ -80,7 +83,7 @@ def test_harmonics_that_are_left_out_are_zero(orders):
     system = unilateral().system()
     branch = followed(system, orders, (1.0, 1.1), samples=4096).branches[0]
     X = branch.points[-1].values["observed_harmonics"]
-    assert branch.points[-1].parameter == 1.1
+    assert branch.points[-1].parameter == 1.1 / TURN
     assert not np.delete(X, orders).any()
 
     def force(x, v):
@@ -125,7 +128,7 @@ def test_damped_modes():
                   for few in (5, [1, 3, 5]))
     top = [one.at(jenkins_system(), amplitude=20.0) for one in (whole, odd)]
     assert top[1].damping_ratio == pytest.approx(top[0].damping_ratio, rel=1e-7)
-    assert top[1].frequency == pytest.approx(top[0].frequency, rel=1e-7)
+    assert top[1].frequency_hz == pytest.approx(top[0].frequency_hz, rel=1e-7)
 
 
 def test_points_are_restored(tmp_path):

@@ -11,7 +11,7 @@ import types
 import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
-from systems import friction_oscillator, impact_oscillator
+from systems import TURN, friction_oscillator, impact_oscillator
 
 from fecontact import Drive, Ground, InputError, Load, PointLoad, simulate
 from fecontact.bifurcation import VectorField, contact_field, poincare_scan, vector_field
@@ -30,7 +30,7 @@ from fecontact.laws import (
     signal,
 )
 
-W = "drive.angular_frequency"
+FREQUENCY = "drive.frequency_hz"
 
 
 def test_the_mark_sees_laws_and_functions(tmp_path):
@@ -46,25 +46,25 @@ def test_the_mark_sees_laws_and_functions(tmp_path):
         scan(stiffer, tmp_path / "field")
     base = impact_oscillator(1)
     numbers = (base.normal.stiffness, base.normal.roughness_height, base.normal.damping)
-    short_scan(base, W, tmp_path / "laws")
-    short_scan(base.with_(normal=RoughSurface(*numbers)), W, tmp_path / "laws")
+    short_scan(base, FREQUENCY, tmp_path / "laws")
+    short_scan(base.with_(normal=RoughSurface(*numbers)), FREQUENCY, tmp_path / "laws")
     for other in (base.with_(**{"normal.stiffness": 1.01 * base.normal.stiffness}),
                   base.with_(normal=ParabolicSurface(*numbers))):
         with pytest.raises(InputError, match="another system"):
-            short_scan(other, W, tmp_path / "laws")
+            short_scan(other, FREQUENCY, tmp_path / "laws")
 
 
 def short_scan(system, parameter, folder, initial=(0.0, 0.0), **settings):
-    return poincare_scan(system, parameter, [60.0, 61.0, 62.0], transient_periods=2, keep=1,
-                         initial=initial, folder=folder, **settings)
+    return poincare_scan(system, parameter, np.array([60.0, 61.0, 62.0]) / TURN,
+                         transient_periods=2, keep=1, initial=initial, folder=folder, **settings)
 
 
-def straight(system, w):
-    return system.with_(**{W: w})
+def straight(system, f):
+    return system.with_(**{FREQUENCY: f})
 
 
-def bent(system, w):
-    return system.with_(**{W: w + 0.1 * (w - 60.0) * (62.0 - w)})
+def bent(system, f):
+    return system.with_(**{FREQUENCY: f + 0.1 * (f - 60.0 / TURN) * (62.0 / TURN - f)})
 
 
 def test_the_mark_sees_functions_of_the_parameter_between_the_ends(tmp_path):
@@ -85,11 +85,11 @@ def test_the_mark_sees_starts_to_the_last_digit(tmp_path):
                   for start in (1e-4, 1e-4 * (1.0 + 1e-10)))
     assert repr(one) == repr(other)
     assert (one.states[-1] != other.states[-1]).any()
-    short_scan(base, W, tmp_path / "a", initial=one)
+    short_scan(base, FREQUENCY, tmp_path / "a", initial=one)
     for same_start in (one, one.states[-1], one.states[-1].tolist(), tuple(one.states[-1])):
-        short_scan(base, W, tmp_path / "a", initial=same_start, rtol=np.float64(1e-5))
+        short_scan(base, FREQUENCY, tmp_path / "a", initial=same_start, rtol=np.float64(1e-5))
     with pytest.raises(InputError, match="another system"):
-        short_scan(base, W, tmp_path / "a", initial=other)
+        short_scan(base, FREQUENCY, tmp_path / "a", initial=other)
 
 
 LONG = np.linspace(0.0, 1.0, 5000)
@@ -142,7 +142,7 @@ def wave(c):
     def law(t, p):
         return c * p[0] * math.sin(p[1] * t), c * p[0] * p[1] * math.cos(p[1] * t)
 
-    return own(Harmonic, law)(1e-4, 60.0)
+    return own(Harmonic, law)(1e-4, 60.0 / TURN)
 
 
 def driven(c):
@@ -176,7 +176,8 @@ def on_a_shaker(c):
     def law(t, p):
         return c * p[1] / p[2] * (1.0 - math.cos(p[2] * t)), c * p[1] * math.sin(p[2] * t)
 
-    return friction_oscillator().with_(ground=Ground(motion=own(HarmonicSpeed, law)(1e-3, 60.0)))
+    return friction_oscillator().with_(
+        ground=Ground(motion=own(HarmonicSpeed, law)(1e-3, 60.0 / TURN)))
 
 
 def far_away(limit):

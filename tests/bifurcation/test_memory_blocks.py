@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from oscillators import jenkins_system, one_mode
+from systems import TURN
 
 import fecontact as fc
 from fecontact.bifurcation import HarmonicBalance, contact_field
@@ -11,13 +12,13 @@ from fecontact.bifurcation.harmonic.memory import LEAK, solve_around
 from fecontact.bifurcation.harmonic.starts import corrected, problem_for
 from fecontact.laws import DahlFriction, IwanFriction, JenkinsFriction, PrescribedForce
 
-FREQUENCY = "drive.angular_frequency"
+FREQUENCY = "drive.frequency_hz"
 
 
 def driven(system):
     """Field over the frequency of a system with a drive."""
     return contact_field(system.with_(drive=fc.Drive(
-        stiffness_x=1.0, damping_x=0.02, amplitude_x=0.5, angular_frequency=1.1)), [FREQUENCY])
+        stiffness_x=1.0, damping_x=0.02, amplitude_x=0.5, frequency_hz=1.1 / TURN)), [FREQUENCY])
 
 
 def iwan(count):
@@ -71,9 +72,11 @@ def test_elements_of_one_node_are_those_of_as_many_nodes():
         field = driven(system)
         problem = problem_for(field, field.values, 0, HarmonicBalance(5, 128),
                               np.ones(field.dimension + 2))
-        problem, u = corrected(problem, np.append(np.zeros(problem.size), 1.1))
+        problem, u = corrected(problem, np.append(np.zeros(problem.size), 1.1 / TURN))
         here = problem.linearise(u)
-        found.append((u, here.condensed, here.memory))
+        # The last derivatives are those to the angular frequency.
+        condensed = here.condensed / np.append(np.ones(problem.size), TURN)
+        found.append((u, condensed, here.memory))
     for one, other in zip(*found, strict=True):
         # The leak alone holds the mean of elements that stick.
         assert one == pytest.approx(other, rel=1e-5, abs=1e-9)

@@ -35,7 +35,7 @@ def store(described, mode, folder):
 
 
 def frequency_at(mode, amplitude):
-    return np.interp(np.log(amplitude), np.log(mode.amplitude), mode.frequency)
+    return np.interp(np.log(amplitude), np.log(mode.amplitude), mode.frequency_hz)
 
 
 def block_frequency(described, amplitude):
@@ -54,9 +54,9 @@ def test_mode_of_a_block_is_that_of_its_element(cli, file):
     results = file.parent / "results"
     mode = read_mode(results / "block-mode-1.h5")
     assert mode.amplitude[[0, -1]] == pytest.approx(AMPLITUDES, rel=1e-6)
-    assert mode.frequency == pytest.approx(
+    assert mode.frequency_hz == pytest.approx(
         block_frequency(Study.read(file), mode.amplitude), rel=1e-3)
-    assert np.ptp(mode.frequency) > 0.4 * mode.frequency[0]
+    assert np.ptp(mode.frequency_hz) > 0.4 * mode.frequency_hz[0]
     for ending in ("csv", "png", "html"):
         assert (results / f"block-mode-1.{ending}").stat().st_size > 1000
 
@@ -120,7 +120,7 @@ def test_going_on_needs_the_same_values(cli, file):
     assert code == 1
     assert "--resume is for a nonlinear mode" in said
     # What responses alone read may differ.
-    assert cli("modes", file, *ARGUMENTS, "--set", "response.bounds_hz=[5.0, 6.0]",
+    assert cli("modes", file, *ARGUMENTS, "--set", "response.bounds=[5.0, 6.0]",
                "--resume")[0] == 0
 
 
@@ -165,6 +165,6 @@ def test_killed_mode_is_never_corrupt(file):
                 results.unlink()
     assert any(count % 50 < 3 for count in kept)
     execute([*arguments, *(["--resume"] if results.exists() else [])])
-    assert read_mode(results).frequency[-1] == pytest.approx(whole.frequency[-1], rel=1e-5)
+    assert read_mode(results).frequency_hz[-1] == pytest.approx(whole.frequency_hz[-1], rel=1e-5)
     with pytest.raises(FecontactError):
         read_mode(file)

@@ -30,16 +30,16 @@ def test_frequency_is_that_of_the_elliptic_integral(hard, amplitude):
 def test_amplitude_follows_from_the_frequency(hard):
     system, mode = hard
     frequency = duffing_frequency(3.0, 4.0, 0.9) / (2.0 * np.pi)
-    assert mode.at(system, frequency=frequency).amplitude[0] == pytest.approx(0.9, rel=1e-5)
+    assert mode.at(system, frequency_hz=frequency).amplitude[0] == pytest.approx(0.9, rel=1e-5)
 
 
 def test_errors_say_what_the_mode_has(hard):
     system, mode = hard
     with pytest.raises(InputError, match=r"amplitude = 3 must lie within the mode, from 0\.001"):
         mode.at(system, amplitude=3.0)
-    with pytest.raises(InputError, match="frequency = 100 Hz must lie within"):
-        mode.at(system, frequency=100.0)
-    with pytest.raises(InputError, match="give either amplitude or frequency"):
+    with pytest.raises(InputError, match="frequency_hz = 100 Hz must lie within"):
+        mode.at(system, frequency_hz=100.0)
+    with pytest.raises(InputError, match="give either amplitude or frequency_hz"):
         mode.at(system)
 
 
@@ -49,4 +49,4 @@ def test_one_frequency_of_a_linear_mode_does_not_name_an_amplitude():
                           method=HarmonicBalance(3))
     assert mode.at(system, amplitude=0.02).angular_frequency[0] == pytest.approx(1.0, rel=1e-10)
     with pytest.raises(InputError, match="times; give the amplitude"):
-        mode.at(system, frequency=float(mode.frequency[0]))
+        mode.at(system, frequency_hz=float(mode.frequency_hz[0]))

@@ -7,7 +7,7 @@ import pytest
 from oscillators import jenkins_system, one_mode
 from scipy.interpolate import CubicSpline
 from scipy.special import ellipk
-from systems import two_mass_field, two_mass_system
+from systems import TURN, two_mass_field, two_mass_system
 
 import fecontact as fc
 from fecontact import io, plot
@@ -115,7 +115,7 @@ def test_mode_goes_through_its_internal_resonance(resonant):
     inside = third > 1.0
     # One tongue: frequency nearly constant, and the first harmonic passes zero at its end.
     assert third.max() > 50.0
-    assert np.ptp(mode.frequency[inside]) < 0.02 * mode.frequency[inside].mean()
+    assert np.ptp(mode.frequency_hz[inside]) < 0.02 * mode.frequency_hz[inside].mean()
     edges = np.flatnonzero(np.diff(inside.astype(int)))
     assert len(edges) == 2
     assert third[0] < 1e-4
@@ -126,7 +126,7 @@ def test_mode_goes_through_its_internal_resonance(resonant):
     size = np.maximum.accumulate(np.linalg.norm(X[1:], axis=1))
     assert (change < 0.15 * size).all()
     # In the limit the second mass vibrates on two springs.
-    assert mode.frequency[-1] * 2.0 * np.pi == pytest.approx(np.sqrt(2.0), rel=0.01)
+    assert mode.frequency_hz[-1] * 2.0 * np.pi == pytest.approx(np.sqrt(2.0), rel=0.01)
     assert mode.conservative
     assert mode.stable[0]
     assert not mode.stable[-1]
@@ -158,7 +158,7 @@ def test_modes_without_stability_are_those_with_it():
     plain = HarmonicBalance(5, stability=None)
     found = [nonlinear_mode(masses(first=0.5), (1e-2, 2.0), observe=("b.p", "y"), method=method)
              for method in (HarmonicBalance(5), plain)]
-    assert np.array_equal(found[0].frequency, found[1].frequency)
+    assert np.array_equal(found[0].frequency_hz, found[1].frequency_hz)
     assert found[0].stable is not None
     assert found[1].stable is None
     assert found[1].conservative
@@ -189,9 +189,9 @@ def test_viscous_damping_is_the_xi_of_the_mode():
         assert not mode.conservative
         assert mode.energy is None
         assert mode.stable is None
-        assert np.ptp(mode.frequency) > 0.1 * mode.frequency[0]
+        assert np.ptp(mode.frequency_hz) > 0.1 * mode.frequency_hz[0]
         free = nonlinear_mode(masses(first=0.5), (1e-2, 3.0), number, observe=("a.p", "y"))
-        assert mode.frequency[-1] == pytest.approx(free.frequency[-1], rel=1e-6)
+        assert mode.frequency_hz[-1] == pytest.approx(free.frequency_hz[-1], rel=1e-6)
         # The loss in a period is that of the dashpots.
         motion = mode.orbit(len(mode) - 1, 401)
         power = 0.06 * (motion.states[:, 2:] ** 2).sum(axis=1)
@@ -215,7 +215,7 @@ def test_linear_mode_of_damping_that_couples_the_modes():
 def test_static_loads_stay_and_loads_in_time_go():
     """A hardening spring is stiffer where a weight holds it: k + 3 c x^2."""
     forces = (fc.PointLoad("a.p", "y", signal=fc.laws.Constant(3.0)),
-              fc.PointLoad("a.p", "y", signal=Harmonic(5.0, 0.7)))
+              fc.PointLoad("a.p", "y", signal=Harmonic(5.0, 0.7 / TURN)))
     system = fc.ContactSystem(
         bodies={"a": point_masses({"p": 1.0})},
         links={"a": PolynomialSpring("a.p", None, 1.0, 0.5, direction=UP)},
@@ -257,7 +257,7 @@ def test_mode_about_the_static_deflection(force, preload, mean):
         index = int(np.argmin(np.abs(mode.amplitude - amplitude)))
         orbit = mode.orbit(index)
         run = fc.simulate(with_mass_damping(unforced(system), float(mode.xi[index])),
-                          1.0 / mode.frequency[index], initial=orbit.states[0], rtol=1e-9,
+                          1.0 / mode.frequency_hz[index], initial=orbit.states[0], rtol=1e-9,
                           outputs=len(orbit.times))
         assert np.abs(run.states - orbit.states)[:, 0].max() < 2e-3 * mode.amplitude[index]
 
@@ -282,8 +282,8 @@ def test_what_depends_on_time_is_left_out_and_the_rest_kept():
                                    translations=[[1.0], [0.0]])
     given = fc.ContactSystem(
         basis, normal=PrescribedForce(1.0), friction=JenkinsFriction(0.5, 1.0),
-        drive=fc.Drive(stiffness_x=3.0, motion_x=fc.laws.Constant(0.1), angular_frequency=2.0),
-        load=fc.Load(gravity=(0.4, 0.0), base_acceleration_x=Harmonic(1.0, 3.0), forces=(
+        drive=fc.Drive(stiffness_x=3.0, motion_x=fc.laws.Constant(0.1), frequency_hz=2.0 / TURN),
+        load=fc.Load(gravity=(0.4, 0.0), base_acceleration_x=Harmonic(1.0, 3.0 / TURN), forces=(
             fc.PointLoad("C", "x", signal=fc.laws.Constant(0.5)),
             fc.PointLoad("C", "x", signal=fc.laws.Pulse("half-sine", 1.0, 1.0)))))
     free = unforced(given)
@@ -332,7 +332,7 @@ def test_backbone_of_a_bolted_joint():
                                     chi=chi, beta=beta, elements=20, spacing_ratio=1.3)
     system = fc.ContactSystem(one_mode(), normal=PrescribedForce(1.0), friction=law,
                               drive=fc.Drive(stiffness_x=1.0, amplitude_x=1.0,
-                                             angular_frequency=1.0))
+                                             frequency_hz=1.0 / TURN))
     mode = nonlinear_mode(system, (0.1, 30.0), method=HarmonicBalance(1, 1024),
                           options=ContinuationOptions(points=300, largest_step=0.15))
     X = np.abs(mode.harmonic())
@@ -369,7 +369,7 @@ def test_beam_with_a_friction_damper_decays_as_its_mode_says():
     mode = nonlinear_mode(system, (5e-5, 1e-3), method=HarmonicBalance(5, 256))
     start = mode.orbit(len(mode) - 1).states[0]
     periods = 170
-    run = fc.simulate(system, periods / mode.frequency[-1], initial=start, rtol=1e-8,
+    run = fc.simulate(system, periods / mode.frequency_hz[-1], initial=start, rtol=1e-8,
                       outputs=100 * periods + 1)
     end = CubicSpline(run.time, run.states[:, :3] @ row[0])
     tops = end.derivative().roots(extrapolate=False)
@@ -379,7 +379,7 @@ def test_beam_with_a_friction_damper_decays_as_its_mode_says():
     frequency, middle = 10.0 / (tops[10:] - tops[:-10]), height[5:-5]
     assert middle.min() < 2.5e-4
     assert middle.max() > 9e-4
-    expected = np.interp(middle, mode.amplitude, mode.frequency)
+    expected = np.interp(middle, mode.amplitude, mode.frequency_hz)
     assert frequency == pytest.approx(expected, rel=2e-5)
     assert ratio == pytest.approx(np.interp(middle, mode.amplitude, mode.damping_ratio), rel=7e-3)
     # The damper doubles the damping and more, and the frequency falls as it slides.
@@ -397,7 +397,7 @@ def test_self_excited_mode_passes_the_limit_cycle_where_xi_is_zero():
     last = int(np.flatnonzero(mode.xi < 0.0)[-1])
     assert 0 < last < len(mode) - 2
     near = slice(last - 2, last + 4)
-    period = CubicSpline(mode.xi[near], 1.0 / mode.frequency[near])(0.0)
+    period = CubicSpline(mode.xi[near], 1.0 / mode.frequency_hz[near])(0.0)
     amplitude = CubicSpline(mode.xi[near], mode.amplitude[near])(0.0)
     field = two_mass_field()
     hopf = equilibrium_branch(field, parameter="B", bounds=(0.3, 9.6)).of_kind("Hopf")[0]
@@ -419,7 +419,7 @@ def test_files_give_back_what_was_written(resonant, tmp_path):
     _, mode = resonant
     again = io.read_mode(io.write_mode(tmp_path / "mode.h5", mode))
     assert repr(again) == repr(mode)
-    for name in ("amplitude", "frequency", "xi", "energy", "stable", "loss"):
+    for name in ("amplitude", "frequency_hz", "xi", "energy", "stable", "loss"):
         assert (getattr(again, name) == getattr(mode, name)).all()
     assert (again.coordinates(3) == mode.coordinates(3)).all()
     assert again.orbit(5).states == pytest.approx(mode.orbit(5).states, rel=1e-15)
@@ -435,7 +435,7 @@ def test_picture_shows_frequency_over_amplitude(resonant, tmp_path):
     assert {line.get_linestyle() for line in lower.lines} == {"-", "--"}
     assert lower.get_ylabel() == "energy [J]"
     drawn = np.concatenate([line.get_ydata() for line in upper.lines])
-    assert drawn.max() == pytest.approx(mode.frequency.max())
+    assert drawn.max() == pytest.approx(mode.frequency_hz.max())
     damped = nonlinear_mode(jenkins_system(), (0.5, 6.0), method=HarmonicBalance(1, 128))
     figure = plot.plot_nonlinear_mode([damped, damped], names=["one", "two"], logarithmic=False)
     assert figure.axes[1].get_ylabel() == "damping ratio"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from oscillators import duffing
 from response_study import STUDY
+from systems import TURN
 
 from fecontact import ContactSystem, Drive, basis_from_matrices
 from fecontact.bifurcation import (
@@ -21,6 +22,7 @@ from fecontact.core.errors import InputError
 from fecontact.laws import BilateralPolynomial
 
 STIFFNESS = np.array([[2.0, -1.0], [-1.0, 1.0]])
+BOUNDS = (0.4 / TURN, 0.6 / TURN)
 FEW = ContinuationOptions(points=8, largest_step=0.2, locate=False)
 
 
@@ -33,15 +35,15 @@ def two_masses(cubic):
         np.eye(2), links, {"contact": second[None], "B": first, "C": second},
         damping=0.1 * links)
     return ContactSystem(basis, normal=BilateralPolynomial(0.0, cubic), drive=Drive(
-        stiffness_y=1.0, damping_y=0.1, amplitude_y=1.0, angular_frequency=1.0))
+        stiffness_y=1.0, damping_y=0.1, amplitude_y=1.0, frequency_hz=1.0 / TURN))
 
 
 def test_linear_response():
     """Both displacements of a linear system, in closed form, from one response."""
     system = two_masses(1e-9)
-    response = frequency_response(system, (0.3, 2.0), observe=("B", "y"), options=FEW,
-                                  method=HarmonicBalance(2))
-    w = response.branches[0].parameter
+    response = frequency_response(system, (0.3 / TURN, 2.0 / TURN), observe=("B", "y"),
+                                  options=FEW, method=HarmonicBalance(2))
+    w = TURN * response.branches[0].parameter
     exact = np.array([np.linalg.solve(STIFFNESS * (1.0 + 0.1j * one) - np.eye(2) * one**2,
                                       [1.0, 0.0]) for one in w])
     assert response.observed == "B y"
@@ -58,7 +60,7 @@ def test_linear_response():
 def test_responses_observed_one_by_one(method):
     """A response of one displacement, observed at another one, is a response of the other."""
     system = two_masses(0.3)
-    whole, other = (frequency_response(system, (0.4, 0.6), observe=(name, "y"), options=FEW,
+    whole, other = (frequency_response(system, BOUNDS, observe=(name, "y"), options=FEW,
                                        method=method) for name in ("B", "C"))
     found = whole.of(system, ("C", "y"))
     np.testing.assert_allclose(found.amplitude(), other.amplitude(), rtol=1e-8)
@@ -71,7 +73,7 @@ def test_responses_observed_one_by_one(method):
 
 def test_held_amplitudes_and_vector_fields():
     system = two_masses(0.3)
-    held = controlled_response(system, (0.4, 0.6), [0.5], "drive.amplitude_y", observe=("B", "y"),
+    held = controlled_response(system, BOUNDS, [0.5], "drive.amplitude_y", observe=("B", "y"),
                                options=FEW, method=HarmonicBalance(3))
     other = held.of(system, ("C", "y"))
     np.testing.assert_array_equal(other.force(), held.force())
@@ -90,21 +92,21 @@ def test_held_amplitudes_and_vector_fields():
 def test_a_system_in_place_of_its_field(method):
     """Points between those of a branch, orbits and trajectories, from the system alone."""
     system = two_masses(0.3)
-    branch = frequency_response(system, (0.4, 0.6), observe=("B", "y"), options=FEW,
+    branch = frequency_response(system, BOUNDS, observe=("B", "y"), options=FEW,
                                 method=method).branches[0]
-    field = contact_field(system, ["drive.angular_frequency"])
-    one, other = (branch.at(given, 0.45) for given in (system, field))
+    field = contact_field(system, ["drive.frequency_hz"])
+    one, other = (branch.at(given, 0.45 / TURN) for given in (system, field))
     np.testing.assert_array_equal(one.u, other.u)
-    assert one.parameter == 0.45
+    assert one.parameter == 0.45 / TURN
     np.testing.assert_array_equal(one.orbit(system).states, one.orbit(field).states)
     assert one.trajectory(system).time[-1] == pytest.approx(2.0 * np.pi / 0.45)
     with pytest.raises(InputError, match="field"):
-        branch.at(None, 0.45)
+        branch.at(None, 0.45 / TURN)
 
 
 def test_bad_points():
     system = two_masses(0.3)
-    response = frequency_response(system, (0.4, 0.5), observe=("B", "y"), options=FEW)
+    response = frequency_response(system, BOUNDS, observe=("B", "y"), options=FEW)
     with pytest.raises(InputError, match="D"):
         response.of(system, ("D", "y"))
     with pytest.raises(InputError, match="system"):
@@ -121,7 +123,7 @@ def file(tmp_path, monkeypatch):
 
 def test_further_displacements_of_a_study(cli, file):
     """Amplitude and phase of further points are columns of the CSV file."""
-    code, _, _ = cli("response", file, "--hz", 9, 10, "--set", 'response.also=["C x", "0 y"]')
+    code, _, _ = cli("response", file, "--bounds", 9, 10, "--set", 'response.also=["C x", "0 y"]')
     assert code == 0
     with (file.parent / "results" / "block-response.csv").open() as stream:
         rows = list(csv.DictReader(stream))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from oscillators import jenkins, jenkins_system, unilateral
 from response_study import STUDY, study
+from systems import TURN
 
 from fecontact import Study, render, simulate
 from fecontact.bifurcation import (
@@ -34,10 +35,11 @@ FEW = ContinuationOptions(points=2)
 def unilateral_points():
     """The same orbit of a mass that leaves a stop, by three methods."""
     field = unilateral()
-    start = frequency_response(field.system(), (0.9, 0.95), observe=("B", "y"), options=FEW,
+    bounds = (0.9 / TURN, 0.95 / TURN)
+    start = frequency_response(field.system(), bounds, observe=("B", "y"), options=FEW,
                                method=METHODS["harmonic"]).branches[0].points[0]
     motion = start.orbit(field)
-    return field, {name: orbit_branch(field, motion, method=method, bounds=(0.9, 0.95),
+    return field, {name: orbit_branch(field, motion, method=method, bounds=bounds,
                                       options=FEW).points[0] for name, method in METHODS.items()}
 
 
@@ -47,7 +49,7 @@ def test_all_methods_give_the_trajectory_of_a_run(unilateral_points):
     runs = {name: point.trajectory(field, 2001) for name, point in points.items()}
     start = runs["shooting"].states[0]
     exact = simulate(runs["shooting"].system, T, initial=start, rtol=1e-9, outputs=2001)
-    assert runs["shooting"].system.drive.angular_frequency == 0.9
+    assert runs["shooting"].system.drive.frequency_hz == 0.9 / TURN
     spring = np.ptp(exact.energies.stored)
     for name, run in runs.items():
         within = 2e-3 if name == "harmonic" else 1e-4
@@ -67,8 +69,8 @@ def test_all_methods_give_the_trajectory_of_a_run(unilateral_points):
 def test_loss_of_a_jenkins_element_is_that_of_a_run():
     """Samples around the start of slip do not resolve the rate of its deflection."""
     system, field = jenkins_system(1.2), jenkins(1.2)
-    point = frequency_response(system, (1.2, 1.25), method=HarmonicBalance(25, 1000),
-                               options=FEW).branches[0].points[0]
+    point = frequency_response(system, (1.2 / TURN, 1.25 / TURN), options=FEW,
+                               method=HarmonicBalance(25, 1000)).branches[0].points[0]
     run, T = point.trajectory(field), 2.0 * np.pi / 1.2
     settled = simulate(system, 60.0 * T, rtol=1e-9, outputs=np.array([0.0, 60.0 * T]))
     exact = simulate(system, T, initial=settled.states[-1], rtol=1e-9)
@@ -86,14 +88,13 @@ def test_loss_of_a_jenkins_element_is_that_of_a_run():
 def block_branches():
     """The block with smoothed friction by three methods, over the frequency."""
     system = study().system().with_(friction=ConstantFriction(0.4, smoothing_slope=10.0))
-    field = contact_field(system, ["drive.angular_frequency"])
-    w = 50.0
-    first = frequency_response(system, (w, 52.0), method=HarmonicBalance(9),
-                               options=FEW).branches[0]
+    field = contact_field(system, ["drive.frequency_hz"])
+    bounds = (50.0 / TURN, 52.0 / TURN)
+    first = frequency_response(system, bounds, method=HarmonicBalance(9), options=FEW).branches[0]
     motion = first.points[0].orbit(field)
     found = {"harmonic": first}
     for name, method in (("collocation", Collocation(20)), ("shooting", Shooting(1))):
-        found[name] = orbit_branch(field, motion, method=method, bounds=(w, 52.0), options=FEW)
+        found[name] = orbit_branch(field, motion, method=method, bounds=bounds, options=FEW)
     return system, field, found
 
 
@@ -119,7 +120,7 @@ def test_movies_of_orbits_by_the_command(block_branches, tmp_path, cli):
     system, _, found = block_branches
     file = write_branches(tmp_path / "orbits.h5", found, system=system, study=STUDY)
     for name in found:
-        code, _, _ = cli("render", file, "--branch", name, "--at-hz", 50.01 / (2.0 * np.pi), "-o",
+        code, _, _ = cli("render", file, "--branch", name, "--at", 50.01 / TURN, "-o",
                          tmp_path / f"{name}.mp4", "--frames", 5, "--size", 320, 180)
         assert code == 0
         assert imageio_ffmpeg.count_frames_and_secs(str(tmp_path / f"{name}.mp4"))[0] == 5
@@ -149,7 +150,7 @@ def test_nonlinear_mode_by_the_command(cli, tmp_path, monkeypatch):
     mode = read_mode(results / "block-mode-1.h5")
     mass = 1.0 / Study.read(tmp_path / "block.toml").modal_basis().T[0, 0, 0] ** 2
     assert mode.angular_frequency[0] == pytest.approx(np.sqrt((5610.0 + 2e4) / mass), rel=1e-4)
-    assert f"{mode.frequency[0]:.6g}" in said
+    assert f"{mode.frequency_hz[0]:.6g}" in said
     A = mode.amplitude[-1]
     assert pytest.approx(4e-3, rel=1e-6) == A
     # Per period, friction 4 S (A - S / k) and the dashpot.

@@ -6,6 +6,7 @@ import impact_orbits
 import numpy as np
 import pytest
 from systems import (
+    TURN,
     belt,
     lorenz_field,
     two_mass_field,
@@ -103,12 +104,12 @@ def test_orbits_of_a_hopf_point_agree_with_collocation(two_masses):
 
 def test_the_drives_frequency_moves_the_ends_of_the_segments():
     """At the end of the range the orbit is the motion of a run that knows nothing of it."""
-    branch = impact_orbits.orbits(64.32, (64.3, 64.5), points=25)
-    field = impact_orbits.field_at(64.32)
+    branch = impact_orbits.orbits(64.32 / TURN, (64.3 / TURN, 64.5 / TURN), points=25)
+    field = impact_orbits.field_at(64.32 / TURN)
     end = observe(field, branch, "B", "y").points[-1]
-    assert end.parameter == pytest.approx(64.5, rel=1e-9)
-    run = strobe(impact_orbits.oscillator(64.5), transient_periods=150, keep=2, initial=np.zeros(4),
-                 rtol=1e-9)
+    assert end.parameter == pytest.approx(64.5 / TURN, rel=1e-9)
+    run = strobe(impact_orbits.oscillator(64.5 / TURN), transient_periods=150, keep=2,
+                 initial=np.zeros(4), rtol=1e-9)
     row = field.displacement_row("B", "y")
     assert end.values["observed_section"] == pytest.approx(run.states[0, -1:] @ row, rel=1e-5)
     assert np.abs(end.values["multipliers"])[:2] == pytest.approx([0.545, 0.545], abs=0.01)
@@ -167,12 +168,12 @@ def test_orbits_in_another_phase_are_met_again(two_masses):
 
 
 def test_driven_orbits_a_period_of_the_drive_later_are_the_same():
-    motion = periodic_motion(impact_orbits.oscillator(30.9), initial=np.zeros(4),
+    motion = periodic_motion(impact_orbits.oscillator(30.9 / TURN), initial=np.zeros(4),
                              longest_period=8 * 2.0 * np.pi / 30.9)
     assert motion.periods == 2
-    field = impact_orbits.field_at(30.9)
-    branch = orbit_branch(field, motion, method=Shooting(segments=3), bounds=(30.0, 32.0),
-                          options=ContinuationOptions(points=1))
+    field = impact_orbits.field_at(30.9 / TURN)
+    branch = orbit_branch(field, motion, method=Shooting(segments=3),
+                          bounds=(30.0 / TURN, 32.0 / TURN), options=ContinuationOptions(points=1))
     problem, u, _ = restored_shooting(field, branch.points[0])
     tangent = branch.points[0].tangent
     later = np.append(problem.at_phases(u, problem.mesh[:-1] + 0.5).reshape(-1), u[-1])
@@ -187,14 +188,14 @@ def test_periodic_motions():
                              longest_period=2.0)
     # Known from an independent calculation.
     assert motion.period == pytest.approx(1.264348, abs=2e-5)
-    driven = periodic_motion(impact_orbits.oscillator(30.9), initial=np.zeros(4),
+    driven = periodic_motion(impact_orbits.oscillator(30.9 / TURN), initial=np.zeros(4),
                              longest_period=8 * 2.0 * np.pi / 30.9)
     assert driven.periods == 2
     assert driven.period == pytest.approx(4.0 * np.pi / 30.9, rel=1e-12)
     assert np.abs(driven.states[-1] - driven.states[0]).max() < 1e-3 * np.ptp(driven.states)
     with pytest.raises(AnalysisError, match=r"(does not repeat|has not settled) within 4 periods"):
-        periodic_motion(impact_orbits.oscillator(23.63), initial=np.zeros(4), transient=10.0,
-                        longest_period=4 * 2.0 * np.pi / 23.63)
+        periodic_motion(impact_orbits.oscillator(23.63 / TURN), initial=np.zeros(4),
+                        transient=10.0, longest_period=4 * 2.0 * np.pi / 23.63)
     with pytest.raises(InputError, match="give transient"):
         periodic_motion(belt(speed=1e-3))
 
@@ -243,19 +244,21 @@ def test_two_masses_with_a_unilateral_spring():
     basis = basis_from_matrices(np.eye(2), K, {"contact": rows, "one": points[0],
                                                "two": points[1]}, damping=0.03 * K)
     system = ContactSystem(basis, normal=LinearContact(100.0), gap=1.0, load=Load(
-        forces=(PointLoad("two", "x", signal=Harmonic(0.1, 0.8)),)))
-    name, seen = "load.forces.0.signal.angular_frequency", basis.point_row("one", "x")
+        forces=(PointLoad("two", "x", signal=Harmonic(0.1, 0.8 / TURN)),)))
+    name, seen = "load.forces.0.signal.frequency_hz", basis.point_row("one", "x")
     response = frequency_response(
-        system, (0.5, 0.8), name, observe=("one", "x"), start=0.8,
+        system, (0.5 / TURN, 0.8 / TURN), name, observe=("one", "x"), start=0.8 / TURN,
         method=HarmonicBalance(21, 512, stability=None)).branches[0]
     field = contact_field(system, [name])
     for w, which, largest in ((0.64, 0, 1.0262143), (0.7, -1, 1.0521133)):
-        orbit = orbit_branch(field, response.at(field, w, which).orbit(field), method=Shooting(),
-                             bounds=(w, w + 0.01), options=ContinuationOptions(points=1)).points[0]
+        f = w / TURN
+        orbit = orbit_branch(
+            field, response.at(field, f, which).orbit(field), method=Shooting(),
+            bounds=(f, f + 0.01 / TURN), options=ContinuationOptions(points=1)).points[0]
         assert (orbit.orbit(field, 8001).states[:, :2] @ seen).max() == pytest.approx(
             largest, rel=3e-7)
     # Scales grow with the motion: those of the first orbit would take some thousand points.
     shot = orbit_branch(field, response.points[0].orbit(field), method=Shooting(1, rtol=1e-6),
-                        bounds=(0.5, 0.8), direction=-1.0,
+                        bounds=(0.5 / TURN, 0.8 / TURN), direction=-1.0,
                         options=ContinuationOptions(points=500, locate=False))
-    assert shot.parameter[-1] == 0.5
+    assert shot.parameter[-1] == 0.5 / TURN

@@ -7,6 +7,7 @@ import weakref
 import numpy as np
 import pytest
 from oscillators import unilateral
+from systems import TURN
 
 import fecontact as fc
 from fecontact.bifurcation import (
@@ -23,6 +24,8 @@ from fecontact.bifurcation.harmonic.starts import problem_for, restored
 from fecontact.core.errors import InputError
 from fecontact.laws import BilateralPolynomial, ConstantFriction, RoughSurface
 
+BOUNDS = (0.6 / TURN, 1.8 / TURN)
+
 
 def duffing_in_y():
     """X'' + .05 X' + X + .1 X^3 = .18 sin W t."""
@@ -31,7 +34,7 @@ def duffing_in_y():
     basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "B": rows, "C": rows},
                                    damping=[[0.05]])
     return fc.ContactSystem(basis, normal=BilateralPolynomial(0.0, 0.1), drive=fc.Drive(
-        stiffness_y=1.0, amplitude_y=0.18, angular_frequency=0.8))
+        stiffness_y=1.0, amplitude_y=0.18, frequency_hz=0.8 / TURN))
 
 
 def pressed_masses():
@@ -48,16 +51,16 @@ def pressed_masses():
         basis, normal=RoughSurface(2.0, 0.5, 0.3), gap=(0.1, 0.0),
         friction=ConstantFriction(0.3, smoothing_slope=3.0), ground=fc.Ground(speed=0.2),
         load=fc.Load(0.4), drive=fc.Drive(stiffness_x=1.0, damping_x=0.2, amplitude_x=0.8,
-                                          angular_frequency=0.9))
+                                          frequency_hz=0.9 / TURN))
 
 
 def test_they_are_those_of_the_samples_one_by_one():
     """Nodes that press, lift off and slide to and fro, with all derivatives."""
-    field = contact_field(pressed_masses(), ["drive.angular_frequency"])
+    field = contact_field(pressed_masses(), ["drive.frequency_hz"])
     problem = problem_for(field, field.values, 0, HarmonicBalance(4, 64),
                           np.ones(field.dimension + 2))
-    u = np.append(np.random.default_rng(5).normal(size=problem.size) / 2.0, 0.9)
-    e = problem.equations(0.9)
+    u = np.append(np.random.default_rng(5).normal(size=problem.size) / 2.0, 0.9 / TURN)
+    e = problem.equations(0.9 / TURN)
     assert e.numbers[PLAIN] == 1.0
     states = problem.states(u, problem.period(u), np.zeros((64, 0)))
     force = field.system().contact_history(np.zeros(64), states)[:, :, 0]
@@ -77,10 +80,10 @@ def test_on_waves_they_are_not_plain(make):
     system = make()
     wavy = system.with_(ground=fc.Ground(amplitude=1e-3, wavelength=1.0, speed=0.0))
     for one, plain in ((system, 1.0), (wavy, 0.0)):
-        field = contact_field(one, ["drive.angular_frequency"])
+        field = contact_field(one, ["drive.frequency_hz"])
         problem = problem_for(field, field.values, 0, HarmonicBalance(2),
                               np.ones(field.dimension + 2))
-        assert problem.equations(0.9).numbers[PLAIN] == plain
+        assert problem.equations(0.9 / TURN).numbers[PLAIN] == plain
 
 
 @pytest.mark.parametrize("largest", [0.01, 0.05])
@@ -94,13 +97,13 @@ def test_folds_and_bound_are_met_in_one_call(largest, monkeypatch):
 
     monkeypatch.setattr(Strides, "stride", counted)
     found = frequency_response(
-        duffing_in_y(), (0.6, 1.8), observe=("B", "y"), method=HarmonicBalance(9, stability=None),
+        duffing_in_y(), BOUNDS, observe=("B", "y"), method=HarmonicBalance(9, stability=None),
         options=ContinuationOptions(points=2000, largest_step=largest)).branches[0]
     assert len(made) == 1 + (len(found) > 513)
     assert found.status is BranchStatus.BOUND
-    assert found.parameter[-1] == 1.8
+    assert found.parameter[-1] == BOUNDS[1]
     first, second = found.of_kind("fold")
-    assert second.parameter == pytest.approx(1.11570025, abs=1e-8)
+    assert TURN * second.parameter == pytest.approx(1.11570025, abs=1e-8)
     places = [found.points.index(fold) for fold in (first, second)]
     for place, sign in zip(places, (1.0, -1.0), strict=True):
         # The first fold is the largest parameter nearby, the second the smallest.
@@ -108,7 +111,7 @@ def test_folds_and_bound_are_met_in_one_call(largest, monkeypatch):
         assert abs(fold.tangent[-1]) < 1e-7
         assert sign * before.tangent[-1] > 0.0 > sign * behind.tangent[-1]
         assert sign * fold.parameter > max(sign * before.parameter, sign * behind.parameter)
-    field = contact_field(duffing_in_y(), ["drive.angular_frequency"])
+    field = contact_field(duffing_in_y(), ["drive.frequency_hz"])
     for place in (*places, 5, len(found) // 2, len(found) - 1):
         problem, u, tangent = restored(field, found.points[place])
         here = problem.linearise(u)
@@ -132,13 +135,13 @@ def test_compiled_steps_that_end_just_behind_a_fold(stability, monkeypatch):
     monkeypatch.setattr(Strides, "stride", stride)
     seen = 0
     method = HarmonicBalance(9, stability=stability)
-    whole = frequency_response(duffing_in_y(), (0.6, 1.8), observe=("B", "y"), method=method,
+    whole = frequency_response(duffing_in_y(), BOUNDS, observe=("B", "y"), method=method,
                                options=ContinuationOptions(points=500, largest_step=0.03))
     fold = next(k for k, point in enumerate(whole.branches[0]) if point.kind == "fold")
     for points in (fold + 2, fold + 3):
         made.clear()
         frequency_response(
-            duffing_in_y(), (0.6, 1.8), observe=("B", "y"), method=method,
+            duffing_in_y(), BOUNDS, observe=("B", "y"), method=method,
             options=ContinuationOptions(points=points, largest_step=0.03))
         for problem, found in made:
             if found is None or len(found.points) < 3 or found.points[-2].kind != "fold":
@@ -158,16 +161,16 @@ def test_a_branch_stops_at_a_fold():
     options = ContinuationOptions(points=500, largest_step=0.03, stop_at="fold")
     for stability in (None, "transitions"):
         found = frequency_response(
-            duffing_in_y(), (0.6, 1.8), observe=("B", "y"), options=options,
+            duffing_in_y(), BOUNDS, observe=("B", "y"), options=options,
             method=HarmonicBalance(9, stability=stability)).branches[0]
         assert found.status is BranchStatus.STOPPED
         assert found.points[-1].kind == "fold"
-        assert found.points[-1].parameter == pytest.approx(1.2696019555, abs=1e-8)
+        assert TURN * found.points[-1].parameter == pytest.approx(1.2696019555, abs=1e-8)
 
 
 def test_stability_changes_at_the_folds_alone():
     """Between the folds the orbit is a saddle; folds within compiled steps carry multipliers."""
-    branch = frequency_response(duffing_in_y(), (0.6, 1.8), observe=("B", "y")).branches[0]
+    branch = frequency_response(duffing_in_y(), BOUNDS, observe=("B", "y")).branches[0]
     places = [k for k, point in enumerate(branch) if point.kind == "fold"]
     unstable = branch.column("unstable")
     regular = [k for k, point in enumerate(branch) if point.kind is None]
@@ -186,10 +189,10 @@ def test_steps_with_kinks_are_as_accurate_as_the_tolerance(harmonics, samples):
     """
     options = ContinuationOptions(points=400, largest_step=0.02, tolerance=1e-8)
     branch = frequency_response(
-        unilateral().system(), (0.6, 1.2), observe=("B", "y"), options=options,
+        unilateral().system(), (0.6 / TURN, 1.2 / TURN), observe=("B", "y"), options=options,
         method=HarmonicBalance(harmonics, samples=samples, stability=None)).branches[0]
     assert len(branch) > 100
-    field = contact_field(unilateral().system(), ["drive.angular_frequency"])
+    field = contact_field(unilateral().system(), ["drive.frequency_hz"])
     for point in branch:
         problem, u, _ = restored(field, point)
         assert problem.kinked
@@ -200,7 +203,7 @@ def test_steps_with_kinks_are_as_accurate_as_the_tolerance(harmonics, samples):
 
 
 def test_values_are_a_mapping_made_when_asked_for():
-    response = frequency_response(duffing_in_y(), (0.6, 0.8), observe=("B", "y"),
+    response = frequency_response(duffing_in_y(), (0.6 / TURN, 0.8 / TURN), observe=("B", "y"),
                                   method=HarmonicBalance(9, stability=None))
     point = response.branches[0].points[3]
     names = ["period", "truncation_error", "residual", "minimum", "maximum", "observed_minimum",
@@ -222,13 +225,13 @@ def test_values_are_a_mapping_made_when_asked_for():
         response.branches[0].column("stable")
     # The observed displacement is the first state.
     assert point.values["observed_maximum"] == pytest.approx(point.values["maximum"][0], rel=1e-6)
-    assert point.values["period"] == pytest.approx(2.0 * np.pi / point.parameter, rel=1e-14)
+    assert point.values["period"] == pytest.approx(1.0 / point.parameter, rel=1e-14)
 
 
 @pytest.mark.parametrize("stability", [None, "transitions"])
 def test_a_point_is_stored_without_its_neighbours(stability):
     """Copies hold a dict; what values were made from is given up when all are made."""
-    branch = frequency_response(duffing_in_y(), (0.6, 0.8), observe=("B", "y"),
+    branch = frequency_response(duffing_in_y(), (0.6 / TURN, 0.8 / TURN), observe=("B", "y"),
                                 method=HarmonicBalance(9, stability=stability)).branches[0]
     point = branch.points[5]
     orbits = point.values._orbits
@@ -250,16 +253,16 @@ def test_a_point_is_stored_without_its_neighbours(stability):
 
 
 def test_responses_of_a_system_share_its_field():
-    system, ranges = duffing_in_y(), (("drive.angular_frequency", (0.6, 1.8)),)
+    system, ranges = duffing_in_y(), (("drive.frequency_hz", BOUNDS),)
     assert field_between(system, ranges) is field_between(system, ranges)
     assert field_between(duffing_in_y(), ranges) is not field_between(system, ranges)
-    one, other = (frequency_response(system, (0.6, 1.8), observe=("B", "y")) for _ in range(2))
+    one, other = (frequency_response(system, BOUNDS, observe=("B", "y")) for _ in range(2))
     assert one.amplitude() == pytest.approx(other.amplitude(), rel=1e-14)
 
 
 def test_a_system_keeps_its_last_fields_as_long_as_it_lives():
     system = duffing_in_y()
-    every = [(("drive.angular_frequency", (0.6, high)),) for high in (1.4, 1.5, 1.6, 1.7, 1.8)]
+    every = [(("drive.frequency_hz", (0.6, high)),) for high in (1.4, 1.5, 1.6, 1.7, 1.8)]
     made = [field_between(system, ranges) for ranges in every]
     assert field_between(system, every[1]) is made[1]
     assert field_between(system, every[0]) is not made[0]

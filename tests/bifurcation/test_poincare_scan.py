@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from systems import basis, impact_oscillator, mass_in_y
+from systems import TURN, basis, impact_oscillator, mass_in_y
 
 from fecontact import (
     AnalysisError,
@@ -67,16 +67,16 @@ def test_multipliers_at_loose_tolerance(w, periods, wanted):
 
 def test_brute_force_meets_single_runs():
     system = impact_oscillator(2)
-    values = np.linspace(60.0, 65.0, 5)
-    found = poincare_scan(system, "drive.angular_frequency", values, transient_periods=60, keep=4,
+    values = np.linspace(60.0, 65.0, 5) / TURN
+    found = poincare_scan(system, "drive.frequency_hz", values, transient_periods=60, keep=4,
                           initial=np.zeros(4), chains=2)
     assert found.up.shape == found.down.shape == (5, 4, 4)
-    alone = strobe(system.with_(**{"drive.angular_frequency": 60.0}), transient_periods=60, keep=4,
-                   initial=np.zeros(4), rtol=1e-5)
+    alone = strobe(system.with_(**{"drive.frequency_hz": 60.0 / TURN}), transient_periods=60,
+                   keep=4, initial=np.zeros(4), rtol=1e-5)
     assert (found.up[0] == alone.states[0]).all()
     # The way down begins at the last value.
-    last = strobe(system.with_(**{"drive.angular_frequency": 65.0}), transient_periods=60, keep=4,
-                  initial=np.zeros(4), rtol=1e-5)
+    last = strobe(system.with_(**{"drive.frequency_hz": 65.0 / TURN}), transient_periods=60,
+                  keep=4, initial=np.zeros(4), rtol=1e-5)
     assert (found.down[-1] == last.states[0]).all()
     assert (found.up[-1] != last.states[0]).any()
     y, _ = found.observed("B", "y")
@@ -85,7 +85,7 @@ def test_brute_force_meets_single_runs():
     assert np.abs(found.up - found.down).max() < 1e-3 * np.abs(found.up).max()
 
     def faster(system, value):
-        return system.with_(**{"drive.angular_frequency": value})
+        return system.with_(**{"drive.frequency_hz": value})
 
     same = poincare_scan(system, faster, values, transient_periods=60, keep=4, initial=np.zeros(4),
                          chains=2, down=False)
@@ -145,7 +145,7 @@ def test_a_damped_mass_comes_to_rest():
 def test_bad_input():
     system = impact_oscillator(2)
     with pytest.raises(InputError, match="ascending order"):
-        poincare_scan(system, "drive.angular_frequency", [2.0, 1.0])
+        poincare_scan(system, "drive.frequency_hz", [2.0, 1.0])
     with pytest.raises(InputError, match=r"no parameter 'drive\.frequency'"):
         poincare_scan(system, "drive.frequency", [1.0, 2.0])
     with pytest.raises(InputError, match="duration = 0"):

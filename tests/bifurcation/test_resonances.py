@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from oscillators import duffing, jenkins_system
+from systems import TURN
 
 import fecontact as fc
 from fecontact import io, plot
@@ -26,7 +27,8 @@ from fecontact.laws import Harmonic
 from fecontact.reduction import PolynomialSpring, point_masses
 
 UP = (0.0, 1.0)
-FREQUENCY = "load.forces.0.signal.angular_frequency"
+FREQUENCY = "load.forces.0.signal.frequency_hz"
+RANGE = (0.7 / TURN, 1.5 / TURN)  # of the first peak
 FINE = ContinuationOptions(points=3000, largest_step=0.01)
 
 
@@ -35,7 +37,7 @@ def hardening(damping=0.05, force=0.5):
     return fc.ContactSystem(
         bodies={"a": point_masses({"p": 1.0})},
         links={"a": PolynomialSpring("a.p", None, 1.0, 0.1, damping, UP)},
-        load=fc.Load(forces=(fc.PointLoad("a.p", "y", signal=Harmonic(force, 1.0)),)))
+        load=fc.Load(forces=(fc.PointLoad("a.p", "y", signal=Harmonic(force, 1.0 / TURN)),)))
 
 
 def describing(X):
@@ -50,7 +52,7 @@ def test_response_of_a_mode_that_sticks_is_linear():
     system = jenkins_system(amplitude=0.02)
     mode = nonlinear_mode(system, (1e-3, 1.9), method=HarmonicBalance(1, 128))
     found = mode_response(mode, system)
-    w = found.angular_frequency()
+    w = TURN * found.frequency_hz()
     linear = 0.02 / (1.5 - w**2 + 0.02j * w)
     assert found.amplitude() == pytest.approx(np.abs(linear), rel=1e-5)
     assert found.phase() == pytest.approx(np.angle(linear), abs=1e-5)
@@ -59,7 +61,7 @@ def test_response_of_a_mode_that_sticks_is_linear():
     assert w[-1] > 3.0
     peak = found.peak()
     assert peak.amplitude == pytest.approx(0.02 / (0.02 * np.sqrt(1.5)), rel=1e-5)
-    assert peak.angular_frequency == pytest.approx(np.sqrt(1.5), rel=1e-7)
+    assert TURN * peak.frequency_hz == pytest.approx(np.sqrt(1.5), rel=1e-7)
     assert peak.damping_ratio == pytest.approx(0.01 / np.sqrt(1.5), rel=1e-5)
 
 
@@ -71,7 +73,7 @@ def test_response_of_a_mode_obeys_the_describing_function():
     forces = [0.3, 1.0]
     found = mode_response(mode, system, levels={"drive.amplitude_x": forces})
     for level, force in enumerate(forces):
-        w, X = found.angular_frequency(level), found.amplitude(level)
+        w, X = TURN * found.frequency_hz(level), found.amplitude(level)
         elastic, lost = describing(X)
         off = ((1.0 - w**2) * X + elastic, 0.02 * w * X + lost)
         near = 0.3 * X.max() < X
@@ -82,14 +84,13 @@ def test_response_of_a_mode_obeys_the_describing_function():
         # Phase resonance, where the force's work is the loss.
         peak = found.peak(level)
         elastic, lost = describing(np.array([peak.amplitude]))
-        assert peak.angular_frequency**2 == pytest.approx(
-            1.0 + elastic[0] / peak.amplitude, rel=2e-5)
-        assert 0.02 * peak.angular_frequency * peak.amplitude + lost[0] == pytest.approx(
-            force, rel=2e-4)
+        w = TURN * peak.frequency_hz
+        assert w**2 == pytest.approx(1.0 + elastic[0] / peak.amplitude, rel=2e-5)
+        assert 0.02 * w * peak.amplitude + lost[0] == pytest.approx(force, rel=2e-4)
         assert peak.amplitude == pytest.approx(X.max(), rel=1e-4)
-    responses = frequency_response(system, (1.0, 1.3), levels={"drive.amplitude_x": forces},
-                                   method=HarmonicBalance(1, 512), options=replace(
-                                       FINE, locate=False))
+    responses = frequency_response(
+        system, (1.0 / TURN, 1.3 / TURN), levels={"drive.amplitude_x": forces},
+        method=HarmonicBalance(1, 512), options=replace(FINE, locate=False))
     for level in range(2):
         assert found.peak(level).amplitude == pytest.approx(
             responses.amplitude(level).max(), rel=1e-4)
@@ -100,19 +101,20 @@ def test_response_of_a_hardening_mode_has_the_peak_of_all_harmonics():
     system = hardening()
     mode = nonlinear_mode(system, (1e-2, 20.0), observe=("a.p", "y"), method=HarmonicBalance(11))
     found = mode_response(mode, system, frequency=FREQUENCY)
-    response = frequency_response(system, (0.8, 2.5), FREQUENCY, observe=("a.p", "y"),
-                                  method=HarmonicBalance(11), options=FINE)
+    response = frequency_response(
+        system, (0.8 / TURN, 2.5 / TURN), FREQUENCY, observe=("a.p", "y"),
+        method=HarmonicBalance(11), options=FINE)
     peak, largest = found.peak(), response.amplitude().max()
     assert largest == pytest.approx(5.628, abs=1e-3)
     assert peak.amplitude == pytest.approx(largest, rel=2e-4)
-    assert peak.angular_frequency == pytest.approx(response.peak().parameter, rel=3e-4)
+    assert peak.frequency_hz == pytest.approx(response.peak().parameter, rel=3e-4)
     # Backbone and overhanging response: the amplitude turns over.
-    w, top = found.angular_frequency(), int(np.argmax(found.amplitude()))
+    w, top = TURN * found.frequency_hz(), int(np.argmax(found.amplitude()))
     assert w[top] > 1.7
     assert (np.diff(w[:top]) > 0.0).all()
     assert w[top:].min() < w[top] - 0.1
     field = contact_field(system, [FREQUENCY])
-    upper = response.branches[0].at(field, 1.5, 0)
+    upper = response.branches[0].at(field, 1.5 / TURN, 0)
     synthesised = np.interp(1.5, w[:top], found.amplitude()[:top])
     assert upper.values["maximum"][0] == pytest.approx(synthesised, rel=5e-3)
 
@@ -128,8 +130,8 @@ def test_two_resonances_of_a_damper_that_slides_on():
     whole = nonlinear_mode(system, (0.5, 60.0), method=HarmonicBalance(1, 512))
     peak = mode_response(whole, system).peak()
     X = peak.amplitude
-    assert 0.02 * peak.angular_frequency * X + describing(np.array([X]))[1][0] == pytest.approx(
-        1.5, rel=1e-3)
+    assert (0.02 * TURN * peak.frequency_hz * X + describing(np.array([X]))[1][0]
+            == pytest.approx(1.5, rel=1e-3))
     assert "resonances" in repr(found)
 
 
@@ -137,18 +139,18 @@ def test_two_resonances_of_a_damper_that_slides_on():
     ("amplitude", 0.0), ("phase", 0.0), ("amplitude", 0.05)])
 def test_derivatives_of_the_resonance_are_those_of_its_residual(condition, window):
     system = hardening()
-    name = "load.forces.0.signal.amplitude"
+    name, f = "load.forces.0.signal.amplitude", 1.3 / TURN
     field = contact_field(system, [FREQUENCY, name])
-    orbit = problem_for(field, field.values_with(**{FREQUENCY: 1.3}), 0, HarmonicBalance(3),
-                        np.ones(field.dimension + 2))
+    orbit = problem_for(field, field.values_with(**{FREQUENCY: f}), 0, HarmonicBalance(3),
+                        np.append(np.ones(field.dimension + 1), 1.0 / TURN))
     rng = np.random.default_rng(2)
-    u = np.concatenate([rng.normal(size=orbit.size), [1.3, 0.5]])
+    u = np.concatenate([rng.normal(size=orbit.size), [f, 0.5]])
     problem = PeakProblem(orbit, 1, 1.0, field.displacement_row("a.p", "y"), condition,
                           rng.normal(size=orbit.size + 1), rest_state(field, field.values),
                           window=window)
     if window:
         # Both sides lie on the response, near which the orbit must be.
-        y = starts.corrected(orbit, np.append(np.zeros(orbit.size), 1.3))[1]
+        y = starts.corrected(orbit, np.append(np.zeros(orbit.size), f))[1]
         u[:-1], weights = y, orbit.weights()
         along = orbit.linearise(y).solve(np.eye(len(y))[-1], np.eye(len(y))[-1])
         problem = replace(problem, border=weights * along / np.sqrt(weights @ along**2))
@@ -166,7 +168,7 @@ def test_peaks_of_one_harmonic_of_a_hardening_spring():
     """
     found = resonance_curve(duffing(), (0.02, 0.5), "P", (0.6, 1.8), frequency="W",
                             method=HarmonicBalance(1))
-    A, W = found.amplitude, found.angular_frequency
+    A, W = found.amplitude, TURN * found.frequency_hz
     assert found.parameter[[0, -1]] == pytest.approx([0.02, 0.5], rel=1e-12)
     assert pytest.approx(1.0 + 0.075 * A**2 - 0.00125, rel=1e-8) == W**2
     assert found.parameter == pytest.approx(A * np.hypot(0.00125, 0.05 * W), rel=3e-8)
@@ -180,12 +182,11 @@ def test_peaks_are_those_of_responses():
     response = frequency_response(duffing(), (0.6, 1.8), "W",
                                   levels={"P": found.parameter[some]}, options=FINE)
     for level, (amplitude, frequency) in enumerate(zip(
-            found.amplitude[some], found.angular_frequency[some], strict=True)):
+            found.amplitude[some], TURN * found.frequency_hz[some], strict=True)):
         largest = response.amplitude(level).max()
         assert largest * (1.0 - 1e-7) < amplitude < largest * (1.0 + 3e-5)
         assert frequency == pytest.approx(response.peak(level).parameter, abs=3e-4)
-    assert found.branch.points[0].orbit().period == pytest.approx(
-        2.0 * np.pi / found.angular_frequency[0])
+    assert found.branch.points[0].orbit().period == pytest.approx(1.0 / found.frequency_hz[0])
     assert np.abs(found.harmonic(3)[-1]) > 0.02
 
 
@@ -194,7 +195,7 @@ def damper():
     """A mass with a Jenkins element and no other damping, over its normal load."""
     system = jenkins_system().with_(**{"drive.damping_x": 0.0})
     return system, resonance_curve(
-        system, (1.2, 3.0), "normal.force", (0.7, 1.5), condition="phase",
+        system, (1.2, 3.0), "normal.force", RANGE, condition="phase",
         method=HarmonicBalance(1, 512), options=ContinuationOptions(points=60))
 
 
@@ -208,10 +209,9 @@ def test_optimal_load_of_a_friction_damper(damper):
     assert best.parameter == pytest.approx(np.pi / 2.0, rel=2e-4)
     assert best.values["observed_amplitude"] == pytest.approx(2.0 * np.pi, rel=2e-4)
     some = slice(None, None, 8)
-    response = frequency_response(system, (1.05, 1.2), levels={"normal.force": S[some]},
-                                  method=HarmonicBalance(1, 512),
-                                  options=ContinuationOptions(
-                                      points=3000, largest_step=0.01, locate=False))
+    response = frequency_response(
+        system, (1.05 / TURN, 1.2 / TURN), levels={"normal.force": S[some]},
+        method=HarmonicBalance(1, 512), options=replace(FINE, locate=False))
     for level, amplitude in enumerate(found.amplitude[some]):
         assert amplitude == pytest.approx(response.amplitude(level).max(), rel=1e-4)
 
@@ -221,7 +221,7 @@ def test_peak_with_memory_is_that_of_responses(damper, samples):
     """The closed form of the best load, and the largest amplitude of responses on its way."""
     system, _ = damper
     method = HarmonicBalance(1, samples)
-    found = resonance_curve(system, (1.2, 3.0), "normal.force", (0.7, 1.5), method=method,
+    found = resonance_curve(system, (1.2, 3.0), "normal.force", RANGE, method=method,
                             options=ContinuationOptions(points=60))
     assert found.condition == "amplitude"
     assert found.parameter[-1] == pytest.approx(3.0, rel=1e-12)
@@ -229,26 +229,26 @@ def test_peak_with_memory_is_that_of_responses(damper, samples):
     assert pytest.approx(S**2 / (0.5 * (S - np.pi / 4.0)), rel=10.0 / samples**1.5) == X
     assert found.optimum().parameter == pytest.approx(np.pi / 2.0, rel=3e-3)
     some = slice(None, None, 8)
-    response = frequency_response(system, (1.05, 1.2), levels={"normal.force": S[some]},
-                                  method=method, options=ContinuationOptions(
-                                      points=3000, largest_step=0.01, locate=False))
-    for level, (amplitude, w) in enumerate(zip(
-            found.amplitude[some], found.angular_frequency[some], strict=True)):
+    response = frequency_response(
+        system, (1.05 / TURN, 1.2 / TURN), levels={"normal.force": S[some]},
+        method=method, options=replace(FINE, locate=False))
+    for level, (amplitude, f) in enumerate(zip(
+            found.amplitude[some], found.frequency_hz[some], strict=True)):
         assert amplitude == pytest.approx(response.amplitude(level).max(), rel=2e-4)
-        assert w == pytest.approx(response.peak(level).parameter, rel=6e-4)
+        assert f == pytest.approx(response.peak(level).parameter, rel=6e-4)
 
 
 def test_peak_with_memory_is_that_of_runs():
     """Runs at the frequency of the peak and beside it, of a damper with dashpot."""
     system = jenkins_system().with_(**{"drive.damping_x": 0.1})
-    found = resonance_curve(system, (1.2, 1.4), "normal.force", (0.7, 1.5),
+    found = resonance_curve(system, (1.2, 1.4), "normal.force", RANGE,
                             method=HarmonicBalance(7, 512),
                             options=ContinuationOptions(points=60))
-    amplitude, w = found.amplitude[-1], found.angular_frequency[-1]
+    amplitude, f = found.amplitude[-1], found.frequency_hz[-1]
     sizes = []
     for factor in (0.985, 1.0, 1.015):
-        driven = system.with_(**{"normal.force": 1.4, "drive.angular_frequency": factor * w})
-        T = 2.0 * np.pi / (factor * w)
+        driven = system.with_(**{"normal.force": 1.4, "drive.frequency_hz": factor * f})
+        T = 1.0 / (factor * f)
         run = fc.simulate(driven, 61.0 * T, rtol=1e-8, outputs=61 * 500 + 1)
         sizes.append(0.5 * np.ptp(run.displacement("B")[-501:, 0]))
     assert sizes[1] == pytest.approx(amplitude, rel=3e-4)
@@ -263,14 +263,14 @@ def test_backbone_of_phase_resonance_is_the_mode(damper):
     """Over the force, resonances of one harmonic have amplitude and frequency of the mode."""
     system = jenkins_system()
     method = HarmonicBalance(1, 512)
-    backbone = resonance_curve(system, (0.1, 1.2), "drive.amplitude_x", (0.8, 1.5),
-                               condition="phase", method=method)
+    backbone = resonance_curve(system, (0.1, 1.2), "drive.amplitude_x",
+                               (0.8 / TURN, 1.5 / TURN), condition="phase", method=method)
     mode = nonlinear_mode(system, (0.5, 60.0), method=method,
                           options=ContinuationOptions(points=500, largest_step=0.03))
     # The phase is that of the driven end's force: also with the dashpot.
-    expected = np.interp(backbone.amplitude, mode.amplitude, mode.angular_frequency)
-    assert backbone.angular_frequency == pytest.approx(expected, rel=2e-4)
-    assert np.ptp(backbone.frequency) > 0.02
+    expected = np.interp(backbone.amplitude, mode.amplitude, mode.frequency_hz)
+    assert backbone.frequency_hz == pytest.approx(expected, rel=2e-4)
+    assert np.ptp(backbone.frequency_hz) > 0.02
 
 
 def test_files_and_pictures(damper, tmp_path):

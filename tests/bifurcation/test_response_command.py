@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 from response_study import STUDY, linear_amplitude, study
+from systems import TURN
 
 from fecontact import Study
 from fecontact.bifurcation import BranchStatus, ResponseSettings
@@ -30,21 +31,21 @@ def test_response_of_a_block_held_by_friction(cli, file):
     assert found.level_name == "drive.amplitude_x"
     assert found.levels == pytest.approx([2e-5, 3e-4])
     assert found.observed == "B x"
-    w = found.branches[0].parameter
-    assert w[[0, -1]] / (2.0 * np.pi) == pytest.approx([8.0, 13.0])
+    frequencies = found.branches[0].parameter
+    assert frequencies[[0, -1]] == pytest.approx([8.0, 13.0])
+    w = TURN * frequencies
     # The small drive never makes it slide.
     assert found.amplitude(0) == pytest.approx(linear_amplitude(w, 2e-5, described), rel=2e-4)
     assert found.amplitude(1).max() < 0.5 * linear_amplitude(w, 3e-4, described).max()
     for level in range(2):
-        frequency = found.peak(level).parameter / (2.0 * np.pi)
-        assert f"{frequency:.7g}" in said
+        assert f"{found.peak(level).parameter:.7g}" in said
     with (results / "block-response.csv").open() as table:
         rows = list(csv.DictReader(table))
     assert len(rows) == sum(map(len, found.branches))
     stored = [float(row["amplitude"]) for row in rows if float(row["level"]) == 2e-5]
     assert stored == pytest.approx(found.amplitude(0), rel=1e-12)
-    frequencies = [float(row["frequency_hz"]) for row in rows if float(row["level"]) == 2e-5]
-    assert frequencies == pytest.approx(w / (2.0 * np.pi), rel=1e-12)
+    stored = [float(row["frequency_hz"]) for row in rows if float(row["level"]) == 2e-5]
+    assert stored == pytest.approx(frequencies, rel=1e-12)
     for ending in ("png", "html"):
         assert (results / f"block-response.{ending}").stat().st_size > 10_000
     assert read_system(results / "block-response.h5").drive.stiffness_x == 5610.0
@@ -60,8 +61,9 @@ def test_template_of_responses(cli, file):
     code, said, _ = cli("response", "held.toml", "--levels", "drive.amplitude_x=5e-5,4e-4")
     assert code == 0
     found = read_response(file.parent / "results" / "held-response.h5")
-    w = found.branches[0].parameter
-    assert w[[0, -1]] / (2.0 * np.pi) == pytest.approx([4.0, 13.0])
+    frequencies = found.branches[0].parameter
+    assert frequencies[[0, -1]] == pytest.approx([4.0, 13.0])
+    w = TURN * frequencies
     assert found.amplitude(0) == pytest.approx(linear_amplitude(w, 5e-5, described), rel=2e-4)
     assert found.amplitude(1).max() < 0.4 * linear_amplitude(w, 4e-4, described).max()
     assert found.peak(1).parameter < 0.95 * found.peak(0).parameter
@@ -72,7 +74,7 @@ def test_template_of_responses(cli, file):
 
 
 def test_command_line_overrides_the_section(cli, file):
-    code, _, _ = cli("response", file, "--hz", 9, 10, "--levels", "load.normal=10,20",
+    code, _, _ = cli("response", file, "--bounds", 9, 10, "--levels", "load.normal=10,20",
                      "--harmonics", 1, "--samples", 64, "-o", "there")
     assert code == 0
     found = read_response(file.parent / "there" / "block-response.h5")
@@ -80,13 +82,13 @@ def test_command_line_overrides_the_section(cli, file):
     assert found.levels == pytest.approx([10.0, 20.0])
     assert found.branches[0].attributes["harmonics"] == 1
     assert found.branches[0].attributes["samples"] == 64
-    assert found.branches[0].parameter[[0, -1]] / (2.0 * np.pi) == pytest.approx([9.0, 10.0])
+    assert found.branches[0].parameter[[0, -1]] == pytest.approx([9.0, 10.0])
 
 
 def test_a_list_of_harmonics(cli, file):
     """By option, by the section, and of modes; the file holds the list."""
     for how in (["--harmonics", "0,1,3"], ["--set", "response.harmonics=[0,1,3]"]):
-        assert cli("response", file, "--hz", 9, 9.5, "--samples", 64, *how)[0] == 0
+        assert cli("response", file, "--bounds", 9, 9.5, "--samples", 64, *how)[0] == 0
         found = read_response(file.parent / "results" / "block-response.h5")
         assert found.branches[0].attributes["orders"].tolist() == [0, 1, 3]
         assert not found.harmonic(2).any()
@@ -153,7 +155,7 @@ def test_resumed_response_has_the_numbers_of_an_uninterrupted_one(points, file, 
 
 def test_points_that_run_out_before_the_peak(cli, file):
     """The last point is no peak; a note says where the branch ends and how to go on."""
-    few = ("--hz", 9, 13, "--set", "response.points=4")
+    few = ("--bounds", 9, 13, "--set", "response.points=4")
     code, said, _ = cli("response", file, *few)
     assert code == 0
     found = read_response(file.parent / "results" / "block-response.h5")
@@ -173,8 +175,9 @@ def test_points_that_run_out_before_the_peak(cli, file):
 
 
 def test_going_on_needs_the_same_values(cli, file):
-    assert cli("response", file, "--hz", 9, 9.5)[0] == 0
-    code, _, said = cli("response", file, "--hz", 9, 9.5, "--set", "load.normal=15.0", "--resume")
+    assert cli("response", file, "--bounds", 9, 9.5)[0] == 0
+    code, _, said = cli("response", file, "--bounds", 9, 9.5, "--set", "load.normal=15.0",
+                        "--resume")
     assert code == 1
     assert "was computed with other values" in said
     code, _, said = cli("response", file, "--resume", "-o", "nowhere")
@@ -192,7 +195,7 @@ def test_results_are_of_the_files_that_the_study_named(cli, file):
     assert cli("mesh", file, "-o", ".")[0] == 0
     mesh = file.with_name("block.msh").replace(file.with_name("part.msh"))
     file.write_text(MESHED)
-    short = ("--hz", 9, 9.5, "--harmonics", 1, "--samples", 64)
+    short = ("--bounds", 9, 9.5, "--harmonics", 1, "--samples", 64)
     of_mode = ("modes", file, "--nonlinear", 1, "--amplitudes", 1e-5, 2e-5)
     assert cli("response", file, *short)[0] == 0
     assert cli("response", file, *short, "--resume")[0] == 0
@@ -242,15 +245,13 @@ def test_a_level_that_fails_leaves_the_others(monkeypatch):
 
 
 @pytest.mark.parametrize(("arguments", "message"), [
-    (["--hz", "2", "1"], "[response]: bounds_hz = [2.0, 1.0] must be two values"),
-    (["--hz", "0", "1"], "bounds_hz = [0.0, 1.0] must be frequencies above zero"),
-    (["--hz", "1", "2", "--bounds", "1", "2"], "--hz and --bounds mean the same"),
+    (["--bounds", "2", "1"], "[response]: bounds = [2.0, 1.0] must be two values"),
+    (["--bounds", "0", "1"], "bounds = [0.0, 1.0] must be frequencies above zero [Hz]"),
     (["load.normal"], "[response] lacks the key 'bounds', the least and largest value of "
                       "load.normal; give it, or --bounds LOW HIGH"),
-    (["load.normal", "--hz", "1", "2"], "give its bounds by the key 'bounds'"),
     (["drive.stifness_x", "--bounds", "1", "2"], "did you mean 'drive.stiffness_x'"),
     (["--levels", "load.normal"], "must have the form KEY=VALUE,VALUE"),
-    (["--levels", "drive.angular_frequency=1"], "take another parameter for the levels"),
+    (["--levels", "drive.frequency_hz=1"], "take another parameter for the levels"),
     (["--harmonics", "1,,3"], "--harmonics 1,,3 must be a whole number, or several with commas"),
     (["--harmonics", "1,3"], "harmonics = [1, 3] leave out the mean, but constant loads deflect"),
     (["--harmonics", "0"], "harmonics = 0 must be a whole number from 1"),
@@ -274,17 +275,17 @@ def test_settings_are_written_and_read_again():
     assert Study.from_toml(described.to_toml()) == described
     changed = described.with_(**{"response.levels.drive.amplitude_x": [1.0]})
     assert changed.response.levels == {"drive.amplitude_x": (1.0,)}
-    assert changed.response.checked_bounds == pytest.approx((16.0 * np.pi, 26.0 * np.pi))
+    assert changed.response.checked_bounds == (8.0, 13.0)
     with pytest.raises(InputError, match="start = 20 must lie in the bounds, 8 to 13"):
-        ResponseSettings(bounds_hz=(8.0, 13.0), start=20.0)
-    assert ResponseSettings(bounds_hz=(8.0, 13.0), start=10.0).first == pytest.approx(20.0 * np.pi)
+        ResponseSettings(bounds=(8.0, 13.0), start=20.0)
+    assert ResponseSettings(bounds=(8.0, 13.0), start=10.0).first == 10.0
 
 
 def test_orbits_of_the_file_are_drawn_and_reported(cli, file, monkeypatch):
     assert cli("response", file)[0] == 0
     stored = file.parent / "results" / "block-response.h5"
     for kind in ("phase", "energies", "response"):
-        place = () if kind == "response" else ("--branch", 1, "--at-hz", 9.8)
+        place = () if kind == "response" else ("--branch", 1, "--at", 9.8)
         assert cli("plot", stored, kind, *place)[0] == 0
         assert stored.with_name(f"block-response-{kind}.png").stat().st_size > 10_000
     assert cli("report", stored, "-o", "page.html")[0] == 0
@@ -299,9 +300,7 @@ def test_orbits_of_the_file_are_drawn_and_reported(cli, file, monkeypatch):
             (["phase"], "holds 2 branches of orbits; choose one with --branch: '0 "
                         "(drive.amplitude_x = 2e-05)'"),
             (["phase", "--branch", 2], "has no branch '2'"),
-            (["phase", "--branch", 0, "--at-hz", 99],
-                 "--at-hz = 99: the branch lies between 8 and 13 Hz"),
-            (["phase", "--branch", 0, "--at-hz", 9, "--at", 9], "mean the same"),
+            (["phase", "--branch", 0, "--at", 99], "the branch lies between 8 and 13; choose"),
             (["mode"], "not that of a nonlinear mode"),
             (["phase", "--branch", 0, "--set", "load.normal=1"], "is a stored result")):
         code, _, said = cli("plot", stored, *arguments)

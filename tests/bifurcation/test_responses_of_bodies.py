@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 import fecontact as fc
 from fecontact.bifurcation import (
@@ -14,7 +15,6 @@ from fecontact.fem import pair_faces
 from fecontact.laws import ConstantFriction, Harmonic, IwanFriction, JenkinsFriction, LinearContact
 from fecontact.reduction import reduce_bodies
 
-TURN = 2.0 * np.pi
 MASS, G = 2.0, 9.81
 INERTIA = MASS / 12.0 * np.array([0.1, 0.05, 0.13])
 CORNERS = np.array([(x, y, -0.05) for x in (-0.1, 0.1) for y in (-0.15, 0.15)])
@@ -38,7 +38,7 @@ def block(friction):
         basis, normal=LinearContact(4e6, 400.0), friction=friction,
         load=fc.Load(gravity=(0.0, 0.0, -G)),
         drive=fc.Drive(stiffness_x=2e4, damping_x=10.0, amplitude_x=4e-4, stiffness_y=1e4,
-                       damping_y=5.0, amplitude_y=5e-4, angular_frequency=130.0))
+                       damping_y=5.0, amplitude_y=5e-4, frequency_hz=130.0 / TURN))
 
 
 def last_period(system, period, count, rtol=1e-8):
@@ -55,10 +55,11 @@ def last_period(system, period, count, rtol=1e-8):
 def test_block_that_slips_in_two_directions(friction):
     """Its path is an ellipse; a run comes to the same motion to some 1e-4."""
     system = block(friction)
-    found = frequency_response(system, (125.0, 140.0), method=HarmonicBalance(
-        9, samples=256, stability=None), options=ContinuationOptions(largest_step=0.2))
-    field = contact_field(system, ["drive.angular_frequency"])
-    here = found.branches[0].at(field, 130.0)
+    found = frequency_response(
+        system, (125.0 / TURN, 140.0 / TURN), method=HarmonicBalance(
+            9, samples=256, stability=None), options=ContinuationOptions(largest_step=0.2))
+    field = contact_field(system, ["drive.frequency_hz"])
+    here = found.branches[0].at(field, 130.0 / TURN)
     states, off = last_period(system, TURN / 130.0, 50)
     assert off < 1e-7
     mine = here.orbit(samples=501).states
@@ -86,20 +87,21 @@ def pair_of_beams():
         bodies=bases, drive=fc.Drive(),
         interfaces=[fc.Interface("face", face, LinearContact(2e7),
                                  ConstantFriction(0.3, smoothing_slope=50.0))],
-        load=fc.Load(60.0, (fc.PointLoad("beam1.end", "y", signal=Harmonic(9.0, 300.0)),)))
+        load=fc.Load(60.0, (fc.PointLoad("beam1.end", "y", signal=Harmonic(9.0, 300.0 / TURN)),)))
 
 
 def test_two_beams_with_an_interface():
     """Normal contact and friction between the bodies, below their first resonance."""
-    system, name = pair_of_beams(), "load.forces.0.signal.angular_frequency"
+    system, name = pair_of_beams(), "load.forces.0.signal.frequency_hz"
     found = frequency_response(
-        system, (1200.0, 1600.0), name, observe=("beam1.end", "y"),
+        system, (1200.0 / TURN, 1600.0 / TURN), name, observe=("beam1.end", "y"),
         method=HarmonicBalance(12, samples=256),
         options=ContinuationOptions(largest_step=0.2))
     field = contact_field(system, [name])
-    here = found.branches[0].at(field, 1500.0)
+    f = 1500.0 / TURN
+    here = found.branches[0].at(field, f)
     assert here.values["stable"]
-    states, off = last_period(system.with_(**{name: 1500.0}), TURN / 1500.0, 60)
+    states, off = last_period(system.with_(**{name: f}), 1.0 / f, 60)
     assert off < 1e-6
     mine = here.orbit(samples=501).states
     row = field.displacement_row("beam1.end", "y")
@@ -109,6 +111,6 @@ def test_two_beams_with_an_interface():
         if size > 1e-2 * np.ptp(states[:, 0]):
             assert np.abs(mine[:, k] - states[:, k]).max() < 1e-2 * size
     # Nodes are nearly relieved during the period.
-    force = fc.simulate(system.with_(**{name: 1500.0}), TURN / 1500.0, initial=states[-1],
+    force = fc.simulate(system.with_(**{name: f}), 1.0 / f, initial=states[-1],
                         outputs=101).normal_force
     assert (force.min(axis=0) < 0.2 * force.max(axis=0)).any()

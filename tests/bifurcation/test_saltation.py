@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from spectra import spectral_distance
-from systems import mass_in_plane
+from systems import TURN, mass_in_plane
 
 from fecontact import (
     ContactSystem,
@@ -45,7 +45,7 @@ def driven(normal=DAMPED, amplitude=1.5e-2, **parts):
     return mass_in_plane(
         spring=1e3, normal=normal, friction=ConstantFriction(0.3, smoothing_slope=1e2),
         drive=Drive(stiffness_x=5e3, damping_x=30.0, stiffness_y=2e3, damping_y=30.0,
-                    amplitude_y=amplitude, amplitude_x=1e-4, angular_frequency=W),
+                    amplitude_y=amplitude, amplitude_x=1e-4, frequency_hz=W / TURN),
         load=Load(14.0), **{"ground": Ground(speed=0.02), **parts})
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from oscillators import duffing, jenkins, jenkins_amplitude, jenkins_system, unilateral
 from scipy.optimize import minimize_scalar
+from systems import TURN
 from test_nonlinear_modes import masses
 
 from fecontact.bifurcation import (
@@ -20,6 +21,8 @@ from fecontact.bifurcation.harmonic.branches import sampling_error
 from fecontact.bifurcation.harmonic.starts import corrected, problem_for, restored
 from fecontact.bifurcation.response_options import ResponseSettings
 from fecontact.core.errors import AnalysisError, InputError
+
+BOUNDS = (1.05 / TURN, 1.3 / TURN)
 
 
 def orbit(field, harmonics, samples, **values):
@@ -69,18 +72,20 @@ def test_it_is_the_distance_to_the_describing_function(w, samples):
 def test_along_a_branch_it_is_the_distance_at_right_angles(samples):
     """From the curve of the describing function."""
     branch = frequency_response(
-        jenkins_system(), (1.05, 1.3), method=HarmonicBalance(1, samples, stability=None),
+        jenkins_system(), BOUNDS, method=HarmonicBalance(1, samples, stability=None),
         options=ContinuationOptions(points=60, largest_step=0.1)).branches[0]
     turned = 0
     for point in branch.points[1:-1:7]:
         problem, u, tangent = restored(jenkins(), point)
         x = u[1] - 1j * u[2]
 
-        def away(w, x=x, at=point.parameter):
+        at = TURN * point.parameter
+
+        def away(w, x=x, at=at):
             return np.hypot(abs(exact(w) - x) / abs(x), (w - at) / 0.25)
 
-        off = minimize_scalar(away, bounds=(point.parameter - 0.02, point.parameter + 0.02),
-                              method="bounded", options={"xatol": 1e-7}).fun
+        off = minimize_scalar(away, bounds=(at - 0.02, at + 0.02), method="bounded",
+                              options={"xatol": 1e-7}).fun
         found = sampling_error(problem, u, tangent)
         assert 0.7 * off < found < 1.4 * off
         turned += found < 0.8 * sampling_error(problem, u, fixed(u))
@@ -93,7 +98,7 @@ def test_it_is_that_of_a_contact_with_separation():
     for samples in (64, 128, 256):
         problem, u = corrected(problem_for(
             field, field.values, 0, HarmonicBalance(5, samples), np.ones(4)), np.append(
-                [0.0, 0.0, 2.0, *np.zeros(8)], 1.3))
+                [0.0, 0.0, 2.0, *np.zeros(8)], 1.3 / TURN))
         _, fine = corrected(replace(problem, samples=16 * samples), u)
         off = np.sqrt(((u - fine)[1:-1] ** 2).sum() / (fine[1:-1] ** 2).sum())
         assert 0.3 * off < sampling_error(problem, u, fixed(u)) < 3.0 * off
@@ -178,19 +183,19 @@ def test_orbits_at_rest_have_no_error(bounds):
 @pytest.mark.parametrize("stability", [None, "transitions"])
 def test_samples_are_doubled_until_a_response_is_accurate(stability):
     found = frequency_response(
-        jenkins_system(), (1.05, 1.3), method=HarmonicBalance(
+        jenkins_system(), BOUNDS, method=HarmonicBalance(
             1, 32, stability=stability, sampling_tolerance=1e-3),
         options=ContinuationOptions(points=60, largest_step=0.1)).branches[0]
     samples = found.attributes["samples"]
     assert samples in (128, 256)
     assert found.attributes["sampling_error"] < 1e-3
-    off = [abs(point.u[1] - 1j * point.u[2] - exact(point.parameter)) / abs(exact(point.parameter))
+    off = [abs((point.u[1] - 1j * point.u[2]) / exact(TURN * point.parameter) - 1.0)
            for point in found.points[::6]]
     assert max(off) < 1.5e-3
     assert max(off) > 0.3 * found.attributes["sampling_error"]
     # Half as many do not suffice, and a start with enough is kept.
     fewer, same = (frequency_response(
-        jenkins_system(), (1.05, 1.3), method=HarmonicBalance(
+        jenkins_system(), BOUNDS, method=HarmonicBalance(
             1, count, stability=stability, sampling_tolerance=tolerance),
         options=ContinuationOptions(points=60, largest_step=0.1)).branches[0]
         for count, tolerance in ((samples // 2, 0.5), (samples, 1e-3)))
@@ -202,7 +207,7 @@ def test_samples_are_doubled_until_a_response_is_accurate(stability):
 
 def test_harmonics_and_samples_grow_together():
     found = frequency_response(
-        jenkins_system(), (1.15, 1.2), method=HarmonicBalance(
+        jenkins_system(), (1.15 / TURN, 1.2 / TURN), method=HarmonicBalance(
             1, 16, tolerance=2e-3, sampling_tolerance=5e-3, stability=None),
         options=ContinuationOptions(points=4)).branches[0]
     assert found.column("truncation_error").max() <= 2e-3
@@ -236,7 +241,7 @@ def test_what_cannot_be_met_is_told(monkeypatch):
     monkeypatch.setattr(branches, "MOST", 100)
     with pytest.raises(AnalysisError, match=r"from its 64 samples is .*, above "
                                             r"sampling_tolerance = 1e-12; raise the tolerance"):
-        frequency_response(jenkins_system(), (1.1, 1.2), method=HarmonicBalance(
+        frequency_response(jenkins_system(), (1.1 / TURN, 1.2 / TURN), method=HarmonicBalance(
             1, 64, stability=None, sampling_tolerance=1e-12),
             options=ContinuationOptions(points=3))
     with pytest.raises(InputError, match="sampling_tolerance = -1"):

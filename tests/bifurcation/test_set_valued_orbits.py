@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 from systems import belt_of_unit_mass as belt
 from systems import last_speed_of_stick_slip as last_speed
 
@@ -86,7 +87,7 @@ def above_stops(load):
                                    damping=0.1119 * np.eye(2))
     system = fc.ContactSystem(
         basis, normal=LinearContact(1e6), friction=ConstantFriction(0.0), load=fc.Load(load),
-        drive=fc.Drive(stiffness_y=0.5, amplitude_y=2.738, angular_frequency=1.0645))
+        drive=fc.Drive(stiffness_y=0.5, amplitude_y=2.738, frequency_hz=1.0645 / TURN))
     field = contact_field(system, "load.normal")
     scales = np.array([0.06, 0.06, 0.2, 0.2, 2.0 * np.pi / 1.0645, 1.0])
     problem = ShootingProblem(field, np.array([load]), 0, np.array([0.0, 1.0]), np.zeros(4), scales,

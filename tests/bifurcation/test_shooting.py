@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from systems import belt, lorenz_field, two_mass_field
+from systems import TURN, belt, lorenz_field, two_mass_field
 
 from fecontact import AnalysisError, InputError, simulate
 from fecontact.bifurcation import (
@@ -77,7 +77,7 @@ def test_belt_with_steep_friction():
 def test_driven_belt_closes_after_four_periods():
     # Section 4.3 with constant normal force.
     system = belt(speed=1e-3).with_(**{"drive.amplitude_x": 0.5e-3,
-                                       "drive.angular_frequency": 13.8})
+                                       "drive.frequency_hz": 13.8 / TURN})
     field = contact_field(system, {"drive.amplitude_x": None})
     period = 2.0 * np.pi / 13.8
     run = simulate(system, 40.0 * period, initial=np.zeros(2), rtol=1e-8,

@@ -10,6 +10,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
 from spectra import spectral_distance
+from systems import TURN
 from systems import belt_of_unit_mass as belt
 
 import fecontact as fc
@@ -65,7 +66,7 @@ def forced(beta=0.4, speed=0.1, w=1.5):
     return fc.ContactSystem(
         basis, normal=PrescribedForce(1.0), friction=ConstantFriction(beta),
         ground=fc.Ground(speed=speed),
-        drive=fc.Drive(stiffness_x=0.5, amplitude_x=2.0, angular_frequency=w))
+        drive=fc.Drive(stiffness_x=0.5, amplitude_x=2.0, frequency_hz=w / TURN))
 
 
 def impacting(w=0.8, amplitude=1.2, lift=2.0):
@@ -75,7 +76,7 @@ def impacting(w=0.8, amplitude=1.2, lift=2.0):
                                    damping=[[2.0 * DAMPING]])
     return fc.ContactSystem(
         basis, normal=LinearContact(1e6), friction=ConstantFriction(0.0), load=fc.Load(-lift),
-        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, angular_frequency=w))
+        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, frequency_hz=w / TURN))
 
 
 def gain(w):
@@ -85,7 +86,7 @@ def gain(w):
 
 def events_of(system, solver, periods=60):
     """Stick phases (begin, end) in one period of a settled run, from its events alone."""
-    T = 2.0 * np.pi / system.parameters()["drive.angular_frequency"]
+    T = 1.0 / system.parameters()["drive.frequency_hz"]
     run = fc.simulate(system, (periods + 2) * T, solver=solver, rtol=1e-11,
                       events=ContactEvents(), outputs=2)
     begins = run.events.only("stick").time
@@ -98,7 +99,7 @@ def events_of(system, solver, periods=60):
 def over_speed():
     """One period of the forced oscillator over the speed of the belt, through three borders."""
     system = forced()
-    field = contact_field(system, ["ground.speed", "drive.angular_frequency"])
+    field = contact_field(system, ["ground.speed", "drive.frequency_hz"])
     return field, orbit_branch(
         field, periodic_motion(system, solver=FILIPPOV, rtol=1e-9), "ground.speed",
         method=Shooting(1, solver=FILIPPOV), bounds=(0.1, 1.5),
@@ -167,10 +168,10 @@ def test_curve_of_grazing_sliding(over_speed):
     field, branch = over_speed
     grazing = branch.of_kind("grazing-sliding")[0]
     assert grazing.parameter == pytest.approx(1.5 * gain(1.5), rel=1e-9)
-    curve = codim2_curve(field, grazing, "drive.angular_frequency", bounds={
-        "ground.speed": (0.5, 1.5), "drive.angular_frequency": (1.3, 2.0)},
+    curve = codim2_curve(field, grazing, "drive.frequency_hz", bounds={
+        "ground.speed": (0.5, 1.5), "drive.frequency_hz": (1.3 / TURN, 2.0 / TURN)},
         options=ContinuationOptions(step=0.1, largest_step=0.2))
-    w = curve.column("drive.angular_frequency")
+    w = TURN * curve.column("drive.frequency_hz")
     assert np.ptp(w) > 0.5
     assert curve.parameter == pytest.approx(w * gain(w), rel=1e-8)
 
@@ -178,13 +179,13 @@ def test_curve_of_grazing_sliding(over_speed):
 def test_adding_sliding():
     """Within stick a slip phase appears, that grows with the root of the distance."""
     system = forced(0.6, 0.05, 0.25)
-    field = contact_field(system, ["drive.angular_frequency"])
+    field = contact_field(system, ["drive.frequency_hz"])
     branch = orbit_branch(field, periodic_motion(system, solver=FILIPPOV, rtol=1e-9),
-                          method=Shooting(1, solver=FILIPPOV), bounds=(0.2, 0.3), direction=-1.0,
-                          options=ContinuationOptions(step=0.02, points=30))
+                          method=Shooting(1, solver=FILIPPOV), bounds=(0.2 / TURN, 0.3 / TURN),
+                          direction=-1.0, options=ContinuationOptions(step=0.02, points=30))
     adding = branch.of_kind("adding-sliding")[0]
     assert adding.persists
-    stick = [events_of(forced(0.6, 0.05, adding.parameter + off), FILIPPOV, 30)
+    stick = [events_of(forced(0.6, 0.05, TURN * adding.parameter + off), FILIPPOV, 30)
              for off in (1e-4, -1e-4, -4e-4)]
     assert [len(each) for each in stick] == [2, 3, 3]
     free = [sum(stick[0]) - sum(each) for each in stick[1:]]
@@ -242,7 +243,7 @@ def impact_orbit(w, amplitude, lift, e=0.8):
 
 def test_grazing_of_a_stop_and_the_orbits_with_impacts():
     system = impacting()
-    field = contact_field(system, ["drive.amplitude_y", "drive.angular_frequency"])
+    field = contact_field(system, ["drive.amplitude_y", "drive.frequency_hz"])
     motion = periodic_motion(system, solver=STOPS, initial=[2.0, 0.0], rtol=1e-9)
     branch = orbit_branch(field, motion, "drive.amplitude_y", method=Shooting(1, solver=STOPS),
                           bounds=(1.0, 3.0),
@@ -266,13 +267,13 @@ def test_grazing_of_a_stop_and_the_orbits_with_impacts():
         return min(abs(known + 1.0).min() for _, known in impact_orbit(0.8, amplitude, 2.0))
 
     assert critical(doubling.parameter) < 1e-7
-    curve = codim2_curve(field, grazing, "drive.angular_frequency", bounds={
-        "drive.amplitude_y": (0.1, 8.0), "drive.angular_frequency": (0.7, 1.2)},
+    curve = codim2_curve(field, grazing, "drive.frequency_hz", bounds={
+        "drive.amplitude_y": (0.1, 8.0), "drive.frequency_hz": (0.7 / TURN, 1.2 / TURN)},
         options=ContinuationOptions(step=0.1, largest_step=0.2))
-    w = curve.column("drive.angular_frequency")
+    w = TURN * curve.column("drive.frequency_hz")
     assert curve.parameter == pytest.approx(4.0 / gain(w), rel=1e-9)
     turning = curve.of_kind("turning point")[0]
-    assert turning.values["drive.angular_frequency"] == pytest.approx(
+    assert TURN * turning.values["drive.frequency_hz"] == pytest.approx(
         np.sqrt(1.0 - 2.0 * DAMPING**2), abs=1e-7)
 
 
@@ -286,7 +287,7 @@ def two_blocks(friction):
     return fc.ContactSystem(
         basis, normal=PrescribedForce((1.0, 1.0)), ground=fc.Ground(speed=0.2),
         friction=friction,
-        drive=fc.Drive(stiffness_x=0.5, amplitude_x=1.5, angular_frequency=0.9))
+        drive=fc.Drive(stiffness_x=0.5, amplitude_x=1.5, frequency_hz=0.9 / TURN))
 
 
 def test_derivatives_of_the_equations():

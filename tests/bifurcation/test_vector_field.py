@@ -9,6 +9,7 @@ import numba
 import numpy as np
 import pytest
 from systems import (
+    TURN,
     belt,
     friction_slope,
     lorenz,
@@ -190,7 +191,7 @@ def test_many_nodes_waves_memory_and_drive(friction):
     system = ContactSystem(
         basis, normal=RoughSurface(10.0, 2.0, 0.5), friction=friction,
         ground=Ground(0.3, profile=Sine(0.3, 2.0), friction_variation=Sine(0.2, 1.0)),
-        drive=Drive(2.0, 3.0, 0.1, 0.2, 0.4, 0.5, 1.3), load=Load(2.0))
+        drive=Drive(2.0, 3.0, 0.1, 0.2, 0.4, 0.5, 1.3 / TURN), load=Load(2.0))
     field = contact_field(system, ["load.normal"])
     assert field.dimension == system.size == len(field.state_names)
     t, x = rng.normal(size=30), rng.normal(size=(30, system.size))
@@ -239,11 +240,11 @@ def test_derivatives_to_parameters_of_everything(law, own):
     system = ContactSystem(
         basis, normal=RoughSurface(10.0, 2.0, 0.5), friction=law,
         ground=Ground(0.3, profile=Sine(0.3, 2.0), friction_variation=Sine(0.2, 1.0)),
-        drive=Drive(2.0, 3.0, 0.1, 0.2, 0.4, 0.5, 1.3), load=Load(2.0))
+        drive=Drive(2.0, 3.0, 0.1, 0.2, 0.4, 0.5, 1.3 / TURN), load=Load(2.0))
     t, x = rng.normal(size=30), 0.5 * rng.normal(size=(30, system.size))
     named = ["load.normal", "ground.speed", "ground.profile.amplitude", "ground.profile.wavelength",
              "ground.friction_variation.amplitude", "drive.amplitude_x", "drive.damping_y",
-             "drive.angular_frequency", "normal.roughness_height", *own]
+             "drive.frequency_hz", "normal.roughness_height", *own]
     given = [*([name] for name in named), {"size": (1.0, with_modes)}, {"k": (9.0, with_normals)},
              [own[0], "ground.speed"]]
     for parameters in given:
@@ -341,16 +342,16 @@ def test_rows_of_displacements():
 
 
 def test_forcing_periods():
-    drive = Drive(stiffness_x=1.0, amplitude_x=1.0, angular_frequency=4.0)
+    drive = Drive(stiffness_x=1.0, amplitude_x=1.0, frequency_hz=4.0 / TURN)
     system = belt().with_(drive=drive)
     assert contact_field(belt(), ["ground.speed"]).forcing_period(np.ones(1)) is None
-    field = contact_field(system, ["drive.angular_frequency"])
-    assert field.forcing_period(np.array([5.0])) == pytest.approx(2.0 * np.pi / 5.0)
-    both = system.with_(load=Load(forces=(PointLoad("B", "x", signal=Harmonic(1.0, 6.0)),)))
+    field = contact_field(system, ["drive.frequency_hz"])
+    assert field.forcing_period(np.array([5.0 / TURN])) == pytest.approx(2.0 * np.pi / 5.0)
+    both = system.with_(load=Load(forces=(PointLoad("B", "x", signal=Harmonic(1.0, 6.0 / TURN)),)))
     assert contact_field(both, []).forcing_period(np.empty(0)) == pytest.approx(np.pi)
     wavy = belt().with_(**{"ground.profile": Sine(1e-6, 6e-3)})
     assert contact_field(wavy, ["ground.speed"]).forcing_period(np.array([3e-3])) == 2.0
-    odd = both.with_(**{"drive.angular_frequency": 4.0 * np.sqrt(2.0)})
+    odd = both.with_(**{"drive.frequency_hz": 4.0 * np.sqrt(2.0) / TURN})
     with pytest.raises(AnalysisError, match="no common multiple"):
         contact_field(odd, []).forcing_period(np.empty(0))
     trace = wavy.with_(**{

@@ -244,7 +244,7 @@ MISTAKES = [
     (["plot", "none-branch.h5"], "KIND`, with one of 'branches', 'mode', 'response' of the whole"),
     (["plot", "none-branch.h5", "--at", "3"], "KIND`, with one of 'contact_map', "),
     (["plot", "none-branch.h5", "branhces"], "(did you mean 'branches'?)"),
-    (["plot", "none-branch.h5", "mode", "--at-hz", "3"], "without --branch, --at, --at-hz"),
+    (["plot", "none-branch.h5", "mode", "--at", "3"], "without --branch, --at and --which"),
     (["plot", "none.vtkhdf", "histroy"], "(did you mean 'history'?)"),
     (["plot", "none.vtkhdf", "response"], "is one of files NAME-branch.h5 and NAME-response.h5"),
     (["laws", "mine.txt:Own"], "a law of your own is FILE.py:CLASS"),

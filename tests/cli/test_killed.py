@@ -31,7 +31,7 @@ LONG = TINY.replace("t_end = 5e-4, outputs = 11", "t_end = 0.6, outputs = 201").
 [drive]
 stiffness_x = 1e5
 amplitude_x = 1e-4
-angular_frequency = 600.0
+frequency_hz = 95.5
 """
 SWEEP = """
 [sweep]

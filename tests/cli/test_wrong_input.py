@@ -36,7 +36,7 @@ def plane(t, y, p):
     (lambda: PlotRequest(highest_hz=-5.0), "highest_hz = -5.0"),
     (lambda: PlotRequest(highest_hz=np.nan), "highest_hz = nan"),
     (lambda: point_of("nan,0.1"), "nan,0.1"),
-    (lambda: poincare_scan(impact_oscillator(), "drive.angular_frequency", "abc"),
+    (lambda: poincare_scan(impact_oscillator(), "drive.frequency_hz", "abc"),
      "values must be"),
 ])
 def test_refused(make, names):

@@ -249,7 +249,7 @@ def jenkins(limit=1.0, stiffness=0.5):
     return fc.ContactSystem(
         body, normal=PrescribedForce(1.0),
         friction=JenkinsFriction(stiffness=stiffness, friction_coefficient=limit),
-        drive=fc.Drive(stiffness_x=0.1, amplitude_x=5.0, angular_frequency=1.0))
+        drive=fc.Drive(stiffness_x=0.1, amplitude_x=5.0, frequency_hz=0.16))
 
 
 RANGES = {"friction.friction_coefficient": (0.3, 2.0), "friction.stiffness": (0.2, 1.0)}

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from systems import TURN
 
 from fecontact import (
     Beam,
@@ -55,8 +56,8 @@ def system(stacked, friction):
         bodies=bases, interfaces=[
             Interface(f"face{k}", face, LinearContact(2e6, 20.0), friction)
             for k, face in enumerate(faces)],
-        load=Load(30.0, (PointLoad("lid.end", "x", signal=Harmonic(20.0, 800.0)),
-                         PointLoad("middle.end", "y", signal=Harmonic(5.0, 1100.0)))))
+        load=Load(30.0, (PointLoad("lid.end", "x", signal=Harmonic(20.0, 800.0 / TURN)),
+                         PointLoad("middle.end", "y", signal=Harmonic(5.0, 1100.0 / TURN)))))
 
 
 def in_one_block(whole):

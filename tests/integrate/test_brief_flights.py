@@ -8,6 +8,7 @@ presses with p - a sin(w t) while it rests there, p = W - GAP.
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from systems import TURN
 
 import fecontact as fc
 from fecontact import Status
@@ -26,7 +27,7 @@ def mass(amplitude):
     return fc.ContactSystem(
         basis, normal=LinearContact(1e6), friction=ConstantFriction(0.0), gap=GAP,
         load=fc.Load(PRESSING + GAP),
-        drive=fc.Drive(stiffness_y=0.5, amplitude_y=2.0 * amplitude, angular_frequency=W))
+        drive=fc.Drive(stiffness_y=0.5, amplitude_y=2.0 * amplitude, frequency_hz=W / TURN))
 
 
 def two_masses(amplitude):
@@ -38,7 +39,7 @@ def two_masses(amplitude):
         {"contact": rows[:1], "B": rows[1], "C": rows[0]}, damping=[[0.2, -0.1], [-0.1, 0.2]])
     return fc.ContactSystem(
         basis, normal=LinearContact(1e6), friction=ConstantFriction(0.0), load=fc.Load(1.0),
-        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, angular_frequency=1.3))
+        drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, frequency_hz=1.3 / TURN))
 
 
 def changes(run):
@@ -130,7 +131,7 @@ def test_slip_that_begins_on_stops():
         system = fc.ContactSystem(
             basis, normal=LinearContact(1e6), friction=ConstantFriction(mu), load=fc.Load(1.0),
             ground=fc.Ground(speed=speed),
-            drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, angular_frequency=w))
+            drive=fc.Drive(stiffness_y=0.5, amplitude_y=amplitude, frequency_hz=w / TURN))
         solver = SetValued(restitution=float(random.choice([0.0, 0.3, 0.6])))
         run = fc.simulate(system, 60.0, initial=[0.0, 0.5, 0.0, 0.0], rtol=1e-9, solver=solver,
                           outputs=31)

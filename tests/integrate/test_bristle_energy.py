@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 from fecontact import (
     ContactSystem,
@@ -42,7 +43,7 @@ def guided(friction, amplitude, normal=None, **parts):
     basis = basis_from_matrices([[1e-6]], [[0.0]], {"contact": [x], "B": x})
     return ContactSystem(basis, normal=normal or PrescribedForce(FORCE), friction=friction,
                          drive=Drive(stiffness_x=1e10, damping_x=10.0, amplitude_x=amplitude,
-                                     angular_frequency=W), **parts)
+                                     frequency_hz=W / TURN), **parts)
 
 
 def cycles(friction, amplitude, count=3, **options):
@@ -103,8 +104,8 @@ def test_balance_under_a_varying_normal_force(name):
     basis = basis_from_matrices(2.0 * np.eye(2), np.diag([1e5, 0.0]),
                                 {"contact": rows[None], "B": rows, "C": rows}, damping=np.diag(
                                     [20.0, 100.0]))
-    load = Load(FORCE, forces=(PointLoad("C", "y", signal=Harmonic(0.8 * FORCE, 3.0 * W)),
-                               PointLoad("C", "x", signal=Harmonic(15.0, W))))
+    load = Load(FORCE, forces=(PointLoad("C", "y", signal=Harmonic(0.8 * FORCE, 3.0 * W / TURN)),
+                               PointLoad("C", "x", signal=Harmonic(15.0, W / TURN))))
     system = ContactSystem(basis, normal=LinearContact(1e6), friction=LAWS[name], load=load)
     run = simulate(system, 0.6, outputs=2001, rtol=1e-8)
     assert np.ptp(run.normal_force) > FORCE
@@ -128,7 +129,7 @@ def test_creep_of_smoothed_friction_is_reported_apart():
     rows = np.zeros((3, 1))
     rows[0, 0] = 1.0
     basis = basis_from_matrices([[1.0]], [[0.0]], {"contact": rows[None], "C": rows})
-    load = Load(forces=(PointLoad("C", "x", signal=Harmonic(0.5 * MU * FORCE, 1e-3,
+    load = Load(forces=(PointLoad("C", "x", signal=Harmonic(0.5 * MU * FORCE, 1e-3 / TURN,
                                                             phase=0.5 * np.pi)),))
     system = ContactSystem(basis, normal=PrescribedForce(FORCE), load=load,
                            friction=ExponentialFriction(MU, MU, 0.0, 1e4))

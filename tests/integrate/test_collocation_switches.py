@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from systems import friction_oscillator, mass_in_plane, mass_in_y
+from systems import TURN, friction_oscillator, mass_in_plane, mass_in_y
 
 import fecontact as fc
 from fecontact import ContactSystem, Drive, Ground, Load, PointLoad, simulate
@@ -142,7 +142,7 @@ RESTS = {
     "springs": (rotated(normal=LinearContact(1e5, 10.0), drive=Drive(
         stiffness_x=500.0, stiffness_y=500.0)), np.zeros(4), 12.0),
     "shaken": (rotated(normal=LinearContact(1e5, 10.0), drive=Drive(
-        stiffness_y=500.0, amplitude_y=1e-4, angular_frequency=100.0)), np.zeros(4), 1.0),
+        stiffness_y=500.0, amplitude_y=1e-4, frequency_hz=100.0 / TURN)), np.zeros(4), 1.0),
     "prescribed": (rotated(normal=PrescribedForce(5.0), load=Load(), drive=Drive(
         stiffness_x=500.0, stiffness_y=500.0)), [1e-4, 0.0, 0.0, 0.01], 10.0),
     "open": (mass_in_y(normal=LinearContact(1e5, 100.0), friction=ConstantFriction(0.0)),
@@ -184,7 +184,7 @@ def test_the_node_that_shortens_steps():
     T = np.zeros((4, 3, 2))
     T[:, 0, 0] = T[:, 1, 1] = 0.4
     basis = fc.ModalBasis(np.zeros(2), np.zeros((2, 2)), T, np.zeros((4, 2)), np.full(2, 0.5))
-    drive = Drive(stiffness_x=500.0, amplitude_x=0.1, angular_frequency=20.0)
+    drive = Drive(stiffness_x=500.0, amplitude_x=0.1, frequency_hz=20.0 / TURN)
     for forces in ((0.0, 5.0), (5.0, 0.0)):
         system = ContactSystem(basis, normal=PrescribedForce(forces), drive=drive,
                                friction=ExponentialFriction(0.8, 0.55, 1000.0, 1e8))
@@ -242,7 +242,7 @@ def test_nodes_in_a_gap_end_no_steps(normal, speed):
     """Two oscillators: slip that turns, and depths of a law that does not act, are no matter."""
     system = mass_in_plane(normal=normal, gap=1.0, ground=Ground(speed=speed), drive=Drive(
         stiffness_x=100.0, stiffness_y=100.0, amplitude_x=0.01, amplitude_y=0.01,
-        angular_frequency=7.0))
+        frequency_hz=7.0 / TURN))
     run = simulate(system, 20.0, initial=np.array([0.1, 0.05, 0.0, 0.0]), outputs=21, rtol=1e-8,
                    solver=Radau())
     share = 0.01 * 100.0 / (100.0 - 49.0)

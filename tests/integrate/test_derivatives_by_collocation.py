@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from systems import friction_oscillator, mass_in_plane, mass_in_y
+from systems import TURN, friction_oscillator, mass_in_plane, mass_in_y
 from test_derivatives_of_steps import BEGIN, SMOOTH, oscillator, scales_of, states_of
 from test_small_systems import system as block
 
@@ -109,7 +109,7 @@ def test_a_step_with_normal_law(name):
 
 def test_a_step_on_ground_that_accelerates():
     system = oscillator(friction=SMOOTH, normal=RoughSurface(1e6, 1e-5, 40.0),
-                        ground=Ground(motion=HarmonicSpeed(0.05, 300.0)))
+                        ground=Ground(motion=HarmonicSpeed(0.05, 300.0 / TURN)))
     level = oscillator(friction=SMOOTH, ground=Ground(speed=0.0))
     states = [state + speed * np.append([0.0, 0.0], system.arrays.rows[0, 0])
               for speed in (0.02, -0.03)
@@ -120,7 +120,7 @@ def test_a_step_on_ground_that_accelerates():
 @pytest.mark.parametrize("name", [
     "ground.speed", "normal.stiffness", "normal.damping", "normal.roughness_height",
     "friction.static_coefficient", "friction.smoothing_slope", "drive.amplitude_x",
-    "drive.stiffness_x", "drive.damping_x", "drive.angular_frequency", "load.normal"])
+    "drive.stiffness_x", "drive.damping_x", "drive.frequency_hz", "load.normal"])
 @pytest.mark.parametrize("nodes", [1, 2])
 def test_parameters_over_some_steps(name, nodes):
     """Against differences of runs at tight tolerance, in slip at a depth that does not end."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from systems import mass_in_plane
+from systems import TURN, mass_in_plane
 
 from fecontact import Drive, Ground, Load
 from fecontact.integrate import step_loop
@@ -30,7 +30,7 @@ from test_normal_laws import LAWS as NORMAL_LAWS  # noqa: E402
 BEGIN = 0.3
 SMOOTH = ExponentialFriction(0.8, 0.55, 100.0, 300.0)
 WAVES = Ground(speed=0.02, profile=Sine(2e-5, 2.5e-3), friction_variation=Sine(0.2, 3e-3))
-DRIVE = Drive(stiffness_x=5e3, damping_x=3.0, amplitude_x=1e-4, angular_frequency=90.0)
+DRIVE = Drive(stiffness_x=5e3, damping_x=3.0, amplitude_x=1e-4, frequency_hz=90.0 / TURN)
 
 
 def oscillator(**parts):
@@ -146,7 +146,7 @@ def test_in_space(friction, ground):
 
 
 def test_ground_that_accelerates():
-    ground = Ground(motion=HarmonicSpeed(0.05, 300.0), profile=Sine(2e-5, 2.5e-3))
+    ground = Ground(motion=HarmonicSpeed(0.05, 300.0 / TURN), profile=Sine(2e-5, 2.5e-3))
     system = oscillator(friction=SMOOTH, normal=RoughSurface(1e6, 1e-5, 40.0), ground=ground)
     states = [state + speed * np.append([0.0, 0.0], system.arrays.rows[0, 0])
               for speed in (0.02, -0.03)
@@ -161,7 +161,7 @@ def test_ground_that_accelerates():
     "ground.speed", "ground.profile.amplitude", "ground.friction_variation.amplitude",
     "normal.stiffness", "normal.damping", "normal.roughness_height",
     "friction.static_coefficient", "drive.amplitude_x", "drive.stiffness_x", "drive.damping_x",
-    "drive.angular_frequency", "load.normal",
+    "drive.frequency_hz", "load.normal",
 ])
 def test_parameters(name, friction):
     system = oscillator(friction=friction, ground=WAVES, normal=RoughSurface(1e6, 1e-5, 40.0))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
+from systems import TURN
 
 import fecontact as fc
 from fecontact.laws import (
@@ -27,7 +28,7 @@ def mass(friction, time=1.0):
     basis = fc.basis_from_matrices([[time**2]], [[0.0]], {"contact": row, "B": row[0]})
     return fc.ContactSystem(
         basis, normal=PrescribedForce(1.0), friction=friction, drive=fc.Drive(
-            stiffness_x=K, damping_x=C * time, amplitude_x=1.0, angular_frequency=W / time))
+            stiffness_x=K, damping_x=C * time, amplitude_x=1.0, frequency_hz=W / time / TURN))
 
 
 def exact_motion(springs, limits, times):
@@ -135,8 +136,8 @@ def test_normal_force_that_varies_and_opens():
     law = JenkinsFriction(2.0, 0.5)
     system = fc.ContactSystem(
         basis, normal=LinearContact(20.0, 0.0), friction=law, load=fc.Load(1.0, forces=(
-            fc.PointLoad("C", "x", signal=Harmonic(1.5, 1.0)),
-            fc.PointLoad("C", "y", signal=Harmonic(3.0, 1.7)))))
+            fc.PointLoad("C", "x", signal=Harmonic(1.5, 1.0 / TURN)),
+            fc.PointLoad("C", "y", signal=Harmonic(3.0, 1.7 / TURN)))))
     run = fc.simulate(system, 40.0, outputs=40001, rtol=1e-8)
     F, x = run.normal_force[:, 0], run.displacement("C")[:, :1]
     assert F.min() == 0.0
@@ -153,8 +154,8 @@ def in_space(friction):
     basis = fc.basis_from_matrices(np.eye(2), np.diag([1.0, 1.3]), {
         "contact": row[None], "C": row}, damping=0.05 * np.eye(2), dimension=3)
     return fc.ContactSystem(basis, normal=PrescribedForce(1.0), friction=friction, load=fc.Load(
-        forces=(fc.PointLoad("C", "x", signal=Harmonic(2.0, 0.9)),
-                fc.PointLoad("C", "y", signal=Harmonic(1.5, 1.3)))))
+        forces=(fc.PointLoad("C", "x", signal=Harmonic(2.0, 0.9 / TURN)),
+                fc.PointLoad("C", "y", signal=Harmonic(1.5, 1.3 / TURN)))))
 
 
 def test_elements_turn_on_the_edge_of_their_disc():
@@ -175,9 +176,9 @@ def bouncing(normal):
         "contact": rows[None], "C": rows}, damping=0.1 * np.eye(3), dimension=3)
     law = IwanFriction(20.0, 0.5, elements=2)
     return fc.ContactSystem(basis, normal=normal, friction=law, load=fc.Load(forces=(
-        fc.PointLoad("C", "x", signal=Harmonic(2.0, 0.9)),
-        fc.PointLoad("C", "y", signal=Harmonic(1.5, 1.3)),
-        fc.PointLoad("C", "z", signal=Harmonic(3.0, 1.7)))))
+        fc.PointLoad("C", "x", signal=Harmonic(2.0, 0.9 / TURN)),
+        fc.PointLoad("C", "y", signal=Harmonic(1.5, 1.3 / TURN)),
+        fc.PointLoad("C", "z", signal=Harmonic(3.0, 1.7 / TURN)))))
 
 
 @pytest.mark.parametrize("normal", [LinearContact(20.0, 0.0), PowerContact(20.0, 2.0),
@@ -326,7 +327,7 @@ def test_derivatives_where_sliding_elements_lift_off_in_space():
 
 def test_what_does_not_serve_the_elements_says_so():
     system = mass(JenkinsFriction(0.5, 1.0))
-    field = fc.bifurcation.contact_field(system, ["drive.angular_frequency"])
+    field = fc.bifurcation.contact_field(system, ["drive.frequency_hz"])
     motion = fc.simulate(system, 2.0 * T, outputs=201)
     with pytest.raises(fc.InputError, match="Collocation does not locate where elastic Coulomb"):
         fc.bifurcation.orbit_branch(field, motion)
@@ -347,7 +348,7 @@ def test_scipy_returns_elements_of_every_node():
     basis = fc.basis_from_matrices(np.eye(2), np.zeros((2, 2)), {"contact": rows, "B": rows[1]})
     system = fc.ContactSystem(
         basis, normal=PrescribedForce((1.0, 1.0)), friction=JenkinsFriction((0.5, 0.5), 1.0),
-        drive=fc.Drive(stiffness_x=K, damping_x=C, amplitude_x=1.0, angular_frequency=W))
+        drive=fc.Drive(stiffness_x=K, damping_x=C, amplitude_x=1.0, frequency_hz=W / TURN))
     times = np.linspace(0.0, 5.0 * T, 101)
     exact = exact_motion(springs, limits, times)[:, 0]
     run = fc.simulate(system, times[-1], outputs=times, rtol=1e-7, solver=fc.integrate.Scipy())
@@ -360,9 +361,9 @@ def test_shooting_finds_the_settled_amplitude():
     system = mass(JenkinsFriction(0.5, 1.0))
     exact = exact_motion([0.5], [1.0], np.linspace(59.0 * T, 60.0 * T, 2001))[:, 0]
     run = fc.simulate(system, 20.0 * T, outputs=20 * 100 + 1)
-    field = bifurcation.contact_field(system, ["drive.angular_frequency"])
+    field = bifurcation.contact_field(system, ["drive.frequency_hz"])
     branch = bifurcation.orbit_branch(
-        field, run, method=bifurcation.Shooting(), bounds=(1.1, 1.2),
+        field, run, method=bifurcation.Shooting(), bounds=(1.1 / TURN, 1.2 / TURN),
         options=bifurcation.ContinuationOptions(points=2))
     x = branch.points[0].orbit(field, 2001).states[:, 0]
     assert np.ptp(x) == pytest.approx(np.ptp(exact), rel=1e-5)

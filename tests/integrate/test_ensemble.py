@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from systems import impact_oscillator
+from systems import TURN, impact_oscillator
 from test_near_nodes import beam
 
 from fecontact import InputError, Status, ensemble, simulate
@@ -17,7 +17,7 @@ PERIOD = 2.0 * np.pi / W
 
 def test_runs_are_those_of_single_runs_bit_for_bit():
     base = impact_oscillator(modes=2)
-    systems = [base.with_(**{"drive.angular_frequency": w}) for w in (30.84, 50.0, W)]
+    systems = [base.with_(**{"drive.frequency_hz": w / TURN}) for w in (30.84, 50.0, W)]
     states = 1e-4 * np.random.default_rng(1).normal(size=(3, base.size))
     times = np.linspace(0.0, 0.6, 7)
     found = ensemble(systems, times, initial=states, workers=2)
@@ -50,12 +50,12 @@ def test_strobed_motion_repeats_where_the_motion_does():
 
 def test_a_chain_hands_on_its_states():
     base = impact_oscillator(modes=2)
-    systems = [base.with_(**{"drive.angular_frequency": w}) for w in (60.0, 61.0, 62.0, 63.0)]
+    systems = [base.with_(**{"drive.frequency_hz": w / TURN}) for w in (60.0, 61.0, 62.0, 63.0)]
     start = np.full(4, 1e-4)
     found = strobe(systems, transient_periods=3, keep=1, initial=start, chain=2)
     last = start
     for index in (0, 1):
-        w = systems[index].drive.angular_frequency
+        w = TURN * systems[index].drive.frequency_hz
         run = driver.start(systems[index], last, np.arange(4) * 2.0 * np.pi / w, rtol=1e-6,
                            work=False)
         run.advance(10**9)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 import fecontact as fc
 from fecontact.integrate import Scipy, run_limits
@@ -145,13 +146,13 @@ def test_longest_steps_resolve_what_is_given_in_time():
     times = np.array([0.0, 10.0])
     cases = {
         0.5: point(drive=fc.Drive(stiffness_x=1.0, amplitude_x=1e-3,
-                                  angular_frequency=4.0 * np.pi)),
-        0.25: point(drive=fc.Drive(stiffness_x=1.0, motion_x=Harmonic(1e-3, 8.0 * np.pi)),
-                    load=loaded(Harmonic(1.0, np.pi))),
-        0.2: point(load=loaded(Harmonic(1.0, 10.0 * np.pi))),
+                                  frequency_hz=4.0 * np.pi / TURN)),
+        0.25: point(drive=fc.Drive(stiffness_x=1.0, motion_x=Harmonic(1e-3, 8.0 * np.pi / TURN)),
+                    load=loaded(Harmonic(1.0, np.pi / TURN))),
+        0.2: point(load=loaded(Harmonic(1.0, 10.0 * np.pi / TURN))),
         0.1: point(ground=fc.Ground(speed=0.2, amplitude=1e-6, wavelength=0.02)),
         # The drive does not move: its frequency does not count.
-        np.inf: point(drive=fc.Drive(stiffness_x=1.0, angular_frequency=4.0 * np.pi)),
+        np.inf: point(drive=fc.Drive(stiffness_x=1.0, frequency_hz=4.0 * np.pi / TURN)),
     }
     for period, system in cases.items():
         assert driver.longest_step(system, times) == pytest.approx(min(10.0, period / 4.0))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fields_in_time import LORENZ, Pendulum
 from scipy.integrate import quad, solve_ivp
-from systems import impact_oscillator
+from systems import TURN, impact_oscillator
 
 import fecontact as fc
 from fecontact.bifurcation import (
@@ -259,16 +259,16 @@ def test_transitions_are_the_derivatives_of_the_motion():
 
 
 def test_runs_of_contact_fields_are_those_of_their_systems():
-    field = contact_field(impact_oscillator(2), {"drive.angular_frequency": None})
-    run = fc.simulate(field.with_(**{"drive.angular_frequency": 63.0}), 0.2, initial=np.zeros(4))
-    system = impact_oscillator(2).with_(**{"drive.angular_frequency": 63.0})
+    field = contact_field(impact_oscillator(2), {"drive.frequency_hz": None})
+    run = fc.simulate(field.with_(**{"drive.frequency_hz": 63.0 / TURN}), 0.2, initial=np.zeros(4))
+    system = impact_oscillator(2).with_(**{"drive.frequency_hz": 63.0 / TURN})
     assert (run.states == fc.simulate(system, 0.2, initial=np.zeros(4)).states).all()
     assert run.state_names == ("q1", "q2", "q1'", "q2'")
 
 
 def test_starts_of_contact_fields():
     system = impact_oscillator(2)
-    field = contact_field(system, {"drive.angular_frequency": None})
+    field = contact_field(system, {"drive.frequency_hz": None})
     rest = fc.simulate(field, 0.1, initial="rest")
     assert (rest.states == fc.simulate(system, 0.1).states).all()
     # A run goes on from its end, in runs, ensembles, exponents and on the way to orbits.

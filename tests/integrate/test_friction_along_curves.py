@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from systems import TURN
 
 import fecontact as fc
 from fecontact.laws import (
@@ -40,7 +41,7 @@ class Curve:
 
     @property
     def ground(self):
-        along, across = (HarmonicSpeed(speed, rate, phase) for speed, rate, phase in zip(
+        along, across = (HarmonicSpeed(speed, rate / TURN, phase) for speed, rate, phase in zip(
             self.speeds, self.rates, self.phases, strict=True))
         return fc.Ground(motion=along, motion_y=across)
 

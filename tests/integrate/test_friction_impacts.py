@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 from fecontact import (
     ContactSystem,
@@ -311,7 +312,7 @@ def test_stick_slip_on_a_rigid_belt(static, period, largest):
 
 def test_slip_before_lift_off():
     """Pushed sideways while its weight is lifted, a mass slips at F = 4 N and lifts off at zero."""
-    lift = PointLoad("C", "y", signal=Harmonic(20.0, angular_frequency=1.0))
+    lift = PointLoad("C", "y", signal=Harmonic(20.0, frequency_hz=1.0 / TURN))
     system = body([(0.0, 0.0)], 0.5, load=Load(10.0, (
         lift, PointLoad("C", "x", signal=Constant(2.0)))))
     slips, lifts = np.arcsin(0.3), np.pi / 6.0

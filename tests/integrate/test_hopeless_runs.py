@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from systems import friction_oscillator, impact_oscillator
+from systems import TURN, friction_oscillator, impact_oscillator
 
 import fecontact as fc
 from fecontact.core.errors import InputError
@@ -23,7 +23,7 @@ def test_periods_without_number_are_refused(frequency):
             if isinstance(solver, SetValued) and not system.ground.speed:
                 continue
             with pytest.raises(InputError, match=r"holds .*e\+\d+ periods of the fastest of drive"):
-                fc.simulate(system.with_(**{"drive.angular_frequency": frequency}), 1.0,
+                fc.simulate(system.with_(**{"drive.frequency_hz": frequency / TURN}), 1.0,
                             solver=solver)
 
 
@@ -41,14 +41,14 @@ def test_steps_without_number_are_refused():
 
 
 def test_ensembles_refuse_them():
-    fast = friction_oscillator().with_(**{"drive.angular_frequency": 1e12})
+    fast = friction_oscillator().with_(**{"drive.frequency_hz": 1e12 / TURN})
     with pytest.raises(InputError, match="periods of the fastest of drive"):
         fc.ensemble([friction_oscillator(), fast], [0.0, 1.0])
 
 
 def test_short_runs_of_fast_drives_end():
     """The same drive over ten of its periods: the block does not move yet."""
-    system = friction_oscillator().with_(**{"drive.angular_frequency": 1e12})
+    system = friction_oscillator().with_(**{"drive.frequency_hz": 1e12 / TURN})
     run = fc.simulate(system, 20.0 * np.pi / 1e12, outputs=11)
     assert run.status is fc.Status.FINISHED
     assert np.abs(run.modal_coordinates - run.modal_coordinates[0]).max() < 1e-12

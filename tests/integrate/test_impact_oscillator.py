@@ -7,6 +7,7 @@ import impact_calibration as calibration
 import impact_oscillator as impact
 import numpy as np
 import pytest
+from systems import TURN
 
 from fecontact import ensemble, read_mesh, simulate
 from fecontact.analysis import count_periods, periodicity, strobed_states
@@ -19,7 +20,7 @@ STARTS = ((0.0, 0.0), (4e-4, 0.0), (1e-4, -0.02))  # height [m], velocity [m/s]
 
 
 def driven(system, frequency):
-    return system.with_(**{"drive.angular_frequency": frequency})
+    return system.with_(**{"drive.frequency_hz": frequency / TURN})
 
 
 def settled_regime(system, height=0.0, velocity=0.0):

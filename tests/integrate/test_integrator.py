@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from systems import mass_in_plane, mass_in_y
+from systems import TURN, mass_in_plane, mass_in_y
 from test_simulate import oscillator
 
 from fecontact import (
@@ -49,10 +49,10 @@ def body(nodes=3, modes=4, **parts):
                        np.ones(nodes))
     given = {
         "normal": PowerContact(1e6, 1.5, 0.0), "ground": Ground(
-            0.02, 2e-6, 0.01, motion=HarmonicSpeed(0.01, 90.0)),
+            0.02, 2e-6, 0.01, motion=HarmonicSpeed(0.01, 90.0 / TURN)),
         "friction": ExponentialFriction(0.6, 0.4, 20.0, 50.0),
-        "drive": Drive(2e3, 3e3, 1.0, 2.0, 1e-4, 2e-4, 70.0),
-        "load": Load(40.0, (PointLoad("B", "x", signal=Harmonic(2.0, 110.0, 0.3)),))}
+        "drive": Drive(2e3, 3e3, 1.0, 2.0, 1e-4, 2e-4, 70.0 / TURN),
+        "load": Load(40.0, (PointLoad("B", "x", signal=Harmonic(2.0, 110.0 / TURN, 0.3)),))}
     return ContactSystem(basis,
                          **{"friction": ExponentialFriction(0.8, 0.55, 1e3), **given, **parts})
 
@@ -64,7 +64,7 @@ def reference(system, state, times, rtol=1e-12):
 
 def test_order_on_a_smooth_problem():
     """Closed contact on wavy ground that accelerates, drive and load: all terms in time."""
-    system = body(ground=Ground(0.02, 2e-6, 0.01, motion=HarmonicSpeed(0.01, 90.0)),
+    system = body(ground=Ground(0.02, 2e-6, 0.01, motion=HarmonicSpeed(0.01, 90.0 / TURN)),
                   normal=LinearContact(1e5, 30.0),
                   # Without fall: that has a kink where the slip velocity changes sign.
                   friction=ExponentialFriction(0.6, 0.6, 0.0, 50.0))

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from systems import basis, friction_oscillator
+from systems import TURN, basis, friction_oscillator
 from test_small_systems import system as block
 
 from fecontact import (
@@ -77,7 +77,7 @@ def slider(**parts):
         "normal": PrescribedForce(14.0),
         "friction": ExponentialFriction(0.8, 0.55, 1000.0, 1e6), "ground": Ground(speed=1e-3),
         "drive": Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3,
-                       angular_frequency=13.8), **parts})
+                       frequency_hz=13.8 / TURN), **parts})
 
 
 def single(system, state, times, rtol, **options):
@@ -93,7 +93,8 @@ CASES = {
     "uniform": friction_oscillator(2),
     "three modes": friction_oscillator(3),
     "two nodes": block(2, 2),
-    "moving ground": slider(ground=Ground(speed=1e-3, motion=HarmonicSpeed(4e-4, 30.0, 0.3))),
+    "moving ground": slider(ground=Ground(
+        speed=1e-3, motion=HarmonicSpeed(4e-4, 30.0 / TURN, 0.3))),
     "tanh": slider(friction=HyperbolicFriction(0.8, 0.55, 2e-3, 1e5, 0.3, smoothing="tanh")),
     "square root": slider(friction=ConstantFriction(0.5, 1e5, smoothing="square-root")),
     "product": slider(friction=ProductFriction(0.4, 0.6, 900.0, 1e5)),
@@ -106,7 +107,7 @@ CASES = {
     "Gaussian": friction_oscillator(2, normal=GaussianSurface(1e7, 1e-5, 40.0)),
     "own law": friction_oscillator(2, normal=Halved(2e7)),
     "load in time": friction_oscillator(2, load=Load(14.0, (
-        PointLoad("C", "y", signal=Harmonic(-3.0, 40.0)),))),
+        PointLoad("C", "y", signal=Harmonic(-3.0, 40.0 / TURN)),))),
 }
 
 
@@ -119,7 +120,7 @@ def test_cases_are_of_all_sizes():
 def test_each_run_is_that_of_a_single_one(name):
     """Errors against a run of tight tolerance are those of single runs of the same tolerance."""
     base = CASES[name]
-    systems = [base.with_(**{"drive.angular_frequency": w}) for w in np.linspace(11.0, 16.0, 11)]
+    systems = [base.with_(**{"drive.frequency_hz": w / TURN}) for w in np.linspace(11.0, 16.0, 11)]
     assert all(kind_of(one, 0.0, 0.4) is not None for one in systems)
     state, times = np.zeros(base.size), np.linspace(0.0, 0.4, 9)
     found = ensemble(systems, times, initial=state, rtol=1e-7)
@@ -135,7 +136,7 @@ def test_each_run_is_that_of_a_single_one(name):
 
 
 def test_against_an_integrator_of_another_library():
-    systems = [slider().with_(**{"drive.angular_frequency": w}) for w in (11.0, 13.8)]
+    systems = [slider().with_(**{"drive.frequency_hz": w / TURN}) for w in (11.0, 13.8)]
     times = np.linspace(0.0, 0.5, 6)
     found = ensemble(systems, times, initial=np.zeros(2), rtol=1e-8)
     for system, states in zip(systems, found.states, strict=True):
@@ -151,7 +152,7 @@ def test_results_do_not_depend_on_what_runs_beside():
     for k in range(29):
         base = friction_oscillator(2) if k % 3 else friction_oscillator(
             2, normal=PowerContact(3e9, 1.5, 0.4))
-        systems.append(base.with_(**{"drive.angular_frequency": rng.uniform(10.0, 16.0),
+        systems.append(base.with_(**{"drive.frequency_hz": rng.uniform(10.0 / TURN, 16.0),
                                      "ground.speed": rng.uniform(5e-4, 2e-3)}))
         states.append(rng.normal(size=4) * np.array([1e-4, 1e-6, 1e-3, 1e-5]))
     times = np.sort(rng.uniform(0.0, 0.4, (29, 5)), axis=1)
@@ -171,7 +172,7 @@ def test_results_do_not_depend_on_what_runs_beside():
 def test_a_chain_hands_on_its_states():
     """As runs one after the other, each from where the one before has ended."""
     frequencies = np.linspace(11.0, 16.0, 11)
-    systems = [slider().with_(**{"drive.angular_frequency": w}) for w in frequencies]
+    systems = [slider().with_(**{"drive.frequency_hz": w / TURN}) for w in frequencies]
     times = np.linspace(0.0, 0.2, 3)
     found = ensemble(systems, times, initial=np.array([1e-4, 0.0]), chain=4, workers=2)
     assert found.finished.all()
@@ -199,7 +200,7 @@ def test_a_chain_goes_on_behind_a_run_that_failed():
 
 
 def test_a_run_that_was_left_goes_on_bit_for_bit(monkeypatch):
-    systems = [slider().with_(**{"drive.angular_frequency": w}) for w in np.linspace(11, 16, 13)]
+    systems = [slider().with_(**{"drive.frequency_hz": w / TURN}) for w in np.linspace(11, 16, 13)]
     times = np.linspace(0.0, 0.4, 5)
     wanted = ensemble(systems, times, initial=np.zeros(2))
     monkeypatch.setattr(lane_driver, "_STEPS", 3)

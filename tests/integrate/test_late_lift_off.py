@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 import fecontact as fc
 from fecontact.laws import BoucWenFriction, LinearContact, LuGreFriction, RoughSurface
@@ -19,7 +20,7 @@ def test_bouncing_on_a_belt(normal, friction):
                                    damping=0.1 * np.eye(2))
     system = fc.ContactSystem(
         basis, normal=normal, friction=friction, ground=fc.Ground(speed=0.4),
-        drive=fc.Drive(stiffness_y=1.0, amplitude_y=1.5, angular_frequency=0.8),
+        drive=fc.Drive(stiffness_y=1.0, amplitude_y=1.5, frequency_hz=0.8 / TURN),
         load=fc.Load(normal=0.5))
     run = fc.simulate(system, 30.0, outputs=301, rtol=1e-6)
     assert run.status.name == "FINISHED"

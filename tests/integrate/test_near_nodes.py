@@ -84,7 +84,7 @@ CASES = {
     "belt": lambda: beam(),
     "wavy": lambda: beam(ground=fc.Ground(speed=0.01, amplitude=2e-6, wavelength=0.02)),
     "shaken": lambda: beam(load=fc.Load(200.0, (fc.PointLoad("C", "y",
-                                                             signal=Harmonic(300.0, 2000.0)),))),
+                                                             signal=Harmonic(300.0, 318.3)),))),
     "far-reaching": lambda: beam(normal=ExponentialContact(20.0, 2e-7, 1.0), load=fc.Load(50.0),
                                  friction=ConstantFriction(0.3, smoothing_slope=1e3)),
     "solid": solid,

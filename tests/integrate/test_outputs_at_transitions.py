@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 import fecontact as fc
 from fecontact.integrate import SetValued, TimeStepping
@@ -30,7 +31,7 @@ def test_a_block_comes_to_rest_between_outputs(rtol):
 
 
 def test_outputs_of_stick_slip_agree_with_steps_from_event_to_event():
-    system = block(drive=fc.Drive(stiffness_x=100.0, amplitude_x=0.05, angular_frequency=7.0))
+    system = block(drive=fc.Drive(stiffness_x=100.0, amplitude_x=0.05, frequency_hz=7.0 / TURN))
     outputs = np.linspace(0.0, 3.0, 3001)
     run, exact = (fc.simulate(system, 3.0, initial=[0.0, 1.0], outputs=outputs, rtol=rtol,
                               solver=solver)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 from fecontact import (
     ContactSystem,
@@ -25,7 +26,7 @@ def system(r, dashpots="relative", **drive):
     """A mass on spring and dashpot along x, whose contact carries no force."""
     row = np.array([[[1.0], [0.0], [0.0]]])
     basis = basis_from_matrices([[MASS]], [[0.0]], {"contact": row, "B": row[0]})
-    drive = drive or {"amplitude_x": AMPLITUDE, "angular_frequency": r * W0}
+    drive = drive or {"amplitude_x": AMPLITUDE, "frequency_hz": r * W0 / TURN}
     return ContactSystem(basis, normal=PrescribedForce(0.0), friction=ConstantFriction(0.3),
                          drive=Drive(STIFFNESS, 0.0, DAMPING, dashpots=dashpots, **drive))
 
@@ -81,7 +82,7 @@ def test_base_that_drags_by_a_dashpot_alone():
     basis = basis_from_matrices([[MASS]], [[0.0]], {"contact": row, "B": row[0]})
     dragged = ContactSystem(
         basis, normal=PrescribedForce(0.0), friction=ConstantFriction(0.3),
-        drive=Drive(damping_x=DAMPING, dashpots="relative", motion_x=Harmonic(AMPLITUDE, w)))
+        drive=Drive(damping_x=DAMPING, dashpots="relative", motion_x=Harmonic(AMPLITUDE, w / TURN)))
     run = simulate(dragged, 1.0, initial=np.zeros(2), outputs=101, rtol=1e-9)
     t, amount = run.time, AMPLITUDE * w * rate / (rate**2 + w**2)
     exact = amount * (rate * np.cos(w * t) + w * np.sin(w * t) - rate * np.exp(-rate * t))
@@ -126,7 +127,7 @@ law = "frictionless"
 stiffness_x = 1e4
 damping_x = 5.0
 amplitude_x = 1e-4
-angular_frequency = 300.0
+frequency_hz = 47.75
 dashpots = "relative"
 """
     study = Study.from_toml(text)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.linalg
-from systems import friction_oscillator, impact_oscillator, mass_in_y
+from systems import TURN, friction_oscillator, impact_oscillator, mass_in_y
 
 from fecontact import AnalysisError, Drive, Ground, InputError, sensitivity, simulate
 from fecontact.integrate import Rodas5P
@@ -96,7 +96,7 @@ def test_volume_shrinks_with_the_trace():
 @pytest.mark.parametrize("name", [
     "ground.speed", "friction.static_coefficient", "friction.smoothing_slope", "load.normal",
     "normal.stiffness", "normal.roughness_height", "drive.amplitude_x", "drive.stiffness_x",
-    "drive.angular_frequency",
+    "drive.frequency_hz",
 ])
 def test_derivatives_to_parameters(name):
     system = friction_oscillator(3, **SMOOTH)
@@ -113,11 +113,11 @@ def test_derivatives_to_parameters(name):
 
 
 @pytest.mark.parametrize(("name", "value"), [
-    ("drive.angular_frequency", 64.32), ("drive.amplitude_y", 0.47e-3), ("drive.damping_y", 0.0),
+    ("drive.frequency_hz", 64.32 / TURN), ("drive.amplitude_y", 0.47e-3), ("drive.damping_y", 0.0),
 ])
 def test_derivatives_that_begin_slowly(name, value):
     """The push of the parameter is zero at the start and grows with time."""
-    system = impact_oscillator(modes=2).with_(**{"drive.angular_frequency": 64.32, name: value})
+    system = impact_oscillator(modes=2).with_(**{"drive.frequency_hz": 64.32 / TURN, name: value})
     start = np.array([-6.95891022e-06, 7.11400198e-07, -7.91871183e-03, 3.15884285e-03])
     t_end = 2.0 * np.pi / 64.32
     found = sensitivity(system, t_end, initial=start, parameter=name)

@@ -5,7 +5,7 @@ from math import factorial
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
-from systems import SURFACE, friction_oscillator, impact_oscillator, mass_in_y
+from systems import SURFACE, TURN, friction_oscillator, impact_oscillator, mass_in_y
 
 import fecontact as fc
 from fecontact import ContactSystem, Drive, Load, ModalBasis, PointLoad, Status, simulate
@@ -63,13 +63,13 @@ def random_system(rng):
               PowerContact(c, 1.0, factor), PowerContact(1e3 * c, 2.0, factor),
               TwoSidedStop(c, 10.0 ** rng.uniform(-5.0, -3.0), float(rng.integers(1, 3)), factor),
               ][rng.integers(5)]
-    forces = (PointLoad("C", "y", signal=Harmonics(tuple(rng.normal(size=2)), (2.0 * wE, 3.1 * wE),
-                                                   (0.3, 1.0))),)
+    forces = (PointLoad("C", "y", signal=Harmonics(
+        tuple(rng.normal(size=2)), (2.0 * wE / TURN, 3.1 * wE / TURN), (0.3, 1.0))),)
     system = oscillator(
         w, 10.0 ** rng.uniform(-4.0, -0.7, m) * (rng.random(m) < 0.7), rng.normal(size=(n, m)),
         normal=normal, gap=rng.choice([0.0, 1e-5, 1e-4]),
         drive=Drive(stiffness_y=10.0 ** rng.uniform(1.0, 3.0), damping_y=rng.uniform(0.0, 0.1),
-                    amplitude_y=10.0 ** rng.uniform(-4.0, -2.5), angular_frequency=wE,
+                    amplitude_y=10.0 ** rng.uniform(-4.0, -2.5), frequency_hz=wE / TURN,
                     dashpots=rng.choice(["relative", "absolute"])),
         load=Load(rng.choice([0.0, 1.0, 3.0]), forces=forces if rng.random() < 0.4 else ()))
     state = rng.normal(size=2 * m) * np.repeat([1e-4, 1e-1], m) * 10.0 ** rng.uniform(-1.0, 0.5)
@@ -211,7 +211,7 @@ def test_a_ball_that_bounces_for_ever():
 def test_errors_follow_the_tolerance(rtol):
     """Free vibration of two modes under a harmonic drive, far from the ground."""
     system = oscillator((20.0, 900.0), (0.01, 0.02), gap=1.0, drive=Drive(
-        stiffness_y=50.0, amplitude_y=1e-3, angular_frequency=40.0))
+        stiffness_y=50.0, amplitude_y=1e-3, frequency_hz=40.0 / TURN))
     state = np.array([1e-3, -2e-4, 0.1, 0.0])
     times = np.linspace(0.0, 1.0, 301)
     run = driver.start(system, state, times, rtol=rtol, work=False, method="power-series")

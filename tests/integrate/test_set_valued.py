@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from systems import friction_oscillator
+from systems import TURN, friction_oscillator
 
 from fecontact import (
     ContactSystem,
@@ -148,7 +148,7 @@ def test_friction_oscillator_without_excitation():
 def den_hartog(beta, ratio, periods, **options):
     """Coulomb friction beta against a force cos(w t), both over the spring's stiffness."""
     system = block(friction=ConstantFriction(beta), load=Load(1.0),
-                   drive=Drive(stiffness_x=0.5, amplitude_x=2.0, angular_frequency=ratio),
+                   drive=Drive(stiffness_x=0.5, amplitude_x=2.0, frequency_hz=ratio / TURN),
                    spring=0.5)
     times = np.linspace(0.0, periods * 2.0 * np.pi / ratio, 400 * periods + 1)
     run = integrate_set_valued(system, start(system, 0.0), times, **options)
@@ -203,7 +203,7 @@ def test_order_while_nothing_changes(method, longest, order):
     basis = basis_from_matrices([[1.0]], [[0.5]], {"contact": [row], "B": row, "C": row})
     system = ContactSystem(basis, normal=PrescribedForce(1.0), friction=ConstantFriction(0.5),
                            ground=Ground(speed=50.0), drive=Drive(
-                               stiffness_x=0.5, amplitude_x=1.0, angular_frequency=2.0))
+                               stiffness_x=0.5, amplitude_x=1.0, frequency_hz=2.0 / TURN))
     end, errors = 12.0, []
     state = np.array([0.5, 0.0])
     for part in (1.0, 0.5, 0.25):
@@ -252,7 +252,7 @@ def test_mass_lifted_off_a_rigid_stop():
     row = np.array([[0.0], [1.0], [0.0]])
     basis = basis_from_matrices([[1.0]], [[1.0]], {"contact": row[None], "B": row, "C": row})
     system = ContactSystem(basis, RoughSurface(1e5, 1e-4), load=Load(1.0), drive=Drive(
-        stiffness_y=1.0, amplitude_y=2.0, angular_frequency=0.5),
+        stiffness_y=1.0, amplitude_y=2.0, frequency_hz=0.5 / TURN),
         friction=ExponentialFriction(0.8, 0.55, 1e3))
     times = np.linspace(0.0, 2.0, 201)
     run = integrate_set_valued(system, np.zeros(2), times, rtol=1e-10, restitution=0.5)

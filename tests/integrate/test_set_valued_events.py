@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 from systems import belt_of_unit_mass as belt
 from systems import last_speed_of_stick_slip as last_speed
 
@@ -101,7 +102,7 @@ def test_ensemble_gives_what_single_runs_give():
 def test_strobed_states_of_den_hartogs_oscillator():
     """Force cos(w t) and friction 0.4 over the stiffness, at 0.8 of the resonance."""
     system = belt(0.0, friction=ConstantFriction(0.4), drive=fc.Drive(
-        stiffness_x=1.0, amplitude_x=1.0, angular_frequency=0.8 * np.sqrt(2.0)))
+        stiffness_x=1.0, amplitude_x=1.0, frequency_hz=0.8 * np.sqrt(2.0) / TURN))
     found = strobe(system, transient_periods=60, keep=4, initial=np.zeros(2), solver=SetValued(),
                    rtol=1e-10)
     assert np.ptp(found.states[0], axis=0) == pytest.approx(0.0, abs=1e-6)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from systems import TURN
 
 import fecontact as fc
 from fecontact import Status
@@ -173,7 +174,7 @@ def test_friction_from_many_random_starts():
 
 
 def test_a_belt_of_changing_speed():
-    motion = HarmonicSpeed(0.5, 3.0)
+    motion = HarmonicSpeed(0.5, 3.0 / TURN)
     times = np.linspace(0.0, 6.0, 31)
     wanted, changes = belt_reference([0.3, 0.0], lambda t: 0.6 + 0.5 * np.sin(3.0 * t), times)
     assert len(changes) >= 2
@@ -188,7 +189,8 @@ def test_stick_let_go_for_a_moment():
     for excess in (1e-3, 1e-4, 1e-5):
         system = mass(SIDEWAYS, spring=0.5, normal=PrescribedForce(1.0),
                       friction=ConstantFriction(0.4), drive=fc.Drive(
-                          stiffness_x=0.5, amplitude_x=0.8 * (1.0 + excess), angular_frequency=1.5))
+                          stiffness_x=0.5, amplitude_x=0.8 * (1.0 + excess),
+                          frequency_hz=1.5 / TURN))
         run = integrate_set_valued(system, np.zeros(2), np.linspace(0.0, 20.0 * np.pi / 1.5, 201),
                                    rtol=1e-9)
         # Slip begins and ends once in each of the 20 half-periods.
@@ -203,7 +205,7 @@ def test_a_stop_let_go_for_a_moment():
     """
     for excess in (1e-3, 1e-4):
         system = mass(UPWARDS, spring=1e-9, load=fc.Load(1.0, (fc.PointLoad(
-            "C", "y", signal=Harmonic(1.0 + excess, 2.0)),)))
+            "C", "y", signal=Harmonic(1.0 + excess, 2.0 / TURN)),)))
         run = integrate_set_valued(system, np.zeros(2), np.linspace(0.0, 10.0 * np.pi, 201),
                                    rtol=1e-9, restitution=0.0)
         assert run.statistics["impacts"] == 10

@@ -4,7 +4,7 @@ from math import comb
 
 import numpy as np
 import pytest
-from systems import two_mass_system
+from systems import TURN, two_mass_system
 
 from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
 from fecontact.integrate.bernstein import of_nested
@@ -15,7 +15,7 @@ from fecontact.integrate.step_loop import REJECTIONS, RUNNING
 from fecontact.laws import ExponentialFriction, PrescribedForce, RoughSurface
 
 FRICTION = ExponentialFriction(0.8, 0.55, 1000.0, 1e6)
-DRIVE = Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3, angular_frequency=13.8)
+DRIVE = Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3, frequency_hz=13.8 / TURN)
 
 
 def system(modes, nodes):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.special import ellipk
+from systems import TURN
 
 import fecontact as fc
 from fecontact import Interface
@@ -158,7 +159,7 @@ def test_lateral_dither_reduces_friction(ratio, expected, solver):
     basis = point_masses({"a": 1e6}, components="xyz", contact="a")
     system = fc.ContactSystem(
         basis, normal=PrescribedForce(push), friction=ConstantFriction(MU),
-        ground=fc.Ground(speed=-ratio * amplitude, motion_y=HarmonicSpeed(amplitude, w)),
+        ground=fc.Ground(speed=-ratio * amplitude, motion_y=HarmonicSpeed(amplitude, w / TURN)),
         load=fc.Load(gravity=(0.0, 0.0, -push / 1e6)))
     run = fc.simulate(system, 0.04, initial=np.zeros(6), outputs=3, rtol=1e-8, max_step=2e-5,
                       solver=SOLVERS[solver])

@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from systems import (
     DRIVEN,
     SURFACE,
+    TURN,
     beam,
     friction_oscillator,
     impact_oscillator,
@@ -170,7 +171,7 @@ def test_den_hartog(r, beta, amplitude, tolerance):
     """m = k = P = 1; the smoothing k_s = 1e3 changes the amplitude by some 1e-3."""
     system = mass_in_plane(1.0, normal=RoughSurface(1e4, 1e-4, 10.0), load=Load(1.0),
                            friction=ExponentialFriction(beta, beta, 0.0, 1e3),
-                           drive=Drive(stiffness_x=1.0, amplitude_x=1.0, angular_frequency=r))
+                           drive=Drive(stiffness_x=1.0, amplitude_x=1.0, frequency_hz=r / TURN))
     period = 2.0 * np.pi / r
     times = np.concatenate([[0.0], np.linspace(29.0, 30.0, 401) * period])
     run = simulate(system, times[-1], outputs=times, solver=Scipy("LSODA"), rtol=1e-7)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 from fecontact import (
     ContactSystem,
@@ -117,10 +118,11 @@ def test_a_side_that_turns_unsteadily_is_a_belt_of_that_speed(name):
     friction = LUGRE if name == "rodas5p" else FRICTION
     # The centre lies above the node: what turns counter-clockwise passes it along t.
     centre = (-radius * np.sin(angle), radius * np.cos(angle))
-    both = together(SlidingRotation(omega, centre, HarmonicSpeed(6.0, 300.0)),
+    both = together(SlidingRotation(omega, centre, HarmonicSpeed(6.0, 300.0 / TURN)),
                     Ground(profile=WAVES), friction)
     run = simulate(both, 0.04, initial=start(both, (0.0, angle)), rtol=1e-9, **options)
-    belt = alone(Ground(speed=omega * radius, motion=HarmonicSpeed(6.0 * radius, 300.0)), friction)
+    belt = alone(Ground(speed=omega * radius,
+                        motion=HarmonicSpeed(6.0 * radius, 300.0 / TURN)), friction)
     single = simulate(belt, 0.04, initial=start(belt, (0.0,)), rtol=1e-9, **options)
     for quantity in ("slip_velocity", "friction_force"):
         theirs = getattr(single, quantity)[:, 0]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 import fecontact as fc
 from fecontact.laws import (
@@ -27,7 +28,7 @@ def bouncing(kind, mass=1.0, length=1.0, time=1.0):
         friction=LAWS[kind](stiffness=30.0 * stiffness, friction_coefficient=0.4),
         ground=fc.Ground(speed=0.4 * length / time),
         drive=fc.Drive(stiffness_y=stiffness, amplitude_y=1.5 * length,
-                       angular_frequency=0.8 / time),
+                       frequency_hz=0.8 / time / TURN),
         load=fc.Load(normal=0.5 * stiffness * length))
     run = fc.simulate(system, 10.0 * time, outputs=101)
     assert run.status is fc.Status.FINISHED
@@ -83,7 +84,7 @@ def test_scale_of_forces():
     np.testing.assert_allclose(scale(load=fc.Load(normal=3e-6)), 3e-6)
     pulled = fc.Load(forces=[fc.PointLoad("C", "x", signal=Constant(-2e-6))])
     np.testing.assert_allclose(scale(load=pulled), 2e-6)
-    driven = fc.Drive(stiffness_x=2e-3, amplitude_x=1e-3, angular_frequency=1.0)
+    driven = fc.Drive(stiffness_x=2e-3, amplitude_x=1e-3, frequency_hz=1.0 / TURN)
     np.testing.assert_allclose(scale(drive=driven), 2e-6)
     np.testing.assert_allclose(scale(PrescribedForce(5e-6)), 5e-6)
     assert scale(load=fc.Load(normal=50.0)) == 1.0

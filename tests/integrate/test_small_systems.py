@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from systems import friction_oscillator, two_mass_system
+from systems import TURN, friction_oscillator, two_mass_system
 
 from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
 from fecontact.integrate import small_systems
@@ -28,7 +28,7 @@ def system(modes, nodes, **changes):
         "normal": RoughSurface(10e6, 10e-6, 40.0),
         "friction": ExponentialFriction(0.8, 0.55, 1000.0, 1e6), "ground": Ground(speed=1e-3),
         "drive": Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3,
-                       angular_frequency=13.8),
+                       frequency_hz=13.8 / TURN),
         "load": Load(14.0), **changes})
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.special import ellipk
+from systems import TURN
 
 import fecontact as fc
 from fecontact.integrate import Rodas5P, Scipy
@@ -126,7 +127,7 @@ def test_lateral_dither_reduces_friction():
     basis = point_masses({"a": 1e9}, components="xyz", contact="a")
     system = fc.ContactSystem(
         basis, normal=LinearContact(stiffness=1e6), friction=ConstantFriction(MU, 1e6),
-        ground=fc.Ground(speed=-speed, motion_y=HarmonicSpeed(amplitude, w)),
+        ground=fc.Ground(speed=-speed, motion_y=HarmonicSpeed(amplitude, w / TURN)),
         load=fc.Load(gravity=(0.0, 0.0, -1e-8)))
     run = fc.simulate(system, 0.1, initial="rest", outputs=5001, rtol=1e-8)
     whole = run.time >= 0.02

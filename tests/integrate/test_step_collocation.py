@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from systems import friction_oscillator, impact_oscillator, mass_in_plane, mass_in_y
+from systems import TURN, friction_oscillator, impact_oscillator, mass_in_plane, mass_in_y
 from test_small_systems import assert_as_said
 from test_small_systems import system as block
 
@@ -108,7 +108,7 @@ def test_the_error_follows_the_tolerance(rtol):
     slope, V, mu, rest, decay = 300.0, 0.7, 0.8, 0.5, 2.0
     system = mass_in_x(4.0, normal=PrescribedForce(1.0), ground=Ground(speed=V),
                        friction=ExponentialFriction(mu, rest, decay, slope),
-                       drive=Drive(stiffness_x=5.0, amplitude_x=0.08, angular_frequency=2.0))
+                       drive=Drive(stiffness_x=5.0, amplitude_x=0.08, frequency_hz=2.0 / TURN))
 
     def phase(k):
         sign = (-1.0) ** (k + 1)
@@ -171,7 +171,7 @@ def test_the_work_of_a_ball_that_bounces():
 def test_work_from_rest_without_loads():
     """A brief touch of a dashpot, in a run that begins with no energy at all."""
     c, damping = 2.7e5, 20.0
-    push = PointLoad("C", "y", signal=Harmonics((-5.0, -1.0), (30.0, 1000.0)))
+    push = PointLoad("C", "y", signal=Harmonics((-5.0, -1.0), (30.0 / TURN, 1000.0 / TURN)))
     system = mass_in_y(normal=LinearContact(c, damping), friction=ConstantFriction(0.0),
                        gap=1e-3, load=Load(forces=(push,)))
     for rtol in (1e-8, 1e-10):
@@ -187,7 +187,7 @@ def test_work_of_creep():
     law, V, begin = ExponentialFriction(0.8, 0.55, 1000.0, 1.8e4), 1e-3, np.array([1e-3, 0.0])
     system = mass_in_x(4.0, normal=PrescribedForce(10.0), ground=Ground(speed=V), friction=law,
                        drive=Drive(stiffness_x=3000.0, damping_x=0.5, amplitude_x=2e-3,
-                                   angular_frequency=60.0))
+                                   frequency_hz=60.0 / TURN))
     times = np.linspace(0.0, 0.3, 300001)
     tight = simulate(system, 0.3, initial=begin, outputs=times, solver=STEPS, rtol=1e-11)
     work, beyond = tight.node_friction_work[:, 0], np.abs(tight.states[:, 1] - V)
@@ -273,7 +273,7 @@ def test_stick_slip_over_many_periods():
         normal=PrescribedForce(14.0), friction=ExponentialFriction(0.8, 0.55, 1000.0, 1e6),
         ground=Ground(speed=1e-3),
         drive=Drive(stiffness_x=5610.0, damping_x=0.768, amplitude_x=0.5e-3,
-                    angular_frequency=13.8))
+                    frequency_hz=13.8 / TURN))
     times = np.linspace(0.0, 3.0, 1501)
     tight = progressed(system, [0.0, 0.0], times, 1e-12, work=False).states
     assert tight == pytest.approx(simulate(
@@ -381,7 +381,7 @@ def test_when_it_is_taken():
 
 
 def test_ensembles():
-    systems = [friction_oscillator(2, **{"drive.angular_frequency": w}) for w in (12.0, 13.8)]
+    systems = [friction_oscillator(2, **{"drive.frequency_hz": w / TURN}) for w in (12.0, 13.8)]
     times = np.linspace(0.0, 0.5, 6)
     found = fc.ensemble(systems, times, initial=np.zeros(4), rtol=1e-8, solver=LONG, chain=2)
     singles = [simulate(systems[0], 0.5, initial=np.zeros(4), rtol=1e-8, outputs=times)]

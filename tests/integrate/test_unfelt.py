@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from systems import basis
+from systems import TURN, basis
 
 from fecontact import (
     ContactSystem,
@@ -117,7 +117,7 @@ def test_reversal_on_a_belt_whose_speed_changes():
     """As above, with a belt whose speed swings: bounds on its speed, not polynomials."""
     for phase in np.linspace(0.0, 1.2, 25):
         system, start = sliding(1e-4, 0.1, phase)
-        system = system.with_(ground=Ground(speed=1.0, motion=HarmonicSpeed(1e-5, 0.3)))
+        system = system.with_(ground=Ground(speed=1.0, motion=HarmonicSpeed(1e-5, 0.3 / TURN)))
         coarse, fine = (simulate(system, 3.0 - phase, initial=start, outputs=101, rtol=1e-5,
                                  max_step=step) for step in (None, 1e-3))
         assert coarse.states == pytest.approx(fine.states, abs=2e-5)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from meshes_for_tests import rectangle
-from systems import friction_oscillator
+from systems import TURN, friction_oscillator
 
 from fecontact import (
     AnalysisError,
@@ -100,7 +100,7 @@ def test_elastic_and_creeping_contacts_wear_nothing():
     x = [[1.0], [0.0], [0.0]]
     point = basis_from_matrices([[1.0]], [[0.0]], {"contact": [x], "C": x})
     for friction in (JenkinsFriction(1e5, 0.4), ExponentialFriction(0.4, 0.4, 0.0, 1e4)):
-        push = Load(forces=(PointLoad("C", "x", signal=Harmonic(4.0, 5.0)),))
+        push = Load(forces=(PointLoad("C", "x", signal=Harmonic(4.0, 5.0 / TURN)),))
         run = simulate(ContactSystem(point, normal=PrescribedForce(20.0), friction=friction,
                                      load=push), 2.0)
         for law in (EnergyWear(1e-9), ArchardWear(1e-9)):
@@ -180,7 +180,7 @@ def beam():
     return ContactSystem(
         basis, normal=RoughSurface(5e7, 1e-5, 2e3), friction=ConstantFriction(MU, 1e4),
         drive=Drive(stiffness_x=2e6, damping_x=200.0, amplitude_x=2e-4,
-                    angular_frequency=2.0 * np.pi * 20.0), load=Load(400.0))
+                    frequency_hz=20.0), load=Load(400.0))
 
 
 def test_pressure_below_a_loaded_beam_evens_out(beam, tmp_path):
@@ -218,7 +218,7 @@ def test_an_impacting_mass_wears_without_an_equilibrium():
     """Nothing presses it on the ground: the gap opens under it, and the run goes on."""
     oscillator = slider(gap=1e-4, load=Load(0.0), drive=Drive(
         stiffness_y=2e4, damping_y=5.0, stiffness_x=1e5, damping_x=100.0, amplitude_y=4e-4,
-        angular_frequency=60.0), ground=Ground(speed=V))
+        frequency_hz=60.0 / TURN), ground=Ground(speed=V))
     history = wear_history(oscillator, EnergyWear(1e-13), THICKNESS, acceleration=10.0, blocks=2,
                            periods=2)
     assert history.depth[-1].min() > 0.0

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from systems import TURN
 
 from fecontact import Drive, Ground, InputError, Load, PointLoad
 from fecontact.laws import (
@@ -68,19 +69,19 @@ def test_flat_ground():
 
 
 def test_drive():
-    drive = Drive(10.0, 20.0, 1.0, 2.0, 0.5e-3, -0.47e-3, 13.8)
+    drive = Drive(10.0, 20.0, 1.0, 2.0, 0.5e-3, -0.47e-3, 13.8 / TURN)
     for motion, amplitude in zip(drive.motions, (0.5e-3, -0.47e-3, 0.0), strict=True):
         for t in (0.0, 0.1, 3.3):
             value, rate = motion.kernel.python(t, motion.parameters())
             assert value == pytest.approx(amplitude * math.sin(13.8 * t), abs=1e-18)
             assert rate == pytest.approx(amplitude * 13.8 * math.cos(13.8 * t), abs=1e-16)
-    assert drive.frequency_hz == pytest.approx(13.8 / (2.0 * math.pi), rel=1e-15)
+    assert drive.fundamental_hz == pytest.approx(13.8 / TURN, rel=1e-15)
 
 
 MOTIONS = [
     None,
-    HarmonicSpeed(0.7, 5.0, 0.4),
-    HarmonicSpeed(0.2, 5.0, -1.0),
+    HarmonicSpeed(0.7, 5.0 / TURN, 0.4),
+    HarmonicSpeed(0.2, 5.0 / TURN, -1.0),
     SpeedRamp(1.5, 0.5, 2.0),
     SpeedRamp(-0.6, -1.0, 1.7),
 ]
@@ -104,10 +105,10 @@ def test_speeds_by_hand():
     assert ramp.travel(3.0) == pytest.approx(0.15 + 0.9 * 2.0 + 0.75, rel=1e-14)
     assert ramp.breakpoints(0.0, 9.0) == (0.5, 2.5)
     assert ramp.breakpoints(0.5, 2.0) == ()
-    swing = Ground(speed=0.3, motion=HarmonicSpeed(0.7, 5.0, 0.4))
+    swing = Ground(speed=0.3, motion=HarmonicSpeed(0.7, 5.0 / TURN, 0.4))
     assert swing.velocity(0.1) == pytest.approx(0.3 + 0.7 * math.sin(0.9), rel=1e-15)
     # A small travel is not lost against the terms whose difference it is.
-    slow = Ground(motion=HarmonicSpeed(1.0, 1e-6, 0.5 * math.pi))
+    slow = Ground(motion=HarmonicSpeed(1.0, 1e-6 / TURN, 0.5 * math.pi))
     assert slow.travel(1e-3) == pytest.approx(1e-3, rel=1e-12)
 
 
@@ -168,21 +169,19 @@ def test_variation_that_reaches_zero_friction():
 
 def test_motions_of_the_drive():
     shake = SweptSine(1e-3, 1.0, 50.0, 10.0)
-    drive = Drive(10.0, 20.0, motion_x=shake, amplitude_y=1e-4, angular_frequency=6.0)
-    assert drive.motions == (shake, Harmonic(1e-4, 6.0), Harmonic(0.0, 6.0))
-    assert drive.frequency_hz == pytest.approx(6.0 / (2.0 * math.pi))
-    assert Drive(motion_x=shake).frequency_hz == 0.0
-    # An angular frequency without an amplitude moves nothing beside a given motion.
-    assert Drive(motion_x=shake, angular_frequency=6.0).frequency_hz == 0.0
-    assert Drive(motion_y=Harmonic(1.0, 3.0), angular_frequency=6.0).frequency_hz == pytest.approx(
-        3.0 / (2.0 * math.pi))
-    assert Drive(angular_frequency=6.0).frequency_hz == pytest.approx(6.0 / (2.0 * math.pi))
-    assert Drive(motion_y=Harmonics((1.0, 1.0), (3.0, 6.0))).frequency_hz == pytest.approx(
-        3.0 / (2.0 * math.pi))
+    drive = Drive(10.0, 20.0, motion_x=shake, amplitude_y=1e-4, frequency_hz=6.0 / TURN)
+    assert drive.motions == (shake, Harmonic(1e-4, 6.0 / TURN), Harmonic(0.0, 6.0 / TURN))
+    assert drive.fundamental_hz == 6.0 / TURN
+    assert Drive(motion_x=shake).fundamental_hz == 0.0
+    # A frequency without an amplitude moves nothing beside a given motion.
+    assert Drive(motion_x=shake, frequency_hz=6.0).fundamental_hz == 0.0
+    assert Drive(motion_y=Harmonic(1.0, 3.0), frequency_hz=6.0).fundamental_hz == 3.0
+    assert Drive(frequency_hz=6.0).fundamental_hz == 6.0
+    assert Drive(motion_y=Harmonics((1.0, 1.0), (3.0, 6.0))).fundamental_hz == 3.0
 
 
 def test_loads_at_points():
-    force = PointLoad("B", "x", signal=Harmonic(2.0, 3.0))
+    force = PointLoad("B", "x", signal=Harmonic(2.0, 3.0 / TURN))
     load = Load(5.0, [force, PointLoad(3, "phi", signal=Constant(1.0))])
     assert load.forces[0] is force
     assert load == Load(5.0, (force, PointLoad(3, "phi", signal=Constant(1.0))))
@@ -200,7 +199,7 @@ def test_loads_at_points():
     (Drive, {"stiffness_x": -1.0}, r"Drive: stiffness_x = -1\.0"),
     (Drive, {"stiffness_y": float("inf")}, "stiffness_y = inf"),
     (Drive, {"damping_x": -1e-3}, "damping_x"), (Drive, {"damping_y": -1e-3}, "damping_y"),
-    (Drive, {"angular_frequency": -1.0}, "angular_frequency"),
+    (Drive, {"frequency_hz": -1.0}, "frequency_hz"),
     (Drive, {"amplitude_x": float("nan")}, "Drive: amplitude_x = nan must be finite"),
     (Drive, {"amplitude_y": float("inf")}, "amplitude_y = inf"),
     (Load, {"normal": float("nan")}, "Load: normal = nan must be finite"),
@@ -213,14 +212,14 @@ def test_loads_at_points():
     (Ground, {"profile": "sine"}, "Ground: profile = 'sine' must be a Profile"),
     (Ground, {"motion": Constant(1.0)}, "motion = .* must be a GroundMotion"),
     (Ground, {"friction_variation": 0.1}, r"friction_variation = 0\.1 must be a Profile"),
-    (HarmonicSpeed, {"amplitude": 1.0, "angular_frequency": 0.0}, r"angular_frequency = 0\.0"),
-    (HarmonicSpeed, {"amplitude": None, "angular_frequency": 1.0}, "amplitude = None"),
+    (HarmonicSpeed, {"amplitude": 1.0, "frequency_hz": 0.0}, r"frequency_hz = 0\.0"),
+    (HarmonicSpeed, {"amplitude": None, "frequency_hz": 1.0 / TURN}, "amplitude = None"),
     (SpeedRamp, {"end_speed": 1.0, "start": 0.0, "duration": 0.0}, r"SpeedRamp: duration = 0\.0"),
     (SpeedRamp, {"end_speed": float("nan"), "start": 0.0, "duration": 1.0}, "end_speed = nan"),
     (Drive, {"amplitude_x": 1.0, "motion_x": Constant(1.0)}, r"amplitude_x = 1\.0 cannot be com"),
     (Drive, {"motion_y": 3.0}, r"Drive: motion_y = 3\.0 must be a Signal"),
-    (Drive, {"motion_x": Constant(), "motion_y": Constant(), "angular_frequency": 2.0},
-     r"angular_frequency = 2\.0 has no effect"),
+    (Drive, {"motion_x": Constant(), "motion_y": Constant(), "frequency_hz": 2.0},
+     r"frequency_hz = 2\.0 has no effect"),
     (PointLoad, {"component": "w", "signal": Constant()}, "component = 'w' must be one of 'phi'"),
     (PointLoad, {"component": (0.0, 0.0), "signal": Constant()},
      r"component = \(0\.0, 0\.0\) must be longer than zero"),

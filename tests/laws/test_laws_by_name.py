@@ -33,7 +33,7 @@ GIVEN = REQUIRED | {
     "decay_length": 1e-6, "nominal_area": 1e-4, "coefficient": 1e-9, "asperities": 1e4,
     "asperity_radius": 1e-5, "composite_modulus": 1e11, "height_deviation": 1e-6,
     "clearance": 1e-4, "wavelength": 1e-2, "amplitude": 1e-6, "amplitudes": (1e-6, 2e-6),
-    "phases": (0.1, 0.2), "angular_frequencies": (10.0, 20.0), "angular_frequency": 10.0,
+    "phases": (0.1, 0.2), "frequencies_hz": (10.0, 20.0), "frequency_hz": 10.0,
     "start_frequency_hz": 1.0, "end_frequency_hz": 10.0, "duration": 2.0, "end_speed": 0.2,
     "times": (0.0, 1.0, 2.0), "values": (0.0, 1.0, 0.0), "abscissae": (0.0, 1e-3, 2e-3, 3e-3),
     "abscissa": (0.0, 1e-3, 2e-3, 3e-3), "heights": (0.0, 1e-6, -1e-6, 0.0), "value": 1.0,
@@ -240,7 +240,7 @@ component = "x"
 [load.forces.signal]
 law = "harmonic"
 amplitude = 2.0
-angular_frequency = 30.0
+frequency_hz = 5.0
 """)
     study = Study.read(path)
     assert isinstance(study.ground.profile, Profile)

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from systems import TURN
 
 from fecontact import InputError
 from fecontact.laws import (
@@ -30,8 +31,8 @@ CLOSED = np.append(VALUES[:-1], VALUES[0])
 
 SIGNALS = {
     "constant": Constant(-3.0),
-    "harmonic": Harmonic(0.5e-3, 13.8, 0.4),
-    "harmonics": Harmonics((1.0, -0.5, 0.2), (3.0, 7.0, 0.0), (0.1, 0.2, 0.3)),
+    "harmonic": Harmonic(0.5e-3, 13.8 / TURN, 0.4),
+    "harmonics": Harmonics((1.0, -0.5, 0.2), (3.0 / TURN, 7.0 / TURN, 0.0), (0.1, 0.2, 0.3)),
     "linear sweep": SweptSine(2.0, 1.0, 20.0, 1.5),
     "falling sweep": SweptSine(2.0, 20.0, 0.0, 1.5),
     "logarithmic sweep": SweptSine(2.0, 1.0, 20.0, 1.5, "logarithmic"),
@@ -104,30 +105,31 @@ def test_signals_are_values(given):
 
 
 def test_frequency_is_that_of_repetition(given):
-    if given.frequency_hz is None:
+    if given.fundamental_hz is None:
         return
     t = np.linspace(0.0, 1.0, 50)
-    np.testing.assert_allclose(given.history(t + 3.0 / given.frequency_hz), given.history(t),
+    np.testing.assert_allclose(given.history(t + 3.0 / given.fundamental_hz), given.history(t),
                                rtol=0, atol=1e-11 * np.abs(given.history(t)).max())
 
 
 def test_harmonics_by_hand():
-    assert Harmonic(2.0, 3.0, 0.5).history(0.7)[0] == pytest.approx(
+    assert Harmonic(2.0, 3.0 / TURN, 0.5).history(0.7)[0] == pytest.approx(
         (2.0 * math.sin(2.6), 6.0 * math.cos(2.6)), rel=1e-15)
-    both = Harmonics((2.0, 0.5), (3.0, 6.0), (0.5, 0.0))
+    both = Harmonics((2.0, 0.5), (3.0 / TURN, 6.0 / TURN), (0.5, 0.0))
     t = np.linspace(-3.0, 3.0, 41)
     np.testing.assert_allclose(
-        both.history(t), Harmonic(2.0, 3.0, 0.5).history(t) + Harmonic(0.5, 6.0).history(t),
+        both.history(t),
+        Harmonic(2.0, 3.0 / TURN, 0.5).history(t) + Harmonic(0.5, 6.0 / TURN).history(t),
         atol=1e-14)
-    assert both.frequency_hz == pytest.approx(3.0 / (2.0 * math.pi), rel=1e-15)
+    assert both.fundamental_hz == pytest.approx(3.0 / (2.0 * math.pi), rel=1e-15)
     assert both.shortest_period == pytest.approx(2.0 * math.pi / 6.0, rel=1e-15)
     assert both.largest == 2.5
-    assert SIGNALS["harmonics"].frequency_hz is None
+    assert SIGNALS["harmonics"].fundamental_hz is None
     assert SIGNALS["harmonics"].shortest_period == pytest.approx(2.0 * math.pi / 7.0, rel=1e-15)
-    assert Harmonics((1.0,), (5.0,)) == Harmonics([1], np.array([5.0]))
-    for still in (Harmonic(1.0, 0.0, 0.3), Harmonic(0.0, 2.0), Constant(1.0)):
+    assert Harmonics((1.0,), (5.0 / TURN,)) == Harmonics([1], np.array([5.0]) / TURN)
+    for still in (Harmonic(1.0, 0.0, 0.3), Harmonic(0.0, 2.0 / TURN), Constant(1.0)):
         assert still.shortest_period is None
-        assert still.frequency_hz is None
+        assert still.fundamental_hz is None
 
 
 @pytest.mark.parametrize("name", ["linear sweep", "falling sweep", "logarithmic sweep"])
@@ -157,7 +159,7 @@ def test_frequency_of_a_sweep():
     assert linear.history(crossing)[0, 0] == pytest.approx(0.0, abs=1e-13)
     still = SweptSine(1.0, 5.0, 5.0, 2.0, "logarithmic").history(np.linspace(0.0, 3.0, 31))
     np.testing.assert_allclose(
-        still, Harmonic(1.0, 10.0 * math.pi).history(np.linspace(0.0, 3.0, 31)), atol=1e-12)
+        still, Harmonic(1.0, 10.0 * math.pi / TURN).history(np.linspace(0.0, 3.0, 31)), atol=1e-12)
 
 
 @pytest.mark.parametrize(("name", "middle", "impulse"), [
@@ -202,13 +204,13 @@ def test_tables_hold_or_repeat_outside():
         np.testing.assert_array_equal(table.history([-9.0, TIMES[0] - 1e-9]), [[first, 0.0]] * 2)
         np.testing.assert_allclose(table.history([TIMES[-1] + 1e-9, 99.0]), [[last, 0.0]] * 2,
                                    rtol=1e-13)
-        assert table.frequency_hz is None
+        assert table.fundamental_hz is None
     for name in ("repeated lines", "repeated curve"):
         table = SIGNALS[name]
         for k in (-2, 5):
             np.testing.assert_allclose(table.history(t + k * period)[:, 0], table.history(t)[:, 0],
                                        atol=1e-11)
-        assert table.frequency_hz == pytest.approx(1.0 / period, rel=1e-15)
+        assert table.fundamental_hz == pytest.approx(1.0 / period, rel=1e-15)
 
 
 def test_lines_are_those_of_interpolation():
@@ -280,7 +282,7 @@ def test_step():
     assert step.history([0.0, np.nextafter(0.4, 0.0), 0.4, 1.0])[:, 0].tolist() == [0, 0, 3, 3]
     assert step.breakpoints(0.0, 1.0) == (0.4,)
     assert step.breakpoints(0.4, 1.0) == ()
-    assert (step.largest, step.shortest_period, step.frequency_hz) == (3.0, None, None)
+    assert (step.largest, step.shortest_period, step.fundamental_hz) == (3.0, None, None)
     with pytest.raises(InputError, match="Step: value = inf"):
         Step(0.0, float("inf"))
 
@@ -315,12 +317,12 @@ def test_signal_of_ones_own():
 @pytest.mark.parametrize(("make", "message"), [
     (lambda: Constant(float("nan")), "Constant: value = nan"),
     (lambda: Constant("much"), "Constant: value = 'much'"),
-    (lambda: Harmonic(1.0, -2.0), r"Harmonic: angular_frequency = -2\.0"),
-    (lambda: Harmonic(1.0, 2.0, None), "Harmonic: phase = None"),
+    (lambda: Harmonic(1.0, -2.0), r"Harmonic: frequency_hz = -2\.0"),
+    (lambda: Harmonic(1.0, 2.0 / TURN, None), "Harmonic: phase = None"),
     (lambda: Harmonics((), ()), "Harmonics: amplitudes has 0 values; at least 1"),
-    (lambda: Harmonics((1.0, 2.0), (1.0,)), "angular_frequencies has 1 values for 2 amplitudes"),
+    (lambda: Harmonics((1.0, 2.0), (1.0,)), "frequencies_hz has 1 values for 2 amplitudes"),
     (lambda: Harmonics((1.0,), (1.0,), (1.0, 2.0)), "phases has 2 values for 1 amplitudes"),
-    (lambda: Harmonics((1.0,), (-1.0,)), r"angular_frequencies\[0\] = -1\.0 must"),
+    (lambda: Harmonics((1.0,), (-1.0,)), r"frequencies_hz\[0\] = -1\.0 must"),
     (lambda: SweptSine(1.0, -1.0, 2.0, 1.0), r"SweptSine: start_frequency_hz = -1\.0"),
     (lambda: SweptSine(1.0, 0.0, 2.0, 1.0, "logarithmic"), r"SweptSine: start_frequency_hz = 0\.0"),
     (lambda: SweptSine(1.0, 1.0, 2.0, 0.0), r"SweptSine: duration = 0\.0"),

@@ -122,7 +122,7 @@ def test_phases_do_not_leap_about_180_degrees(trajectory):
 
 def test_every_kind_is_drawn_from_a_stored_run(trajectory, tmp_path, capsys):
     system = trajectory.system.with_(drive=Drive(stiffness_x=1e5, amplitude_x=1e-5,
-                                                 angular_frequency=2.0 * np.pi * 200.0))
+                                                 frequency_hz=200.0))
     case = write_case(tmp_path / "beam.vtkhdf", simulate(system, 0.06, outputs=2401), frames=0)
     for kind in plot_kinds.KINDS:
         assert execute(["plot", str(case), kind, "--t-start", "0.002"]) == 0

@@ -100,7 +100,7 @@ def test_the_command(runs, tmp_path, monkeypatch, capsys):
     assert "compare takes two files or more, not 1" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("over", ["drive.angular_frequency", "ground.speed"])
+@pytest.mark.parametrize("over", ["drive.frequency_hz", "ground.speed"])
 def test_responses_and_branches_over_each_other(over, tmp_path, capsys):
     """Files of two studies: the value that differs stands in the table, the curves in a picture."""
     if over == "ground.speed":

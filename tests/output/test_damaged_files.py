@@ -12,6 +12,7 @@ import pytest
 import response_study
 from sweep_study import Serial, write_study
 from synthetic import basis, run
+from systems import TURN
 
 from fecontact import InputError, read_case, sweep, write_case
 from fecontact.bifurcation import (
@@ -389,7 +390,7 @@ def test_arrays_that_a_file_does_not_hold(tmp_path):
 def response(tmp_path_factory):
     """A small response, whose orbits are Fourier coefficients, with the study that it is of."""
     described = response_study.study()
-    found = frequency_response(described.system(), (50.0, 55.0),
+    found = frequency_response(described.system(), (50.0 / TURN, 55.0 / TURN),
                                method=HarmonicBalance(3, 32))
     return write_response(tmp_path_factory.mktemp("response") / "response.h5", found,
                           system=described.system(), study=response_study.STUDY)

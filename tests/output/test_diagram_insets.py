@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from systems import impact_oscillator
+from systems import TURN, impact_oscillator
 
 from fecontact import AnalysisError, InputError
 from fecontact.bifurcation import (
@@ -64,19 +64,19 @@ def test_phase_planes_stand_in_the_order_of_their_places(tmp_path):
 
 def test_phase_plane_of_an_orbit():
     """y = a cos(w t) is an ellipse with the half axes a and a w."""
-    w, a = 64.0, 2e-4
-    field = contact_field(impact_oscillator(2), {"drive.angular_frequency": None})
+    w, a = 10.0 * TURN, 2e-4
+    field = contact_field(impact_oscillator(2), {"drive.frequency_hz": None})
     y = field.displacement_row("B", "y")[:2]
     t = 2.0 * np.pi / w * np.arange(80) / 80.0
     q = a * y / (y @ y)
     nodes = np.concatenate([np.cos(w * t)[:, None] * q, -w * np.sin(w * t)[:, None] * q], axis=1)
     values = {"mesh": np.linspace(0.0, 1.0, 21), "period": 2.0 * np.pi / w, "stable": False,
               "minimum": nodes.min(axis=0), "maximum": nodes.max(axis=0)}
-    branch = Branch("drive.angular_frequency", (
-        BranchPoint(np.append(nodes.ravel(), w), np.zeros(nodes.size + 1), values),), attributes={
-            "periods": 1, "degree": 4, "parameter_values": np.array([w])})
+    point = BranchPoint(np.append(nodes.ravel(), 10.0), np.zeros(nodes.size + 1), values)
+    branch = Branch("drive.frequency_hz", (point,), attributes={
+        "periods": 1, "degree": 4, "parameter_values": np.array([10.0])})
     inset = phase_inset(field, branch.points[0], observe=("B", "y"))
-    assert inset.title == "drive.angular_frequency = 64"
+    assert inset.title == "drive.frequency_hz = 10"
     assert inset.displacement[0] == pytest.approx(a, rel=1e-12)
     assert (inset.displacement / a)**2 + (inset.velocity / (a * w))**2 == pytest.approx(
         np.ones(len(inset.velocity)), abs=1e-5)
@@ -110,7 +110,7 @@ def test_densities_of_scans(tmp_path):
     shape = system.basis.T[0, 1, 0]
     y = np.array([[1e-4, 1e-4, 1e-4], [1e-4, 2e-4, 2e-4], [np.nan, np.nan, 3e-4]]) / shape
     up = np.stack([y, np.zeros((3, 3))], axis=2)
-    found = PoincareScan(system, "drive.angular_frequency", np.array([60.0, 61.0, 63.0]), up,
+    found = PoincareScan(system, "drive.frequency_hz", np.array([60.0, 61.0, 63.0]), up,
                          up[:1, :0])
     for each in (replace(found, down=up), replace(found, down=up[:, :0])):
         axis = plot_poincare_scan(each, "B", "y", y_label="y [m]").axes[0]
@@ -124,8 +124,7 @@ def test_densities_of_scans(tmp_path):
         middles = 0.5 * (rows[1:] + rows[:-1])[height]
         assert middles == pytest.approx([1e-4, 1e-4, 2e-4, 3e-4], abs=2e-7)
         assert cells.T[column, height] == pytest.approx([1.0, 1.0 / 3.0, 2.0 / 3.0, 1.0])
-        assert (axis.get_xlabel(), axis.get_ylabel()) == ("drive angular frequency [rad/s]",
-                                                          "y [µm]")
+        assert (axis.get_xlabel(), axis.get_ylabel()) == ("drive frequency [Hz]", "y [µm]")
     with pytest.raises(AnalysisError, match="no run of the diagram could go on"):
         plot_poincare_scan(replace(found, up=np.nan * up))
     with pytest.raises(InputError, match="must end in"):
@@ -137,7 +136,7 @@ def test_columns_hold_several_of_many_values():
     system = impact_oscillator(1)
     values = np.linspace(60.0, 61.0, 5000)
     up = np.tile((values - 60.0)[:, None, None] / system.basis.T[0, 1, 0], (1, 2, 2))
-    found = PoincareScan(system, "drive.angular_frequency", values, up, up[:, :0])
+    found = PoincareScan(system, "drive.frequency_hz", values, up, up[:, :0])
     mesh = plot_poincare_scan(found).axes[0].collections[0]
     cells = np.ma.filled(mesh.get_array(), 0.0)
     assert 800 < cells.shape[1] <= 1600
@@ -152,7 +151,7 @@ def test_basins_of_a_system(tmp_path):
                    (Axis("B", "y", "velocity"), [-0.01, 0.02]), transient_periods=60, keep=4)
     plot_basins(found, path=tmp_path / "basins.png")
     assert (tmp_path / "basins.png").stat().st_size > 5_000
-    runs = poincare_scan(impact_oscillator(2), "drive.angular_frequency", [64.0, 65.0],
+    runs = poincare_scan(impact_oscillator(2), "drive.frequency_hz", [10.2, 10.3],
                          transient_periods=60, keep=2, initial=np.zeros(4))
     assert len(plot_branches([BRANCH], "observed_section", beneath=runs,
                              observe=("B", "y")).axes[0].lines) == 4

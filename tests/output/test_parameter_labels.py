@@ -15,7 +15,7 @@ from fecontact.io import read_branches, write_branches
 from fecontact.laws import Constant, Harmonic
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.parameter_labels import branch_label, name_axis
-from fecontact.output.plots.responses.response import frequency_axis, level_texts
+from fecontact.output.plots.responses.response import level_texts
 from fecontact.plot import plot_branches, plot_eigenvalues, plot_sweep
 from fecontact.sweeps import SweepTable
 from fecontact.system.parameter_labels import _classes, _units_of, parameter_label
@@ -24,7 +24,7 @@ from fecontact.system.parameter_labels import _classes, _units_of, parameter_lab
 @pytest.mark.parametrize(("name", "label"), [
     ("ground.speed", "ground speed [m/s]"),
     ("ground.profile.amplitude", "ground profile amplitude [m]"),
-    ("drive.angular_frequency", "drive angular frequency [rad/s]"),
+    ("drive.frequency_hz", "drive frequency [Hz]"),
     ("interfaces.SOLE.friction.smoothing_slope", "SOLE friction smoothing slope [s/m]"),
     ("normal.roughness_height", "normal roughness height [m]"),
     ("load.normal", "load normal [N]"),
@@ -45,19 +45,17 @@ def test_forces_are_named_by_their_place_and_direction():
     system = SimpleNamespace(load=Load(forces=forces))
     name = "load.forces.0.signal"
     assert parameter_label(f"{name}.amplitude", system=system) == "force at B x [N]"
-    assert parameter_label(f"{name}.angular_frequency", system=system) == (
-        "angular frequency of the force at B x [rad/s]")
+    assert parameter_label(f"{name}.frequency_hz", system=system) == (
+        "frequency of the force at B x [Hz]")
     assert parameter_label("load.forces.1.signal.amplitude", system=system) == (
         "moment at C phi [N m]")
     assert parameter_label(f"{name}.amplitude") == "amplitude of force 0"
     assert parameter_label("load.forces.2.signal.amplitude", system=system) == (
         "force at contact node 3 y [N]")
     response = SimpleNamespace(
-        parameter_name=f"{name}.angular_frequency", level_name=f"{name}.amplitude",
-        levels=np.array([0.5, 2e3]), branches=[Branch(f"{name}.angular_frequency", (), attributes={
-            "labels": ("angular frequency of the force at B x [rad/s]",),
+        level_name=f"{name}.amplitude", levels=np.array([0.5, 2e3]),
+        branches=[Branch(f"{name}.frequency_hz", (), attributes={
             "level_label": "force at B x [N]"})])
-    assert frequency_axis(response) == (2.0 * np.pi, "frequency of the force at B x [Hz]")
     assert level_texts(response) == ("force at B x", ["0.0005 kN", "2 kN"])
 
 

@@ -143,7 +143,7 @@ def test_runs_come_back_from_files(run, tmp_path):
 @pytest.mark.parametrize("solver", [
     Rodas5P(), SetValued(), SetValued(static_coefficient=[0.85])])
 def test_runs_of_contact_fields_come_back(solver, tmp_path):
-    field = contact_field(friction_oscillator(), {"drive.angular_frequency": None})
+    field = contact_field(friction_oscillator(), {"drive.frequency_hz": None})
     run = fc.simulate(field, 1.0, initial="rest", solver=solver, events=ContactEvents())
     read = read_run(write_run(tmp_path / "run.h5", run))
     assert len(run.events) > 0

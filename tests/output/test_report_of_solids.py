@@ -8,6 +8,7 @@ import pytest
 from browsing import SOFTWARE_WEBGL, Opened, launched, sync_api
 from matplotlib import colormaps
 from report_reading import Shown
+from systems import TURN
 
 import fecontact as fc
 from fecontact.cli.templates import template
@@ -106,10 +107,9 @@ def test_what_is_stored_is_the_run(trajectory, path):
         k = list(charts).index(title)
         found = shown.array("charts", k, "values")[:, 0] * charts[title]["factor"]
         assert found == pytest.approx(expected, abs=2e-4 * np.abs(expected).max()), title
-    travel = shown.array("ground", "travel")
+    travel, w = shown.array("ground", "travel"), TURN * 47.75
     assert travel[:, 0] == pytest.approx(0.05 * run.time, abs=1e-8)
-    assert travel[:, 1] == pytest.approx(
-        0.05 / 300.0 * (1.0 - np.cos(300.0 * run.time)), abs=1e-8)
+    assert travel[:, 1] == pytest.approx(0.05 / w * (1.0 - np.cos(w * run.time)), abs=1e-8)
     assert not travel[:, 2].any()
 
 

@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 from solid_blocks import block_body
+from systems import TURN
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkFiltersVerdict import vtkCellSizeFilter
 from vtkmodules.vtkIOHDF import vtkHDFReader
@@ -239,7 +240,7 @@ def test_fields_of_a_static_solid_go_to_paraview(tmp_path):
 
 
 SYSTEMS = {
-    "map": {"ground": fc.Ground(speed=0.1, speed_y=-0.3, motion_y=HarmonicSpeed(0.05, 900.0),
+    "map": {"ground": fc.Ground(speed=0.1, speed_y=-0.3, motion_y=HarmonicSpeed(0.05, 900.0 / TURN),
                                 height_map=HeightMap(np.random.default_rng(4).standard_normal(
                                     (5, 7)) * 1e-5 / 3.0, 0.011, 0.013, 0.001, -0.007)),
             "drive": fc.Drive(stiffness_z=1e5 / 3.0, damping_z=7.0, motion_z=Tabulated(
@@ -249,21 +250,21 @@ SYSTEMS = {
     "waves": {"ground": fc.Ground(profile=Sine(1e-5 / 3.0, 0.03), wave_direction=(1.0, 3.0),
                                   friction_variation=Sine(0.1, 0.02), normal="vertical"),
               "drive": fc.Drive(stiffness_x=1e5, stiffness_y=2e5, stiffness_z=3e5,
-                                amplitude_z=1e-6, amplitude_y=2e-6, angular_frequency=300.0,
+                                amplitude_z=1e-6, amplitude_y=2e-6, frequency_hz=300.0 / TURN,
                                 dashpots="relative", damping_y=3.0),
               "load": fc.Load(
-                  gravity=(0.1, 0.2, -9.81), base_acceleration_z=fc.laws.Harmonic(1.0, 70.0),
+                  gravity=(0.1, 0.2, -9.81), base_acceleration_z=fc.laws.Harmonic(1.0, 70.0 / TURN),
                   forces=(fc.PointLoad((0.1, 0.05, 0.05), "phi_x",
-                                       signal=fc.laws.Harmonic(2.0, 30.0)),
-                          fc.PointLoad(2, "z", signal=fc.laws.Harmonic(1.0, 30.0))),
+                                       signal=fc.laws.Harmonic(2.0, 30.0 / TURN)),
+                          fc.PointLoad(2, "z", signal=fc.laws.Harmonic(1.0, 30.0 / TURN))),
                   boundaries=(fc.BoundaryLoad("top", pressure=1e5, shear=1e3, shear_across=7e3),
                               fc.BoundaryLoad("right", shear_across=fc.laws.Harmonic(
-                                  1e3 / 3.0, 50.0)))),
+                                  1e3 / 3.0, 50.0 / TURN)))),
               "friction": BoucWenFriction(friction_coefficient=0.5, exponent=1.7, beta=0.7,
                                           yield_displacement=5e-6)},
     "sliding": {"sliding": {"contact": SlidingTranslation(0.1, (1.0, 2.0, 0.0))}},
     "sliding in time": {"sliding": {"contact": SlidingRotation(
-        2.0, (0.1, 0.05, 0.3), HarmonicSpeed(0.5, 100.0), axis=(0.0, 0.1, 1.0))}},
+        2.0, (0.1, 0.05, 0.3), HarmonicSpeed(0.5, 100.0 / TURN), axis=(0.0, 0.1, 1.0))}},
 }
 
 

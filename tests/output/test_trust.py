@@ -61,7 +61,7 @@ render = { frames = 2, size = [320, 180] }
 normal = { law = "own.py:Stiff" }
 friction = { law = "frictionless" }
 """
-RESPONSE = ["--hz", "10", "10.5", "--harmonics", "1", "--samples", "64"]
+RESPONSE = ["--bounds", "10", "10.5", "--harmonics", "1", "--samples", "64"]
 MODE = ["--nonlinear", "1", "--amplitudes", "1e-5", "2e-5"]
 
 

@@ -55,7 +55,7 @@ def backbone(system, largest, observe, at, harmonics=4):
     mode = nonlinear_mode(system, (1e-3 * largest, largest), 1, observe=observe,
                           method=HarmonicBalance(harmonics, stability=None))
     assert (np.diff(mode.amplitude) > 0.0).all()
-    return np.interp(at, mode.amplitude, mode.frequency) / mode.frequency[0]
+    return np.interp(at, mode.amplitude, mode.frequency_hz) / mode.frequency_hz[0]
 
 
 @pytest.mark.parametrize(("d", "m"), [(1, 3), (2, 5), (3, 8)])

@@ -232,7 +232,7 @@ ground.motion 3
 drive.amplitude_x nan
 drive.stiffness_x -1
 drive.damping_x -1
-drive.angular_frequency nan
+drive.frequency_hz nan
 drive.motion_x 3
 drive.motion_x {law="tabulated",times=[0,1],values=[1]}
 drive.motion_x {law="swept-sine"}

@@ -50,7 +50,7 @@ def in_python(points=None, links=()):
         interfaces=[fc.Interface("lining", pairing, RoughSurface(20e6, 10e-6, 200.0),
                                  ConstantFriction(0.4, smoothing_slope=1e4))],
         links=links or None,
-        drive=fc.Drive(stiffness_x=2e5, damping_x=20.0, amplitude_x=1e-3, angular_frequency=62.8),
+        drive=fc.Drive(stiffness_x=2e5, damping_x=20.0, amplitude_x=1e-3, frequency_hz=10.0),
         load=fc.Load(normal=200.0))
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 import fecontact as fc
 from fecontact.cli.templates import template
@@ -122,7 +123,7 @@ def test_a_solid_on_a_belt_runs_as_in_python():
     system = fc.ContactSystem(
         basis, normal=RoughSurface(40e6, 10e-6, 200.0),
         friction=ExponentialFriction(0.6, 0.35, decay=10.0, smoothing_slope=1e4),
-        ground=fc.Ground(speed=0.05, motion_y=HarmonicSpeed(0.05, 300.0)),
+        ground=fc.Ground(speed=0.05, motion_y=HarmonicSpeed(0.05, 47.75)),
         drive=fc.Drive(stiffness_x=2e5, damping_x=5.0, stiffness_y=2e5, damping_y=5.0),
         load=fc.Load(normal=200.0, gravity=(0.0, 0.0, -9.81)))
     run = study.run()
@@ -284,7 +285,7 @@ simulation = { t_end = 1e-4, outputs = 3 }
 @pytest.mark.parametrize(("changes", "message"), [
     ({"ground.speed_y": 0.1}, r"\[ground\]: speed_y = 0\.1 is for solids, but the body is plane; "
                               r"leave it out, or make a solid"),
-    ({"ground.motion_y": {"law": "harmonic-speed", "amplitude": 1.0, "angular_frequency": 1.0}},
+    ({"ground.motion_y": {"law": "harmonic-speed", "amplitude": 1.0, "frequency_hz": 1.0 / TURN}},
      r"\[ground\]: motion_y = .* is for solids"),
     ({"ground.rotation_speed": 1.0}, r"\[ground\]: rotation_speed = 1\.0 is for solids"),
     ({"ground.wave_direction": [0.0, 2.0]}, r"wave_direction = \[0\.0, 1\.0\] is for solids"),

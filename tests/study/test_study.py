@@ -6,6 +6,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from systems import TURN
 
 from fecontact import (
     BoundaryLoad,
@@ -455,7 +456,7 @@ loads = ["gravity", "top", [0.15, 0.012]]
 
 [load]
 gravity = [0.0, -9.81]
-base_acceleration_x = { law = "harmonic", amplitude = 3.0, angular_frequency = 500.0 }
+base_acceleration_x = { law = "harmonic", amplitude = 3.0, frequency_hz = 80.0 }
 
 [[load.boundaries]]
 boundary = "top"
@@ -564,7 +565,7 @@ def test_a_decimal_comma_is_recognised(tiny):
     ({"gap": 50.0}, "no contact can close: the smallest gap is 50 m"),
     ({"gap": 50.0, "simulation.t_end": 2.0}, "smallest gap of 50 m is more than 100 times"),
     ({"simulation.t_end": 1e5}, "periods of the fastest mode"),
-    ({"drive.amplitude_x": 1e-6, "drive.stiffness_x": 1.0, "drive.angular_frequency": 1e11},
+    ({"drive.amplitude_x": 1e-6, "drive.stiffness_x": 1.0, "drive.frequency_hz": 1e11 / TURN},
      r"lasts 1\.6e\+07 periods of the fastest of drive")])
 def test_implausible_values_are_warned_of_before_a_run(tiny, changes, message):
     found, = implausible(tiny.with_(**changes))

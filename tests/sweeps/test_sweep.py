@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from sweep_study import Serial, files_below, is_alive, write_study
+from systems import TURN
 
 from fecontact import AnalysisError, InputError, Study, read_case, sweep
 from fecontact.core.files.atomic_write import _MARK
@@ -88,7 +89,7 @@ def test_numbers_of_laws_change_as_they_do_in_the_study(study):
 
 def test_members_of_lists_and_kept_bodies(study):
     force = {"point": "C", "component": "y", "signal": {"law": "harmonic", "amplitude": 1.0,
-                                                        "angular_frequency": 5.0}}
+                                                        "frequency_hz": 5.0 / TURN}}
     loaded = study.with_(**{"load.forces": [force, force]})
     moved = loaded.with_(**{"load.forces.1.signal.amplitude": 3.0})
     assert [one.signal.amplitude for one in moved.load.forces] == [1.0, 3.0]

@@ -130,7 +130,7 @@ ground.speed = [1e-3, 2e-3]
 """)
     text = study.read_text().replace("load = { normal = 14.0 }", """
 load = { normal = 14.0, forces = [{ point = "B", component = "x", signal = { law = "harmonic",
-amplitude = 1.0, angular_frequency = 50.0 } }] }""".replace(",\n", ", "))
+amplitude = 1.0, frequency_hz = 8.0 } }] }""".replace(",\n", ", "))
     study.write_text(text)
     given = ["--set", "simulation.t_end=0.02", "--set", "load.forces.0.signal.amplitude=0.5",
              "--set", "friction.law=constant", "--set", "friction.friction_coefficient=0.7"]

@@ -22,11 +22,11 @@ simulation = { initial = { displacement = [0.0, 1e-4, 0.0] } }
 stiffness_y = 99.085
 damping_y = 0.02046
 amplitude_y = 0.47e-3
-angular_frequency = 64.32
+frequency_hz = 10.236846
 [sweep]
 strobe = { transient_periods = 120, keep = 48, component = "y" }
 [sweep.axes]
-drive.angular_frequency = [64.32, 30.84, 37.41, 23.63]
+drive.frequency_hz = [10.236846, 4.908338, 5.953986, 3.760831]
 """
 
 
@@ -45,7 +45,7 @@ def test_published_regimes_and_the_numbers_of_ensembles(study, tmp_path):
     different = [1 + int((np.diff(np.sort(row)) > 1e-7).sum()) for row in table.strobed]
     assert different[:3] == [1, 2, 4]
     assert different[3] > 40
-    system = study.with_(**{"drive.angular_frequency": 30.84}).system()
+    system = study.with_(**{"drive.frequency_hz": 4.908338}).system()
     start = RigidStart(displacement=(0.0, 1e-4, 0.0))
     alone = strobe(system, transient_periods=120, keep=48, initial=start)
     found = table.strobed[1]
@@ -53,15 +53,15 @@ def test_published_regimes_and_the_numbers_of_ensembles(study, tmp_path):
     assert np.abs(height - found).max() < 1e-4 * np.ptp(found)
     again = read_table(tmp_path / "f/index.csv")
     assert (again.strobed == table.strobed).all()
-    plot_strobed(table, "drive.angular_frequency", path=tmp_path / "s.png")
+    plot_strobed(table, "drive.frequency_hz", path=tmp_path / "s.png")
     assert (tmp_path / "s.png").stat().st_size > 5000
-    one = sweep(study, {"drive.angular_frequency": [30.84]}, Serial(), folder=tmp_path / "one")
+    one = sweep(study, {"drive.frequency_hz": [4.908338]}, Serial(), folder=tmp_path / "one")
     assert one.keys[0] == table.keys[1]
     assert (one.strobed[0] == table.strobed[1]).all()
 
 
 def test_going_on_with_a_strobed_sweep(study, tmp_path):
-    axes = {"drive.angular_frequency": [64.32, 60.0, -1.0, 0.0]}
+    axes = {"drive.frequency_hz": [10.236846, 9.5, -1.0, 0.0]}
     table = sweep(study, axes, Serial(), folder=tmp_path / "f", batch=1,
                   strobe={"transient_periods": 2, "keep": 12, "component": "y"})
     assert list(table.failed) == [2, 3]
@@ -79,7 +79,7 @@ def test_what_cannot_be_strobed(study, tmp_path):
         sweep(study, summaries=["stick_fraction"], executor=Serial(), folder=tmp_path / "f")
     with pytest.raises(InputError, match="keep = 0 must be from 1 to"):
         sweep(study, strobe={"keep": 0}, executor=Serial(), folder=tmp_path / "f")
-    few = sweep(study, {"drive.angular_frequency": [60.0]}, Serial(), folder=tmp_path / "f",
+    few = sweep(study, {"drive.frequency_hz": [9.5]}, Serial(), folder=tmp_path / "f",
                 strobe={"transient_periods": 0, "keep": 3, "component": "y"})
     assert np.isnan(few.values["periods"]).all()
     assert few.strobed[0, 0] == pytest.approx(1e-4, rel=1e-12)  # the start itself

@@ -161,7 +161,7 @@ def test_number_of_periods(run):
         w = 2.0 * np.pi * k
         q[:, 0] += 1e-4 * size * np.sin(w * t)
         rate[:, 0] += 1e-4 * size * w * np.cos(w * t)
-    system = run.system.with_(**{"drive.angular_frequency": 2.0 * np.pi})
+    system = run.system.with_(**{"drive.frequency_hz": 1.0})
     motion = Trajectory(system, t, q, rate, np.zeros((len(t), len(POWERS))))
     assert values(motion, "periods") == {"periods": 2.0}
     assert values(replace(motion, modal_coordinates=q + 1e-5 * t[:, None]), "periods") == {

@@ -38,7 +38,8 @@ class Model:
 
     def drive(self, axis, t):
         """Moving end of the spring at B, and its rate."""
-        w, a = self.values["drive.angular_frequency"], self.values[f"drive.amplitude_{axis}"]
+        w = 2.0 * np.pi * self.values["drive.frequency_hz"]
+        a = self.values[f"drive.amplitude_{axis}"]
         return a * np.sin(w * t), a * w * np.cos(w * t)
 
     def normal(self, j, u, v):

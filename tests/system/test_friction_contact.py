@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 from fecontact import (
     ContactSystem,
@@ -27,7 +28,7 @@ from fecontact.laws import (
 
 KN, KT, MU = 2.0, 1.5, 0.4
 SLOPE = 0.5  # penetration over tangential displacement
-SEEN = "load.forces.0.signal.angular_frequency"
+SEEN = "load.forces.0.signal.frequency_hz"
 
 
 def element(preload):
@@ -44,7 +45,7 @@ def oscillator(preload, force, w=1.1, direction=None):
     rows = {"contact": [row[:, None]], "C": along[:, None]}
     basis = basis_from_matrices([[1.0]], [[1.0]], rows, damping=[[0.04]], dimension=len(along))
     return ContactSystem(basis, normal=element(preload), load=Load(forces=(
-        PointLoad("C", tuple(along), signal=Harmonic(force, w)),
+        PointLoad("C", tuple(along), signal=Harmonic(force, w / TURN)),
         PointLoad("C", tuple(along), signal=SLOPE * preload))))
 
 
@@ -114,7 +115,7 @@ def test_harmonic_balance_of_the_element_agrees_with_the_run(preload):
     system = oscillator(preload, 1.0 + 0.5 * (preload > 1.0))
     field = contact_field(system, [SEEN])
     point = frequency_response(
-        field, (1.1, 1.15), SEEN, observe=("C", "x"), method=HarmonicBalance(
+        field, (1.1 / TURN, 1.15 / TURN), SEEN, observe=("C", "x"), method=HarmonicBalance(
             9, 1024, stability=None), options=ContinuationOptions(points=1)).branches[0].points[0]
     x, *_ = steady_cycle(system)
     assert point.values["observed_amplitude"] == pytest.approx(np.ptp(x) / 2.0, rel=2e-3)

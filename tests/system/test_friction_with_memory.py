@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 from fecontact import ContactSystem, Drive, Ground, Load, basis_from_matrices, simulate
 from fecontact.laws import (
@@ -41,7 +42,7 @@ def block(friction, **changes):
         "normal": RoughSurface(1e6, 10e-6, 20.0), "friction": friction,
         "ground": Ground(speed=5e-3), "load": Load(normal=20.0),
         "drive": Drive(stiffness_x=4000.0, damping_x=1.0, amplitude_x=1e-4,
-                       angular_frequency=30.0)} | changes
+                       frequency_hz=30.0 / TURN)} | changes
     return ContactSystem(basis(), **parts)
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from systems import TURN
 
 from fecontact import (
     AnalysisError,
@@ -175,7 +176,7 @@ def test_one_speed_may_vary_in_time_beside_others_at_rest():
     motion = system.prescribed_motion
     assert motion.velocity(2.0) == pytest.approx([0.4, 0.4, 0.0], rel=1e-14)
     assert system.breakpoints(0.0, 10.0) == (1.0, 3.0)
-    wave = sliding_system(SlidingTranslation(0.3, motion=HarmonicSpeed(0.1, 50.0)))
+    wave = sliding_system(SlidingTranslation(0.3, motion=HarmonicSpeed(0.1, 50.0 / TURN)))
     assert wave.shortest_period(0.0, 1.0) == pytest.approx(2.0 * np.pi / 50.0)
     with pytest.raises(InputError, match="'bush' varies in time while 'the ground' moves too"):
         sliding_system(SlidingTranslation(0.3, motion=SpeedRamp(0.5, 1.0, 2.0)), Ground(speed=1.0))
@@ -183,7 +184,7 @@ def test_one_speed_may_vary_in_time_beside_others_at_rest():
 
 def test_one_body_on_ground_keeps_the_motion_of_the_ground():
     basis = basis_from_matrices(np.eye(2), np.eye(2), {"contact": np.eye(3, 2)[None]})
-    for ground in (Ground(speed=0.5), Ground(), Ground(0.1, motion=HarmonicSpeed(0.2, 3.0))):
+    for ground in (Ground(speed=0.5), Ground(), Ground(0.1, motion=HarmonicSpeed(0.2, 3.0 / TURN))):
         system = ContactSystem(basis, LinearContact(1e5), NO_FRICTION, ground)
         assert system.prescribed_motion.factors.tolist() == [[1.0]]
         base, = system.prescribed_motion.motions

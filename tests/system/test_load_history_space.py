@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from space_systems import chain, circle, dragged, jenkins, node
+from systems import TURN
 
 import fecontact as fc
 from fecontact import AnalysisError, InputError, LoadPath, load_history
@@ -354,8 +355,8 @@ def test_a_slow_run_gives_the_same_loop():
     from fecontact.laws import HarmonicSpeed
     radius, w = 4e-4, 2.0 * np.pi
     system = jenkins(held=1e9, normal=LinearContact(1e6, 200.0), ground=fc.Ground(
-        motion=HarmonicSpeed(radius * w, w, phase=0.5 * np.pi),
-        motion_y=HarmonicSpeed(radius * w, w)))
+        motion=HarmonicSpeed(radius * w, w / TURN, phase=0.5 * np.pi),
+        motion_y=HarmonicSpeed(radius * w, w / TURN)))
     state = np.zeros(system.size)
     state[:3] = fc.equilibrium(system).modal_coordinates
     run = fc.simulate(system, 1.0, initial=state, outputs=101)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from meshes_for_tests import rectangle
+from systems import TURN
 
 import fecontact as fc
 from fecontact import BoundaryLoad, Load, PointLoad
@@ -81,7 +82,7 @@ def test_a_harmonic_base_is_transmitted_as_by_the_closed_form(ratio):
     # Relative motion in the steady state, of base motion base sin(w t).
     relative = base * ratio**2 / (1.0 - ratio**2 + 1j * z)
     times = np.linspace(0.0, 4.0 * np.pi / w, 201)
-    system = oscillator(Load(base_acceleration_x=Harmonic(-base * w**2, w)))
+    system = oscillator(Load(base_acceleration_x=Harmonic(-base * w**2, w / TURN)))
     assert fc.system.forcing_period(system) == pytest.approx(2.0 * np.pi / w, rel=1e-14)
     start = np.array([relative.imag, (1j * w * relative).imag]) * np.sqrt(MASS)
     found = x_of(system, times, start) + base * np.sin(w * times)
@@ -225,10 +226,10 @@ def test_boundary_loads_push_into_the_body_and_run_round_it():
 
 @pytest.mark.parametrize("load", [
     Load(gravity=(0.4, -G), boundaries=[BoundaryLoad("top", Pulse("half-sine", 3e5, 1e-3))]),
-    Load(gravity=(0.0, -G), base_acceleration_x=Harmonic(20.0, 900.0),
+    Load(gravity=(0.0, -G), base_acceleration_x=Harmonic(20.0, 900.0 / TURN),
          base_acceleration_y=Step(2e-3, -30.0)),
-    Load(20.0, boundaries=[BoundaryLoad("left", 1e5, Harmonic(1e5, 2000.0))],
-         forces=[PointLoad((0.03, 0.004), "x", signal=Harmonic(30.0, 3000.0))]),
+    Load(20.0, boundaries=[BoundaryLoad("left", 1e5, Harmonic(1e5, 2000.0 / TURN))],
+         forces=[PointLoad((0.03, 0.004), "x", signal=Harmonic(30.0, 3000.0 / TURN))]),
 ])
 def test_energy_balances_in_contact(load):
     system = beam(load)
@@ -247,7 +248,7 @@ def test_energy_balances_in_contact(load):
 
 
 def test_loads_are_parameters_of_the_system():
-    system = beam(Load(boundaries=[BoundaryLoad("top", 2e4, Harmonic(1.0, 3.0))]))
+    system = beam(Load(boundaries=[BoundaryLoad("top", 2e4, Harmonic(1.0, 3.0 / TURN))]))
     values = system.parameters()
     assert values["load.boundaries.0.pressure"] == 2e4
     assert values["load.boundaries.0.shear.amplitude"] == 1.0
@@ -267,13 +268,13 @@ def driven_mass():
                                    damping=DASHPOT * np.eye(2))
     return fc.ContactSystem(
         basis, normal=LinearContact(1e3, 0.0), friction=ConstantFriction(0.2, smoothing_slope=9.0),
-        load=Load(2.0), drive=fc.Drive(stiffness_x=2.0, amplitude_x=0.1, angular_frequency=5.0))
+        load=Load(2.0), drive=fc.Drive(stiffness_x=2.0, amplitude_x=0.1, frequency_hz=5.0 / TURN))
 
 
 @pytest.mark.parametrize("changes", [
-    {"drive.angular_frequency": 31.0}, {"drive.stiffness_x": 7.0, "drive.amplitude_x": 0.2},
+    {"drive.frequency_hz": 31.0 / TURN}, {"drive.stiffness_x": 7.0, "drive.amplitude_x": 0.2},
     {"drive": fc.Drive(stiffness_y=3.0, damping_x=2.0, dashpots="relative", amplitude_x=0.1,
-                       angular_frequency=4.0)},
+                       frequency_hz=4.0 / TURN)},
     {"load.normal": 12.0}, {"load": Load(5.0), "drive.damping_y": 0.3}])
 def test_a_system_under_another_excitation_is_that_made_anew(changes):
     """It shares what has been checked already; its arrays are those of a new system."""

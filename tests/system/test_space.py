@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 import fecontact as fc
 from fecontact.bifurcation import contact_field
@@ -43,7 +44,7 @@ GROUNDS = {
                           wave_direction=(1.0, 2.0)),
     "map": fc.Ground(speed_y=0.1, height_map=HeightMap(
         2e-4 * np.random.default_rng(3).standard_normal((8, 6)), 0.01, 0.012)),
-    "dither": fc.Ground(speed=0.1, motion_y=HarmonicSpeed(0.05, 900.0)),
+    "dither": fc.Ground(speed=0.1, motion_y=HarmonicSpeed(0.05, 900.0 / TURN)),
 }
 
 
@@ -65,7 +66,7 @@ def system(friction="exponential", ground="flat", **parts):
     return fc.ContactSystem(
         block(), normal=LinearContact(stiffness=4e6, damping=200.0), friction=FRICTION[friction],
         ground=GROUNDS[ground], drive=fc.Drive(stiffness_z=2e3, damping_y=3.0, amplitude_z=1e-4,
-                                               angular_frequency=200.0),
+                                               frequency_hz=200.0 / TURN),
         load=fc.Load(gravity=(0.3, -0.2, -9.81)), **parts)
 
 

@@ -5,7 +5,7 @@ import pytest
 from meshes_for_tests import rectangle
 from model_for_tests import Model
 from scipy.optimize import brentq, minimize
-from systems import mass_in_plane
+from systems import TURN, mass_in_plane
 
 from fecontact import (
     AnalysisError,
@@ -112,7 +112,7 @@ def test_steady_sliding(speed):
 
 def test_drive_is_at_its_mean():
     drive = Drive(stiffness_x=5610.0, stiffness_y=1e5, amplitude_x=0.5e-3, amplitude_y=1e-3,
-                  angular_frequency=13.8)
+                  frequency_hz=13.8 / TURN)
     for time in (0.0, 0.1):
         q = equilibrium(mass_point(drive=drive), time=time).modal_coordinates
         undriven = mass_point(drive=Drive(stiffness_x=5610.0, stiffness_y=1e5))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from meshes_for_tests import rectangle
 from model_for_tests import Model
+from systems import TURN
 
 from fecontact import (
     ContactSystem,
@@ -43,7 +44,7 @@ def random_system(n=3, m=10, seed=0, **parts):
         "normal": RoughSurface(1e6, R, 40.0),
         "friction": ExponentialFriction(0.8, 0.55, 1e3, 1e6),
         "ground": Ground(speed=1e-3, amplitude=20e-6, wavelength=2.5e-3),
-        "drive": Drive(5610.0, 99.0, 0.768, 0.02, 0.5e-3, -0.47e-3, 13.8),
+        "drive": Drive(5610.0, 99.0, 0.768, 0.02, 0.5e-3, -0.47e-3, 13.8 / TURN),
         "load": Load(14.0), "gap": 1e-6, **parts,
     }
     return ContactSystem(random_basis(n, m, seed),
@@ -88,7 +89,7 @@ SYSTEMS = {
     "ground at rest": {"ground": Ground(amplitude=50e-6, wavelength=1e-3)},
     "no drive": {"drive": Drive()},
     "vertical": {"ground": Ground(0.01, 50e-6, 1e-3, normal="vertical")},
-    "dashpots to the base": {"drive": Drive(3e3, 2e3, 0.7, 0.4, 1e-3, 5e-4, 13.8,
+    "dashpots to the base": {"drive": Drive(3e3, 2e3, 0.7, 0.4, 1e-3, 5e-4, 13.8 / TURN,
                                             dashpots="relative")},
     "back": {"ground": Ground(speed=-0.3, amplitude=20e-6, wavelength=2.5e-3)},
     "rising friction": {"friction": ExponentialFriction(0.2, 0.6, 300.0, 1e5)},
@@ -240,7 +241,7 @@ def test_load_presses_down():
 
 
 def test_spring_and_absolute_dashpot_at_the_excitation_point():
-    drive = Drive(stiffness_x=100.0, damping_x=3.0, amplitude_x=0.5, angular_frequency=2.0,
+    drive = Drive(stiffness_x=100.0, damping_x=3.0, amplitude_x=0.5, frequency_hz=2.0 / TURN,
                   stiffness_y=50.0, damping_y=4.0, amplitude_y=0.25)
     system = mass_point(drive=drive)
     for t in (0.0, 0.4, 1.1):
@@ -323,7 +324,7 @@ def test_rigid_modes_feel_the_resultant():
     system = ContactSystem(
         beam(5), normal=RoughSurface(3e6, R, 40.0), ground=Ground(speed=0.01),
         friction=ExponentialFriction(0.8, 0.55, 1e3), load=Load(14.0),
-        drive=Drive(stiffness_x=1e4, damping_x=2.0, amplitude_x=1e-4, angular_frequency=30.0))
+        drive=Drive(stiffness_x=1e4, damping_x=2.0, amplitude_x=1e-4, frequency_hz=30.0 / TURN))
     model = Model(system)
     rng = np.random.default_rng(7)
     t, y = 0.05, rng.standard_normal(16) * np.repeat([1e-6, 1e-3], 8)
@@ -357,7 +358,7 @@ def test_parameters_by_their_dotted_names():
     assert values["ground.speed"] == 1e-3
     assert values["ground.amplitude"] == 20e-6
     assert values["ground.wavelength"] == 2.5e-3
-    assert values["drive.angular_frequency"] == 13.8
+    assert values["drive.frequency_hz"] == 13.8 / TURN
     assert (values["drive.amplitude_x"], values["drive.amplitude_y"]) == (0.5e-3, -0.47e-3)
     assert (values["drive.stiffness_x"], values["drive.stiffness_y"]) == (5610.0, 99.0)
     assert (values["drive.damping_x"], values["drive.damping_y"]) == (0.768, 0.02)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from systems import TURN
 
 from fecontact import (
     ContactSystem,
@@ -74,7 +75,7 @@ def test_free_decay(dimension, how):
 def test_steady_forced_motion_of_a_run():
     w = 1.3
     given = system(damping=1.0, load=Load(forces=(
-        PointLoad("C", "x", signal=Harmonic(amplitude=3.0, angular_frequency=w)),)))
+        PointLoad("C", "x", signal=Harmonic(amplitude=3.0, frequency_hz=w / TURN)),)))
     run = simulate(given, 60.0, rtol=1e-8)
     x = run.states[:, 0] / np.sqrt(MASS)
     last = run.time > 60.0 - 2.0 * np.pi / w
@@ -85,9 +86,9 @@ def test_steady_forced_motion_of_a_run():
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_response_is_the_resonance_of_one_mode(dimension):
     given = system(dimension=dimension, drive=Drive(stiffness_x=1.0, amplitude_x=0.1,
-                                                    angular_frequency=1.0))
-    response = frequency_response(given, (0.5, 5.0))
-    w = response.branches[0].parameter
+                                                    frequency_hz=1.0 / TURN))
+    response = frequency_response(given, (0.5 / TURN, 5.0 / TURN))
+    w = TURN * response.branches[0].parameter
     exact = 0.1 / np.abs(STIFFNESS[0] + 1.0 - MASS * w**2 + 1j * w * DAMPING)
     assert response.amplitude() == pytest.approx(exact, rel=1e-6)
     assert all(point.values["stable"] for point in response.branches[0].points)
@@ -98,11 +99,11 @@ def test_response_is_the_resonance_of_one_mode(dimension):
 def test_steps_grow_with_a_resonance_by_any_method(method):
     """From 0.012 to 4.7 at the peak: scales that stay would make it a way of some hundred steps."""
     given = system(damping=0.01, drive=Drive(stiffness_x=1.0, amplitude_x=0.1,
-                                             angular_frequency=1.0))
+                                             frequency_hz=1.0 / TURN))
     far = ContinuationOptions(step=0.03, largest_step=0.3, points=400)
-    balanced, found = (frequency_response(given, (0.5, 5.0), method=how, options=far)
+    balanced, found = (frequency_response(given, (0.5 / TURN, 5.0 / TURN), method=how, options=far)
                        for how in (HarmonicBalance(), method))
-    w = found.branches[0].parameter
+    w = TURN * found.branches[0].parameter
     assert w[-1] == 5.0
     exact = 0.1 / np.abs(STIFFNESS[0] + 1.0 - MASS * w**2 + 0.01j * w)
     assert found.amplitude() == pytest.approx(exact, rel=1e-5)
@@ -168,7 +169,7 @@ damping = 0.02
 [drive]
 stiffness_x = 1e6
 amplitude_x = 1e-4
-angular_frequency = 3e4
+frequency_hz = 4775.0
 [simulation]
 t_end = 2e-3
 outputs = 501
@@ -232,7 +233,7 @@ stiffness = 1e6
 [drive]
 stiffness_x = 1e6
 amplitude_x = 1e-4
-angular_frequency = 3e4
+frequency_hz = 4775.0
 [simulation]
 t_end = 2e-3
 outputs = 101

@@ -108,7 +108,7 @@ def poincare_scan(
     system : ContactSystem or VectorField
         Excited with one period at every value, unless there is a section.
     parameter : str or function
-        Dotted name of a number of the system, ``"drive.angular_frequency"``, the name of one of
+        Dotted name of a number of the system, ``"drive.frequency_hz"``, the name of one of
         the field, or a function that makes the system for a value, ``(system, value) -> system``;
         for an executor of processes one at the top of a module.
     values : (V,) array

@@ -126,14 +126,14 @@ class ContactField(VectorField):
         return self._base_period if self._constant_period else common_period(self.system(values))
 
     def repeats_with_drive(self, values: Array, index: int) -> bool:
-        """Whether a parameter is the drive's frequency w, and the forcing has the period 2 pi / w.
+        """Whether a parameter is the drive's frequency f, and the forcing has the period 1 / f.
 
         Raises
         ------
         AnalysisError
             If what is given in time is not periodic.
         """
-        name = "drive.angular_frequency"
+        name = "drive.frequency_hz"
         if name in self._family.own or list(self.parameters)[index] != name:
             return False
         return drive_sets_period(self.system() if len(values) == 1 else self.system(values))

@@ -60,7 +60,7 @@ from fecontact.system.statics.equilibrium import equilibrium_coordinates
 
 # Points of a branch at most, and largest step, unless options say so.
 _POINTS, _LARGEST = 2000, 0.03
-_FREQUENCY = "drive.angular_frequency"
+_FREQUENCY = "drive.frequency_hz"
 
 
 @read_only_arrays
@@ -222,9 +222,9 @@ def frequency_response(
     system : ContactSystem or VectorField
         Excited with a common period.
     bounds : (float, float)
-        Range of the parameter [rad/s for a frequency].
+        Range of the parameter [Hz for the frequency of a drive].
     parameter : str, optional
-        Dotted name, by default 'drive.angular_frequency'; the only parameter of a vector field. Any
+        Dotted name, by default 'drive.frequency_hz'; the only parameter of a vector field. Any
         other gives responses over it, such as the amplitude of a force.
     levels : mapping of one name, optional
         Another parameter and its values, a branch for each: ``{"drive.amplitude_x": [1.0, 2.0]}``.

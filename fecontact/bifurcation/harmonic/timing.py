@@ -1,7 +1,5 @@
 """How the period of the forcing depends on a parameter."""
 
-import math
-
 import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField, made_values
@@ -31,7 +29,7 @@ def timing_of(
     try:
         if (isinstance(field, ContactField) and here > 0.0
                 and field.repeats_with_drive(values, free)):
-            return 2.0 * math.pi, None
+            return 1.0, None
     except FecontactError:
         return None, None
     made = made_values(field, values, free) if isinstance(field, ContactField) else []

@@ -72,13 +72,13 @@ def controlled_response(
     system : ContactSystem or VectorField
         Excited with a common period.
     bounds : (float, float)
-        Range of the parameter [rad/s for a frequency].
+        Range of the parameter [Hz for the frequency of a drive].
     amplitudes : float or sequence
         a above zero, half the range of the observed displacement: a branch for each.
     force : str
         Dotted name of the level that is free, such as 'drive.amplitude_x', zero without motion.
     parameter : str, optional
-        Dotted name, by default 'drive.angular_frequency'.
+        Dotted name, by default 'drive.frequency_hz'.
     observe, method, options, start, preload
         As for :func:`fecontact.bifurcation.frequency_response`, by harmonic balance.
 
@@ -99,7 +99,7 @@ def controlled_response(
                          f"numbers above zero.")
     chosen = options_of(
         options or ContinuationOptions(points=_POINTS, largest_step=_LARGEST), bounds)
-    name = parameter or "drive.angular_frequency"
+    name = parameter or "drive.frequency_hz"
     if name == force:
         raise InputError(f"controlled_response: parameter and force are both {force!r}; take "
                          f"another parameter.")

@@ -71,7 +71,7 @@ def unforced(system: ContactSystem) -> ContactSystem:
     accelerations = {f"base_acceleration_{axis}": signal if isinstance(signal, Constant) else None
                      for axis, signal in zip("xyz", load.base_accelerations, strict=True)}
     return system.with_(
-        drive=_changed(drive, {"angular_frequency": 0.0, **none, **kept}),
+        drive=_changed(drive, {"frequency_hz": 0.0, **none, **kept}),
         load=_changed(load, {"forces": tuple(forces), "boundaries": tuple(boundaries),
                              **accelerations}))
 

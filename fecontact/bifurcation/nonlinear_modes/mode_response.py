@@ -29,20 +29,15 @@ class Resonance:
     ----------
     amplitude : float
         Half the range of the observed displacement [m].
-    frequency : float
+    frequency_hz : float
         Frequency of the mode there [Hz].
     damping_ratio : float
         Its damping ratio.
     """
 
     amplitude: float
-    frequency: float
+    frequency_hz: float
     damping_ratio: float
-
-    @property
-    def angular_frequency(self) -> float:
-        """2 pi times the frequency [rad/s]."""
-        return 2.0 * np.pi * self.frequency
 
 
 @read_only_arrays
@@ -68,15 +63,11 @@ class ModeResponse(Summarised):
     resonances: tuple[tuple[Resonance, ...], ...]
     _curves: tuple[Array, ...]
 
-    def angular_frequency(self, level: int = 0) -> Array:
-        """Frequencies of the excitation (K,) along the response [rad/s].
+    def frequency_hz(self, level: int = 0) -> Array:
+        """Frequencies of the excitation (K,) along the response [Hz].
 
         From below resonance to above; NaN separates isolated responses.
         """
-        return self._curves[level][0]
-
-    def frequency(self, level: int = 0) -> Array:
-        """The same [Hz]."""
         return np.asarray(self._curves[level][0] / (2.0 * np.pi))
 
     def amplitude(self, level: int = 0) -> Array:
@@ -103,7 +94,7 @@ class ModeResponse(Summarised):
 
     def summary(self) -> list[tuple[str, str]]:
         """Mode, levels and resonances."""
-        found = [f"{quantity(one.amplitude, 'm')} at {one.frequency:.5g} Hz"
+        found = [f"{quantity(one.amplitude, 'm')} at {one.frequency_hz:.5g} Hz"
                  for level in self.resonances for one in level]
         return [("mode", f"{self.mode.number}"), ("observed", self.mode.observed),
                 *([(self.level_name, listed([f"{level:.5g}" for level in self.levels], 6))]
@@ -114,7 +105,7 @@ class ModeResponse(Summarised):
 @one_blas_thread
 def mode_response(
     mode: NonlinearMode, system: ContactSystem, *,
-    levels: Mapping[str, ArrayLike] | None = None, frequency: str = "drive.angular_frequency",
+    levels: Mapping[str, ArrayLike] | None = None, frequency: str = "drive.frequency_hz",
 ) -> ModeResponse:
     r"""Resonance and forced response of a system from one of its nonlinear modes, at no cost.
 
@@ -138,7 +129,7 @@ def mode_response(
     levels : mapping of one name, optional
         A parameter and its values, ``{"drive.amplitude_x": [1.0, 2.0]}``.
     frequency : str
-        Dotted name of the angular frequency of the excitation.
+        Dotted name of the frequency of the excitation [Hz].
 
     Raises
     ------
@@ -186,7 +177,7 @@ class _Along:
         w, X = mode.angular_frequency, mode.coordinates()
         state = rest_state(field, values)
         forces = []
-        for each in w:
+        for each in w / (2.0 * np.pi):
             values = values.copy()
             values[free] = each
             forces.append(given_force(field, values, state, require_excitation(field, values)))

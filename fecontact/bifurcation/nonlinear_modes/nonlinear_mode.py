@@ -97,7 +97,7 @@ class NonlinearMode(Summarised):
         return np.asarray(2.0 * np.pi / self.branch.column("period"))
 
     @property
-    def frequency(self) -> Array:
+    def frequency_hz(self) -> Array:
         """Frequency (N,) [Hz]."""
         return np.asarray(1.0 / self.branch.column("period"))
 
@@ -169,7 +169,7 @@ class NonlinearMode(Summarised):
 
     def at(
         self, system: ContactSystem, *, amplitude: float | None = None,
-        frequency: float | None = None,
+        frequency_hz: float | None = None,
     ) -> "NonlinearMode":
         """The mode at one amplitude or one frequency: a mode of a single point, solved there.
 
@@ -179,7 +179,7 @@ class NonlinearMode(Summarised):
             The system of the mode.
         amplitude : float, optional
             Amplitude of the observed displacement, in its unit.
-        frequency : float, optional
+        frequency_hz : float, optional
             Frequency [Hz], in place of the amplitude.
 
         Raises
@@ -187,19 +187,19 @@ class NonlinearMode(Summarised):
         InputError
             If the mode has no such amplitude or frequency, or has it several times.
         """
-        if (amplitude is None) == (frequency is None):
-            raise InputError("NonlinearMode.at: give either amplitude or frequency.")
+        if (amplitude is None) == (frequency_hz is None):
+            raise InputError("NonlinearMode.at: give either amplitude or frequency_hz.")
         if amplitude is not None:
             return _solved(self, system, _bracket("amplitude", self.amplitude, amplitude, ""),
                            float(amplitude))
-        assert frequency is not None
-        place = _bracket("frequency", self.frequency, frequency, " Hz")
-        ends, known = self.amplitude[place : place + 2], self.frequency[place : place + 2]
-        if known[0] == frequency or known[1] == frequency:
-            return _solved(self, system, place, float(ends[int(known[1] == frequency)]))
+        assert frequency_hz is not None
+        place = _bracket("frequency_hz", self.frequency_hz, frequency_hz, " Hz")
+        ends, known = self.amplitude[place : place + 2], self.frequency_hz[place : place + 2]
+        if frequency_hz in known.tolist():
+            return _solved(self, system, place, float(ends[int(known[1] == frequency_hz)]))
 
         def off(A: float) -> float:
-            return float(_solved(self, system, place, A).frequency[0]) - float(frequency)
+            return float(_solved(self, system, place, A).frequency_hz[0]) - float(frequency_hz)
 
         from scipy.optimize import brentq
 
@@ -216,7 +216,7 @@ class NonlinearMode(Summarised):
         stable = self.stable
         return [
             ("mode", f"{self.number}"), ("observed", self.observed),
-            ("amplitude", span(self.amplitude)), ("frequency", span(self.frequency, "Hz")),
+            ("amplitude", span(self.amplitude)), ("frequency", span(self.frequency_hz, "Hz")),
             ("damping ratio", "none" if self.conservative else span(self.damping_ratio)),
             ("points", f"{len(self)}"),
             *([("special", listed(special, 5))] if special else []),
@@ -333,7 +333,7 @@ def _bracket(name: str, values: Array, wanted: float, unit: str) -> int:
     if not found:
         raise InputError(f"NonlinearMode.at: {name} = {float(value):g}{unit} must lie within the "
                          f"mode, from {values.min():.6g} to {values.max():.6g}{unit}.")
-    if len(found) > 1 and name == "frequency":
+    if len(found) > 1 and name == "frequency_hz":
         raise InputError(f"NonlinearMode.at: the mode has the frequency {float(value):g} Hz "
                          f"{len(found)} times; give the amplitude.")
     if len(found) > 1 and max(found) - min(found) > 1:

@@ -138,7 +138,7 @@ class PeakProblem(Problem):
             known[list(orbit.field.parameters)[orbit.free]] = float(u[-2])
         else:
             rate = float(linearisation.gradient @ tangent[:-1]) / found["observed_amplitude"]
-            known |= {"angular_frequency": float(u[-2]), "amplitude_rate": rate}
+            known |= {"frequency_hz": orbit.periods / T, "amplitude_rate": rate}
         if orbit.stability is not None:
             known |= {"stable": inner.floquet.stable, "multipliers": inner.floquet.multipliers}
         return {**known, "truncation_error": error, "residual": residual, "minimum": low,

@@ -49,7 +49,7 @@ _CONDITIONS = ("amplitude", "phase")
 class ResonanceCurve(Summarised):
     """Resonances of forced responses over a parameter.
 
-    Points of the branch store 'angular_frequency', 'stable', 'amplitude_rate' (relative change of
+    Points of the branch store 'frequency_hz', 'stable', 'amplitude_rate' (relative change of
     the amplitude along the curve) and what a :class:`~fecontact.bifurcation.FrequencyResponse`
     stores. Points of kind 'extremum' are those of the amplitude over the parameter, 'fold' those
     where the parameter turns.
@@ -87,14 +87,9 @@ class ResonanceCurve(Summarised):
         return np.asarray(self.branch.column("observed_amplitude"))
 
     @property
-    def angular_frequency(self) -> Array:
-        """Frequency (N,) of the resonance [rad/s]."""
-        return np.asarray(self.branch.column("angular_frequency"))
-
-    @property
-    def frequency(self) -> Array:
+    def frequency_hz(self) -> Array:
         """Frequency (N,) of the resonance [Hz]."""
-        return np.asarray(self.angular_frequency / (2.0 * np.pi))
+        return np.asarray(self.branch.column("frequency_hz"))
 
     def harmonic(self, k: int = 1) -> ComplexArray:
         """Complex harmonic X_k (N,) of the observed displacement, x_k = Re(X_k exp(i k w t))."""
@@ -109,7 +104,7 @@ class ResonanceCurve(Summarised):
         special = [f"{point.kind} at {point.parameter:.5g}" for point in self.branch.special]
         return [("parameter", self.parameter_name), ("range", span(self.parameter)),
                 ("observed", self.observed), ("condition", self.condition),
-                ("amplitude", span(self.amplitude)), ("frequency", span(self.frequency, "Hz")),
+                ("amplitude", span(self.amplitude)), ("frequency", span(self.frequency_hz, "Hz")),
                 ("points", f"{len(self)}"), ("special", listed(special, 5)),
                 ("end", self.branch.status.name.lower())]
 
@@ -117,7 +112,7 @@ class ResonanceCurve(Summarised):
 @one_blas_thread
 def resonance_curve(
     system: ContactSystem | VectorField, bounds: tuple[float, float], parameter: str,
-    frequencies: tuple[float, float], *, frequency: str = "drive.angular_frequency",
+    frequencies: tuple[float, float], *, frequency: str = "drive.frequency_hz",
     observe: tuple[str | int, str] | ArrayLike = ("B", "x"),
     condition: Literal["amplitude", "phase"] = "amplitude", lag: float = 0.5 * np.pi,
     method: HarmonicBalance | None = None, options: ContinuationOptions | None = None,
@@ -138,9 +133,9 @@ def resonance_curve(
     parameter : str
         Dotted name, such as 'drive.amplitude_x' or 'normal.force'.
     frequencies : (float, float)
-        Range of the frequency in which the first peak lies [rad/s].
+        Range of the frequency in which the first peak lies [Hz].
     frequency : str
-        Dotted name of the angular frequency of the excitation.
+        Dotted name of the frequency of the excitation.
     observe : (point, component) or (d,) sequence
         As for :func:`fecontact.bifurcation.frequency_response`.
     condition : 'amplitude' or 'phase'

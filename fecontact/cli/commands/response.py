@@ -20,13 +20,12 @@ def response(
     study: StudyFile,
     parameter: Annotated[str | None, Parameter(
         help="What changes along a response; overrides [response]. By default "
-        "drive.angular_frequency.")] = None,
+        "drive.frequency_hz.")] = None,
     /,
     *,
-    hz: Annotated[tuple[float, float] | None, Parameter(
-        help="Lowest and highest frequency [Hz]; overrides [response].")] = None,
     bounds: Annotated[tuple[float, float] | None, Parameter(
-        help="Least and largest value of another parameter; overrides [response].")] = None,
+        help="Lowest and highest frequency [Hz], or value of another parameter; overrides "
+        "[response].")] = None,
     levels: Annotated[str | None, Parameter(
         help="Another parameter and its values, drive.amplitude_x=1e-5,2e-5; a response for "
         "each.")] = None,
@@ -64,7 +63,7 @@ def response(
 
     described = read_study(study, set_)
     with located(f"{described.title}: [response]:", "ResponseSettings"):
-        wanted = _wanted(described.response, parameter, hz, bounds, levels, method, harmonics,
+        wanted = _wanted(described.response, parameter, bounds, levels, method, harmonics,
                          samples, tolerance, amplitudes, force)
     with located(f"{described.title}:"):
         _ = wanted.checked_bounds
@@ -121,8 +120,8 @@ def response(
 
 
 def _wanted(
-    given: "ResponseSettings", parameter: str | None, hz: tuple[float, float] | None,
-    bounds: tuple[float, float] | None, levels: str | None, method: str | None,
+    given: "ResponseSettings", parameter: str | None, bounds: tuple[float, float] | None,
+    levels: str | None, method: str | None,
     harmonics: str | None, samples: int | None, tolerance: float | None, amplitudes: str | None,
     force: str | None,
 ) -> "ResponseSettings":
@@ -131,12 +130,8 @@ def _wanted(
         ("parameter", parameter), ("method", method), ("force", force),
         ("harmonics", None if harmonics is None else _harmonics(harmonics)), ("samples", samples),
         ("tolerance", tolerance)) if value is not None}
-    if hz is not None and bounds is not None:
-        raise InputError("--hz and --bounds mean the same; give one of them.")
-    if hz is not None or bounds is not None:
-        changes |= {"bounds": bounds, "bounds_hz": hz, "start": None}
-    elif parameter is not None and parameter != given.parameter:
-        changes |= {"bounds": None, "bounds_hz": None, "start": None}
+    if bounds is not None or (parameter is not None and parameter != given.parameter):
+        changes |= {"bounds": bounds, "start": None}
     if levels is not None:
         changes["levels"] = _levels(levels)
     if amplitudes is not None:

@@ -13,7 +13,7 @@ from fecontact.cli.console import (
     waiting,
     warn_if_stale,
 )
-from fecontact.cli.options import All, At, AtHz, Branches, Changes, RunFile, Trust, Which
+from fecontact.cli.options import All, At, Branches, Changes, RunFile, Trust, Which
 
 
 def report(
@@ -137,7 +137,6 @@ def render(
     t_end: Annotated[float | None, Parameter(help="End of the interval to draw [s].")] = None,
     branch: Branches = None,
     at: At = None,
-    at_hz: AtHz = None,
     which: Which = 0,
     trust: Trust = False,
 ) -> None:
@@ -156,7 +155,7 @@ def render(
         "frames": frames, "fps": fps, "size": size, "colour": colour, "scale": scale,
         "view": view,
         "t_start": t_start, "t_end": t_end}
-    stored = stored_orbit_or_run(file, trust, set_, OrbitChoice(branch, at, at_hz, which))
+    stored = stored_orbit_or_run(file, trust, set_, OrbitChoice(branch, at, which))
     from fecontact.core.tables import located
 
     with located("render:", "RenderSettings"):
@@ -198,7 +197,6 @@ def plot(
         name=["--output", "-o"], help="A .png, .pdf or .svg file.")] = None,
     branch: Branches = None,
     at: At = None,
-    at_hz: AtHz = None,
     which: Which = 0,
     all_: All = False,
     trust: Trust = False,
@@ -217,7 +215,7 @@ def plot(
     from fecontact.output.plots.figure import styled
 
     require_possible(output)
-    chosen = OrbitChoice(branch, at, at_hz, which)
+    chosen = OrbitChoice(branch, at, which)
     kind = require_kind_of_plot(kind, file, chosen)
     if kind in DIAGRAMS and holds_branches(file):
         require_stored(file, set_)

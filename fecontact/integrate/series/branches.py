@@ -162,7 +162,7 @@ def sines_of(signal: Signal) -> tuple[float, list[tuple[float, float, float]]] |
     if type(signal) is Constant:
         return float(signal.value), []
     if type(signal) is Harmonic:
-        return 0.0, [(signal.amplitude, signal.angular_frequency, signal.phase)]
+        return 0.0, [(signal.amplitude, 2.0 * np.pi * signal.frequency_hz, signal.phase)]
     if type(signal) is Harmonics:
         rows = signal.parameters()[1:].reshape(-1, 3)
         return 0.0, [(float(a), float(w), float(phase)) for a, w, phase in rows]

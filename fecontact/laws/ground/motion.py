@@ -78,7 +78,7 @@ def _harmonic_speed(t, p):
 class HarmonicSpeed(GroundMotion):
     r"""Ground whose speed oscillates about the constant one.
 
-    .. math:: V(t) = V + A \sin(w t + \varphi)
+    .. math:: V(t) = V + A \sin(2 \pi f t + \varphi)
 
     The travel is the exact integral.
 
@@ -86,8 +86,8 @@ class HarmonicSpeed(GroundMotion):
     ----------
     amplitude : float
         A [m/s].
-    angular_frequency : float
-        w, positive [rad/s].
+    frequency_hz : float
+        f, positive [Hz].
     phase : float
         phi [rad].
 
@@ -100,33 +100,37 @@ class HarmonicSpeed(GroundMotion):
     kernel: ClassVar = _harmonic_speed
 
     amplitude: Annotated[float, Unit("m/s")]
-    angular_frequency: Annotated[float, Unit("rad/s")]
+    frequency_hz: Annotated[float, Unit("Hz")]
     phase: Annotated[float, Unit("rad")] = 0.0
 
     def __post_init__(self) -> None:
         require_finite("HarmonicSpeed", amplitude=self.amplitude, phase=self.phase)
-        require_positive("HarmonicSpeed", angular_frequency=self.angular_frequency)
+        require_positive("HarmonicSpeed", frequency_hz=self.frequency_hz)
 
     def parameters(self, speed: float) -> Array:
-        """V, A, w and phi."""
-        return np.array([speed, self.amplitude, self.angular_frequency, self.phase], dtype=float)
+        """V, A, 2 pi f and phi."""
+        return np.array([speed, self.amplitude, self._w, self.phase], dtype=float)
+
+    @property
+    def _w(self) -> float:
+        return 2.0 * math.pi * self.frequency_hz
 
     @property
     def shortest_period(self) -> float | None:
-        """2 pi / w [s]."""
-        return 2.0 * math.pi / self.angular_frequency
+        """1 / f [s]."""
+        return 1.0 / self.frequency_hz
 
     def largest_speed(self, speed: float, t0: float, t1: float) -> float:
         """Largest magnitude of the speed from t0 to t1 [m/s]."""
-        low, high = (self.angular_frequency * t + self.phase for t in (t0, t1))
+        low, high = (self._w * t + self.phase for t in (t0, t1))
         first = math.ceil(low / math.pi - 0.5)
         last = min(math.floor(high / math.pi - 0.5), first + 1)
         angles = [low, high, *(math.pi * (k + 0.5) for k in range(first, last + 1))]
         return max(abs(speed + self.amplitude * math.sin(angle)) for angle in angles)
 
     def largest_acceleration(self, speed: float, t0: float, t1: float) -> float:
-        """A w [m/s2]."""
-        return abs(self.amplitude) * self.angular_frequency
+        """2 pi f A [m/s2]."""
+        return abs(self.amplitude) * self._w
 
 
 @signal

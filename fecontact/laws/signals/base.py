@@ -51,8 +51,8 @@ class Signal:
         return None
 
     @property
-    def frequency_hz(self) -> float | None:
-        """Frequency of a periodic signal [Hz], else None."""
+    def fundamental_hz(self) -> float | None:
+        """Fundamental frequency of a periodic signal [Hz]; None of any other and of a constant."""
         return None
 
     @property

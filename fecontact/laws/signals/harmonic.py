@@ -62,14 +62,14 @@ def _harmonic(t, p):
 class Harmonic(Signal):
     r"""A sine.
 
-    .. math:: A \sin(w t + \varphi)
+    .. math:: A \sin(2 \pi f t + \varphi)
 
     Parameters
     ----------
     amplitude : float
         A, in the unit of the quantity.
-    angular_frequency : float
-        w, zero or above [rad/s].
+    frequency_hz : float
+        f, zero or above [Hz]; w / (2 pi) of an angular frequency w [rad/s].
     phase : float
         phi [rad]; pi / 2 for a cosine.
 
@@ -82,23 +82,27 @@ class Harmonic(Signal):
     kernel: ClassVar = _harmonic
 
     amplitude: float
-    angular_frequency: Annotated[float, Unit("rad/s")]
+    frequency_hz: Annotated[float, Unit("Hz")]
     phase: Annotated[float, Unit("rad")] = 0.0
 
     def __post_init__(self) -> None:
         require_finite("Harmonic", amplitude=self.amplitude, phase=self.phase)
-        require_not_negative("Harmonic", angular_frequency=self.angular_frequency)
+        require_not_negative("Harmonic", frequency_hz=self.frequency_hz)
+
+    def parameters(self) -> Array:
+        """A, 2 pi f and phi."""
+        return np.array([self.amplitude, 2.0 * math.pi * self.frequency_hz, self.phase])
 
     @property
     def shortest_period(self) -> float | None:
-        """2 pi / w [s]; None for a constant."""
-        w = self.angular_frequency
-        return 2.0 * math.pi / w if w > 0.0 and self.amplitude != 0.0 else None
+        """1 / f [s]; None for a constant."""
+        f = self.frequency_hz
+        return 1.0 / f if f > 0.0 and self.amplitude != 0.0 else None
 
     @property
-    def frequency_hz(self) -> float | None:
+    def fundamental_hz(self) -> float | None:
         """Its frequency [Hz]; None for a constant."""
-        return None if self.shortest_period is None else self.angular_frequency / (2.0 * math.pi)
+        return None if self.shortest_period is None else self.frequency_hz
 
     @property
     def largest(self) -> float:
@@ -121,14 +125,14 @@ def _harmonics(t, p):
 class Harmonics(Signal):
     r"""A sum of sines of arbitrary frequencies.
 
-    .. math:: \sum_k A_k \sin(w_k t + \varphi_k)
+    .. math:: \sum_k A_k \sin(2 \pi f_k t + \varphi_k)
 
     Parameters
     ----------
     amplitudes : sequence
         A_k, in the unit of the quantity.
-    angular_frequencies : sequence
-        w_k, zero or above [rad/s].
+    frequencies_hz : sequence
+        f_k, zero or above [Hz].
     phases : sequence, optional
         phi_k [rad]; zero by default.
 
@@ -141,7 +145,7 @@ class Harmonics(Signal):
     kernel: ClassVar = _harmonics
 
     amplitudes: tuple[float, ...]
-    angular_frequencies: Annotated[tuple[float, ...], Unit("rad/s")]
+    frequencies_hz: Annotated[tuple[float, ...], Unit("Hz")]
     phases: Annotated[tuple[float, ...], Unit("rad")] = ()
 
     def __post_init__(self) -> None:
@@ -152,34 +156,35 @@ class Harmonics(Signal):
             if len(given) not in (len(self.amplitudes), 0):
                 raise InputError(f"Harmonics: {entry.name} has {len(given)} values for "
                                  f"{len(self.amplitudes)} amplitudes; give one for each.")
-        for k, w in enumerate(self.angular_frequencies):
-            require_not_negative("Harmonics", **{f"angular_frequencies[{k}]": w})
+        for k, f in enumerate(self.frequencies_hz):
+            require_not_negative("Harmonics", **{f"frequencies_hz[{k}]": f})
 
     def parameters(self) -> Array:
-        """Number of sines, then A, w and phi of each."""
+        """Number of sines, then A, 2 pi f and phi of each."""
         phases = self.phases or np.zeros(len(self.amplitudes))
-        rows = np.column_stack([self.amplitudes, self.angular_frequencies, phases])
+        rows = np.column_stack([
+            self.amplitudes, 2.0 * math.pi * np.array(self.frequencies_hz), phases])
         return np.concatenate([[len(rows)], rows.ravel()])
 
     @property
     def _heard(self) -> list[float]:
-        """Angular frequencies above zero whose amplitude is not zero."""
-        return sorted(w for a, w in zip(self.amplitudes, self.angular_frequencies, strict=True)
-                      if a != 0.0 and w > 0.0)
+        """Frequencies above zero whose amplitude is not zero."""
+        return sorted(f for a, f in zip(self.amplitudes, self.frequencies_hz, strict=True)
+                      if a != 0.0 and f > 0.0)
 
     @property
     def shortest_period(self) -> float | None:
         """That of the highest frequency [s]."""
-        return 2.0 * math.pi / self._heard[-1] if self._heard else None
+        return 1.0 / self._heard[-1] if self._heard else None
 
     @property
-    def frequency_hz(self) -> float | None:
+    def fundamental_hz(self) -> float | None:
         """The lowest frequency [Hz] if all others are integer multiples of it, else None."""
         if not self._heard:
             return None
         ratios = np.array(self._heard) / self._heard[0]
         whole = np.abs(ratios - np.round(ratios)) <= 1e-9 * ratios
-        return self._heard[0] / (2.0 * math.pi) if whole.all() else None
+        return self._heard[0] if whole.all() else None
 
     @property
     def largest(self) -> float:

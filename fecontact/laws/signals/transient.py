@@ -269,7 +269,7 @@ class Tabulated(Signal):
         return self._steps[0]
 
     @property
-    def frequency_hz(self) -> float | None:
+    def fundamental_hz(self) -> float | None:
         """Frequency of a repeated table [Hz]; None if the ends are held."""
         return 1.0 / (self.times[-1] - self.times[0]) if self.outside == "repeat" else None
 

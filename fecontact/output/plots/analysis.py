@@ -220,7 +220,7 @@ def plot_poincare(
     require_kind("plot_poincare", Trajectory, trajectory=trajectory)
     row = direction_row(trajectory, component)
     start = float(trajectory.time[0])
-    if period is None and not trajectory.system.drive.frequency_hz > 0.0:
+    if period is None and not trajectory.system.drive.fundamental_hz > 0.0:
         found = section_states(trajectory, point, component, t_start=start)
     else:
         found = strobed_states(trajectory, period=period, phase=phase, t_start=start)

@@ -68,7 +68,7 @@ def report_modes(
     lossless = all(mode.conservative for mode in given)
     below: list[Any] = [mode.energy if lossless else mode.damping_ratio for mode in given]
     diagrams = [
-        Diagram("", "frequency [Hz]", x, [mode.frequency for mode in given], 300, True),
+        Diagram("", "frequency [Hz]", x, [mode.frequency_hz for mode in given], 300, True),
         Diagram(f"amplitude of {given[0].observed} [{symbol}]",
                 "energy [J]" if lossless else "damping ratio", x, below, 210, True)]
     point, component = observe

@@ -10,11 +10,10 @@ from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.harmonic.response import FrequencyResponse
 from fecontact.core.checks import require_kind
 from fecontact.core.units import quantity
-from fecontact.output.plots.parameter_labels import in_unit
+from fecontact.output.plots.parameter_labels import branch_label, in_unit
 from fecontact.output.plots.responses.response import (
     drawn,
     drawn_label,
-    frequency_axis,
     level_texts,
 )
 from fecontact.output.report.branch_report import COLUMNS, shown_of
@@ -31,8 +30,8 @@ def report_response(
     """Write a frequency response as one HTML file; a click on a point plays its orbit.
 
     Above the amplitude, below the phase of the first harmonic against a sine drive, a colour for
-    each level; unstable parts are dashed, angular frequencies in Hz. The orbit is played by the
-    deformed bodies and drawn over time and in the phase plane.
+    each level; unstable parts are dashed. The orbit is played by the deformed bodies and drawn
+    over time and in the phase plane.
 
     Parameters
     ----------
@@ -68,8 +67,8 @@ def report_response(
              *([response.level_name] if response.level_name and not response.force_name else [])]
     field = contact_field(system, dict.fromkeys(names))
     named = dict(zip(_names(response), response.branches, strict=True))
-    factor, x_label = frequency_axis(response)
-    x = [branch.parameter / factor for branch in response.branches]
+    x_label = branch_label(response.branches[0])
+    x = [branch.parameter for branch in response.branches]
     curves = [drawn(response, level) for level in range(len(named))]
     unit = "rad" if observe[1].startswith("phi") else "m"
     scale, y_label = in_unit(drawn_label(response), np.concatenate(curves))

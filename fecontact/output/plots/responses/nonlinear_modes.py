@@ -56,12 +56,12 @@ def plot_nonlinear_mode(
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.4, 1.0))
         colours = distinct_colours(len(given))
         drawn = [_drawn((upper, lower), mode.branch, mode.amplitude,
-                        (mode.frequency, _below(mode, lossless)), colour)
+                        (mode.frequency_hz, _below(mode, lossless)), colour)
                  for mode, colour in zip(given, colours, strict=True)]
         if logarithmic:
             lower.set_xscale("log")
         upper.margins(x=0.02)
-        frequencies = np.concatenate([mode.frequency for mode in given])
+        frequencies = np.concatenate([mode.frequency_hz for mode in given])
         name_axis(upper, "y", "frequency [Hz]", frequencies)
         if lossless:
             lower.set_yscale("log")
@@ -113,14 +113,14 @@ def plot_resonance_curve(
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.4, 1.0))
         colours = distinct_colours(len(given))
         drawn = [_drawn((upper, lower), curve.branch, curve.parameter,
-                        (curve.amplitude, curve.frequency), colour)
+                        (curve.amplitude, curve.frequency_hz), colour)
                  for curve, colour in zip(given, colours, strict=True)]
         upper.set_ylim(bottom=0.0)
         upper.margins(x=0.02)
         name_axis(upper, "y", f"amplitude of {given[0].observed} [{_unit(given[0].observed)}]",
                   np.concatenate([curve.amplitude for curve in given]))
         name_axis(lower, "y", "frequency [Hz]",
-                  np.concatenate([curve.frequency for curve in given]))
+                  np.concatenate([curve.frequency_hz for curve in given]))
         name_axis(lower, "x", branch_label(given[0].branch),
                   np.concatenate([curve.parameter for curve in given]))
         _legend(upper, list(names), colours, drawn)

@@ -34,7 +34,7 @@ def plot_response(
 
     Above half the range of the observed quantity, or the force that holds it, below the phase of
     its first harmonic against a sine drive. Stable parts are solid, unstable ones dashed, special
-    points marked. Angular frequencies are shown in Hz.
+    points marked.
 
     Parameters
     ----------
@@ -56,14 +56,14 @@ def plot_response(
         For another suffix, or a file that cannot be written.
     """
     require_kind("plot_response", FrequencyResponse, response=response)
-    factor, label = frequency_axis(response)
+    label = branch_label(response.branches[0])
     with new_figure(9.0, 6.4, path) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
         marked: dict[str, None] = {}
         dashed = False
         colours = distinct_colours(len(response.branches))
         for level, (branch, colour) in enumerate(zip(response.branches, colours, strict=True)):
-            x, stable = branch.parameter / factor, stable_pieces(branch)
+            x, stable = branch.parameter, stable_pieces(branch)
             dashed |= not stable.all()
             curves = (drawn(response, level), np.degrees(response.phase(level)))
             for panel, curve in zip((upper, lower), curves, strict=True):
@@ -88,15 +88,6 @@ def plot_response(
         beyond = label.endswith("[Hz]") and shaded_beyond((upper, lower), usable_hz)
         _legend(upper, response, colours, list(marked), dashed, beyond)
     return figure
-
-
-def frequency_axis(response: FrequencyResponse) -> tuple[float, str]:
-    """Factor and label of the parameter's axis; angular frequencies are shown in Hz."""
-    label = branch_label(response.branches[0])
-    if response.parameter_name.rpartition(".")[2] == "angular_frequency":
-        words = label.removesuffix(" [rad/s]").replace("angular ", "")
-        return 2.0 * np.pi, f"{words} [Hz]"
-    return 1.0, label
 
 
 def level_texts(response: FrequencyResponse) -> tuple[str, list[str]]:
