@@ -397,6 +397,16 @@ def check_fitting(names, printed, folder):
         assert (folder / f"{name}.png").stat().st_size > 10000
 
 
+def check_large_deflections(names, printed, folder):
+    # Mattiasson's table, a path through two limit points, and the beam of one mode at a = h.
+    assert names["path"].displacement("right")[-1] == pytest.approx([-0.38763, 0.71379], rel=4e-3)
+    turns = np.diff(np.sign(np.diff(names["snap"].load_factors)))
+    assert np.count_nonzero(turns) == 2
+    assert names["snap"].reached
+    assert names["basis"].large_deflections[0].force_error < 5e-3
+    assert names["at"] / names["basis"].frequencies_hz[0] == pytest.approx([1.016, 1.237], abs=0.01)
+
+
 CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,
           "laws.md": check_laws, "frequency-responses.md": check_frequency_responses,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
@@ -404,6 +414,7 @@ CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": che
           "set-valued.md": check_set_valued, "loads.md": check_loads,
           "preload.md": check_preload, "rotation.md": check_rotation,
           "stressed-bodies.md": check_stressed_bodies,
+          "large-deflections.md": check_large_deflections,
           "cyclic-symmetry.md": check_cyclic_symmetry, "bodies.md": check_bodies,
           "solids.md": check_solids,
           "report.md": check_report, "contact-faces-in-space.md": check_faces_in_space,

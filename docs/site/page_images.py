@@ -171,6 +171,12 @@ def modes(folder: Path) -> dict[str, Path]:
                                                       "internal_resonance")}
 
 
+def panel(folder: Path) -> dict[str, Path]:
+    """Nonlinear mode of a thin panel between bolted ends."""
+    example(folder, "bolted_panel", ".")
+    return {"bolted_panel": folder / "bolted_panel.png"}
+
+
 MAKERS: dict[Callable[[Path], dict[str, Path]], tuple[str, ...]] = {
     beam: ("beam_on_wavy_ground", "contact_map", "report"),
     solid: ("solid_on_belt", "report-solid"), squeal: ("flutter_modes",),
@@ -178,6 +184,7 @@ MAKERS: dict[Callable[[Path], dict[str, Path]], tuple[str, ...]] = {
     orbits: ("impact_orbits", "impact_doublings"), two_masses: ("two_masses_over_B",),
     responses: ("friction_damper_response", "hardening_response"),
     blades: ("blade_pair",), many_runs: ("million_starts", "hundred_thousand_frequencies"),
+    panel: ("bolted_panel",),
     modes: ("damped_beam_mode", "damped_beam_responses", "internal_resonance")}
 
 
