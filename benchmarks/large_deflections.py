@@ -124,7 +124,7 @@ def main(columns: int = 60, quick: bool = False) -> None:
         found = run.displacement("middle")[:, 1]
         error = np.abs(found - exact).max() / np.abs(exact).max()
         own, other = (frequency(run.time, one) for one in (found, exact))
-        on_mode = np.interp(np.abs(exact).max(), mode.amplitude, mode.frequency)
+        on_mode = np.interp(np.abs(exact).max(), mode.amplitude, mode.frequency_hz)
         print(f"{size:10.2f} {other:10.3f} {own:12.3f} {on_mode:13.3f} {error:13.4f} "
               f"{slow_time:9.2f} {quick_time:11.4f} {slow_time / quick_time:7.0f}")
 

@@ -88,7 +88,7 @@ def first_slip(force: float) -> float:
 def seen_slip(mode: NonlinearMode, held: NonlinearMode) -> tuple[float, float]:
     """Amplitudes [m] at which frequency and damping leave those of held ends."""
     found = []
-    for own, other, least in ((-mode.frequency, -held.frequency, 0.2),
+    for own, other, least in ((-mode.frequency_hz, -held.frequency_hz, 0.2),
                               (mode.damping_ratio, held.damping_ratio, 5e-4)):
         away = own - np.interp(mode.amplitude, held.amplitude, other)
         first = int(np.argmax(away > least))
@@ -103,7 +103,7 @@ def draw(modes: dict[str, NonlinearMode], path: Path) -> None:
         frequency, damping = figure.subplots(1, 2)
         for colour, (name, mode) in zip(COLOURS, modes.items(), strict=False):
             at = mode.amplitude / THICKNESS
-            frequency.plot(at, mode.frequency, color=colour, label=name)
+            frequency.plot(at, mode.frequency_hz, color=colour, label=name)
             damping.plot(at, 100.0 * mode.damping_ratio, color=colour, label=name)
         frequency.set(xlabel="amplitude by thickness", ylabel="frequency [Hz]")
         damping.set(xlabel="amplitude by thickness", ylabel="damping ratio [%]")
@@ -120,13 +120,13 @@ def main(folder: Path, quick: bool) -> None:
         mode = backbone(bolted(basis, force), 64 if quick else 256)
         modes[f"{force:g} N" if force < 1e5 else "held"] = mode
     held = modes["held"]
-    hertz = np.interp(THICKNESS, held.amplitude, held.frequency)
-    print(f"held: {held.frequency[0]:.2f} Hz, {hertz:.2f} Hz at an amplitude of one thickness")
+    hertz = np.interp(THICKNESS, held.amplitude, held.frequency_hz)
+    print(f"held: {held.frequency_hz[0]:.2f} Hz, {hertz:.2f} Hz at an amplitude of one thickness")
     for name, mode in modes.items():
         if name != "held" and first_slip(float(name.split()[0])) < 0.6 * LARGEST:
             first, loss = seen_slip(mode, held)
             expected = first_slip(float(name.split()[0]))
-            hertz, ratio = mode.frequency[-1], mode.damping_ratio[-1]
+            hertz, ratio = mode.frequency_hz[-1], mode.damping_ratio[-1]
             print(f"{name}: slips at {1e3 * first:.3f} mm (closed form {1e3 * expected:.3f} mm), "
                   f"in each cycle from {1e3 * loss:.3f} mm; at {1e3 * LARGEST:g} mm {hertz:.2f} Hz "
                   f"and a damping ratio of {100.0 * ratio:.2f} %")
