@@ -100,7 +100,7 @@ def main(columns: int = 60, quick: bool = False) -> None:
     system, row = fc.ContactSystem(basis), basis.point_row("middle", "y")
     begin = time.perf_counter()
     mode = nonlinear_mode(system, (0.05 * HEIGHT, 1.1 * HEIGHT), observe=("middle", "y"),
-                          method=HarmonicBalance(6, stability=None))
+                          method=HarmonicBalance(4, stability=None))
     followed = time.perf_counter() - begin
     print(f"{whole.mass.shape[0]} unknowns; basis of {basis.modes} in {fitted:.1f} s, "
           f"{basis.large_deflections[0].states} static solutions; backbone in {followed:.1f} s")

@@ -193,10 +193,14 @@ def _turned(system: ContactSystem, times: Array, states: Array) -> str | None:
 
 
 def _beyond_fit(system: ContactSystem, times: Array, states: Array) -> str | None:
-    """Deflections beyond the range in which their forces were fitted."""
-    for one in system.basis.large_deflections:
+    return beyond_fit(system.basis, states[:, : system.basis.modes])
+
+
+def beyond_fit(basis: ModalBasis, coordinates: Array) -> str | None:
+    """Message about coordinates (N, m) outside the range in which their forces were fitted."""
+    for one in basis.large_deflections:
         with np.errstate(over="ignore", invalid="ignore"):
-            reach = one.reach(states[:, : system.basis.modes])
+            reach = one.reach(coordinates)
         if reach > FITTED:
             return (f"a mode with large deflections is deflected by {reach:.3g} times the range in "
                     f"which its forces were fitted, up to {one.largest_displacement:.3g} m; make "

@@ -10,6 +10,7 @@ from fecontact import (
     ContactSystem,
     Load,
     LoadPath,
+    ModelWarning,
     PointLoad,
     Study,
     equilibrium,
@@ -81,6 +82,14 @@ def test_modes_about_a_deflected_state():
     history = load_history(system, LoadPath(load_scale=(0.2, 1.0)))
     assert history.modal_coordinates[-1] == pytest.approx(
         rest.modal_coordinates, abs=1e-6 * np.abs(rest.modal_coordinates).max())
+
+
+def test_branches_watch_the_range():
+    """A nonlinear mode beyond the fitted deflections says so."""
+    system = ContactSystem(beams.bent("hinged", 0.6 * H))
+    with pytest.warns(ModelWarning, match=r"On this branch .* by 1\.\d+ times the range"):
+        nonlinear_mode(system, (1e-4, 0.8 * H), observe=("middle", "y"),
+                       method=HarmonicBalance(2, stability=None))
 
 
 def test_response_peaks_on_the_backbone():

@@ -16,6 +16,7 @@ from fecontact.bifurcation.continuation.problem import (
     ContinuationOptions,
     sizes_of,
 )
+from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.method import MOST, MOST_SAMPLED, HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
@@ -24,6 +25,7 @@ from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField
+from fecontact.system.model_limits import beyond_fit, warn_of_limits
 
 # Factors of the first step, tried in this order to leave a special point.
 _FIRST_STEPS = (1.0, 0.2, 0.04)
@@ -175,7 +177,7 @@ def follow(
         If they do not with as many as the method allows.
     """
     if problem.stability is None or problem.autonomous or not problem.kinked:
-        return _refined(problem, u, tangent, method, options, further, how)[0]
+        return _watched(*_refined(problem, u, tangent, method, options, further, how)[:2])
     # Multipliers and special points take the time: they are computed once, on the final samples.
     branch, plain, u, tangent = _refined(
         replace(problem, stability=None), u, tangent, replace(method, stability=None), options,
@@ -185,12 +187,23 @@ def follow(
     whole = replace(plain, stability=problem.stability)
     wrong = _wrong_at_folds(whole, branch)
     if wrong:
-        return replace(branch, message=_joined(branch.message, wrong))
+        return replace(_watched(branch, whole), message=_joined(branch.message, wrong))
     known = {name: branch.attributes[name] for name in ("sampling_error",)
              if name in branch.attributes}
     found = _followed(whole, u, tangent, options, {**(further or {}), **known}, how)
-    return replace(found, message=_joined(found.message, branch.message)
+    return replace(_watched(found, whole), message=_joined(found.message, branch.message)
                    if _FEW[:20] in branch.message else found.message)
+
+
+def _watched(branch: Branch, problem: HarmonicProblem) -> Branch:
+    """The branch, with a warning if large deflections leave the range of their forces."""
+    field = problem.field
+    if isinstance(field, ContactField) and (basis := field.system().basis).large_deflections:
+        moved = [problem.series.values @ problem.coefficients(point.u)[:, : basis.modes]
+                 for point in branch.points]
+        sentence = beyond_fit(basis, np.concatenate(moved))
+        warn_of_limits([sentence] if sentence else [], "On this branch")
+    return branch
 
 
 def _followed(
