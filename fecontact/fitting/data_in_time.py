@@ -23,6 +23,7 @@ from fecontact.system.quasistatic.path import LoadPath
 
 _SAMPLES = 24.0  # outputs of a decay in a period of its highest frequency
 _OVERLAP = 0.95  # of the windows along the run of a model
+_SLOPE = 0.1  # of log amplitude, over which the slope at the end of a curve is taken
 _MOVED = ("displacement", "velocity")
 
 
@@ -127,7 +128,8 @@ class HistoryData(FitData):
 class DecayData(FitData):
     """Frequency and damping over amplitude of a ring-down, compared with those of a run.
 
-    The run is evaluated as the measurement was; amplitudes outside of it take its nearest value.
+    The run is evaluated as the measurement was. At amplitudes outside of it, frequency and damping
+    go on linearly over the logarithm of the amplitude.
 
     Parameters
     ----------
@@ -185,12 +187,28 @@ class DecayData(FitData):
         found = ring_down(run.time, values.values, derivative=order, **{
             "frequency": float(np.median(self.curve.frequency)), **self.options,
             "overlap": _OVERLAP})
-        low, high = found.amplitude.min(), found.amplitude.max()
-        return np.concatenate(found.at(np.clip(self.curve.amplitude, low, high)))
+        return _extended(found, self.curve.amplitude)
 
     def curves(self) -> list[Curve]:
         """Frequency and damping ratio over amplitude."""
         return curves_of(self.curve)
+
+
+def _extended(curve: AmplitudeCurve, amplitude: Array) -> Array:
+    """Frequencies and damping ratios (2 N,) at amplitudes, beyond the ends of a curve too."""
+    known = np.sort(curve.amplitude)
+    low, high = float(known[0]), float(known[-1])
+    values = np.stack(curve.at(np.clip(amplitude, low, high)))
+    # A step along the curve, over which the slope at its end is taken.
+    inner = min(_SLOPE, 0.5 * np.log(high / low))
+    if inner > 0.0:
+        for end, side in ((low, 1.0), (high, -1.0)):
+            at_end, within = (np.stack(curve.at(place)) for place in (
+                end, end * np.exp(side * inner)))
+            beyond = side * np.log(end / amplitude)
+            values += np.where(beyond > 0.0, beyond, 0.0) * (
+                (at_end - within) / inner)[:, None]
+    return np.concatenate(values)
 
 
 def measured_of(curve: AmplitudeCurve) -> Array:
