@@ -17,6 +17,8 @@ _WORDS: Mapping[str, tuple[str, ...]] = {
     "run": ("simulate", "solve", "transient", "integrate", "dynamic", "stick-slip"),
     "wear": ("fretting", "archard"),
     "sweep": ("brute-force", "monte-carlo", "parameter-study", "sensitivity", "sobol", "doe"),
+    "fit": ("identify", "identification", "calibrate", "calibration", "update", "inverse"),
+    "data": ("measurement", "measurements", "uff", "ring-down"),
     "branch": ("bifurcation", "bifurcations", "continuation", "continue", "limit-cycles",
                "periodic-orbits", "matcont", "auto"),
     "response": ("frf", "hbm", "harmonic-balance", "frequency-response", "forced-response",

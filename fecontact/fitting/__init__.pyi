@@ -1,6 +1,7 @@
 from .data import Curve, FitData, FunctionData
 from .data_in_time import DecayData, HistoryData, LoopData
 from .data_of_modes import BackboneData, FrequencyData, ReceptanceData, ResponseData
+from .from_study import fit_study, study_data
 from .problem import Problem
 from .profile import ProfileLikelihood, profile_likelihood
 from .result import Fit, FitStart
@@ -22,5 +23,7 @@ __all__ = [
     "ReceptanceData",
     "ResponseData",
     "SearchOptions",
+    "fit_study",
     "profile_likelihood",
+    "study_data",
 ]

@@ -20,6 +20,7 @@ from fecontact.fitting.data import FitData
 from fecontact.study.fit_section import FitParameter, values_of
 from fecontact.study.study import Study
 from fecontact.sweeps.batch import changed
+from fecontact.sweeps.case import of_basis
 from fecontact.system.contact_system import ContactSystem
 
 STEP = 1e-3  # of differences, in parts of the range
@@ -78,6 +79,8 @@ class Problem:
         values = dict(zip(self.names, values_of(self.parameters, u).tolist(), strict=True))
         if isinstance(self.model, ContactSystem):
             return self.model.with_(values)
+        if not any(of_basis(name, prestress=self.model.basis.prestress) for name in self.names):
+            _ = self.model.reduced  # made once, for all values
         study = changed(self.model, values)
         study.reuse(self.model)
         return study.system()

@@ -1,6 +1,6 @@
 from .bodies_section import BodyBasisSettings, BodySections, InterfaceSettings, Placement, Reduced
 from .convergence import study_convergence
-from .fit_section import FitParameter
+from .fit_section import FitDataSettings, FitParameter, FitSettings
 from .geometry_section import MeshFile
 from .links_section import FaceWeldSettings
 from .materials_section import MaterialSettings
@@ -22,7 +22,9 @@ __all__ = [
     "BodySettings",
     "Distribution",
     "FaceWeldSettings",
+    "FitDataSettings",
     "FitParameter",
+    "FitSettings",
     "InterfaceSettings",
     "MaterialSettings",
     "MeshFile",

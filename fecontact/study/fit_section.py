@@ -1,14 +1,18 @@
-"""Ranges of parameters that are fitted to measurements."""
+"""The section ``[fit]``: parameters that are fitted to measurements, and these."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from numbers import Real
-from typing import Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from fecontact.core.errors import InputError
+from fecontact.core.tables import convert_fields
 from fecontact.core.types import Array
+from fecontact.core.units import Unit
+from fecontact.study.sweep_section import leaves
 
 
 @dataclass(frozen=True)
@@ -91,3 +95,165 @@ def values_of(parameters: tuple[FitParameter, ...], places: Array) -> Array:
     """Values (p,) at places (p,)."""
     return np.array([one.value(float(place))
                      for one, place in zip(parameters, places, strict=True)])
+
+
+Kind = Literal["loop", "history", "ring-down", "backbone", "frequencies", "receptance", "response"]
+# Keys that a kind needs.
+_NEEDED = {"loop": ("file", "against"), "history": ("file",), "ring-down": ("file", "t_end"),
+           "backbone": ("file",), "frequencies": ("frequencies_hz",), "receptance": ("file",),
+           "response": ("file",)}
+
+
+@dataclass(frozen=True)
+class FitDataSettings:
+    """``[[fit.data]]``: one measurement that the model is compared with.
+
+    Parameters
+    ----------
+    kind : str
+        'loop': a force over a displacement, against quasi-static loading; 'history': a channel over
+        time, against a run; 'ring-down': a decay over time, evaluated by windows, against a run;
+        'backbone': the same decay, against a nonlinear mode; 'frequencies': natural frequencies;
+        'receptance': a complex channel over frequency; 'response': amplitudes over frequency,
+        against harmonic balance.
+    name : str
+        Name in tables and pictures; by default the kind.
+    file : str, optional
+        File of the measurement, as `fecontact data` reads it; relative to the study.
+    channel : str, optional
+        Channel that is compared; the only one by default.
+    against : str, optional
+        Of a loop the channel of the displacement.
+    units : mapping of channel to unit
+        Units in which the file gives channels, in place of its own.
+    deviation : float, optional
+        Standard deviation of the values, in SI units; of ring-downs and backbones it follows from
+        the record. Without any, all follow from the residuals.
+    point : str or int
+        Point that was measured.
+    component : str
+        Direction there, 'x', 'y', of solids also 'z', or a rotation.
+    quantity : str
+        What was measured over time: 'displacement', 'velocity', 'friction_force', ...
+    t_start, t_end : float, optional
+        Part of the record [s]; of a ring-down t_end is also the end of the run of the model.
+    initial : 'rest', 'sliding', 'preload' or list
+        State from which the model runs [q, q', z].
+    along : str
+        Of a loop what the displacement is: 'motion_x', 'motion_y', 'motion_z' of the drive, or
+        'travel', 'travel_y' of the ground.
+    frequencies_hz : list, optional
+        Measured natural frequencies [Hz].
+    modes : list, optional
+        Numbers of the modes of the model that they belong to, from 1.
+    about : 'none', 'rest' or 'sliding'
+        Equilibrium about which the contact is linearised for natural frequencies and receptances.
+    frequency_hz : float, optional
+        Of a decay the frequency of the mode; by default that of the highest peak.
+    window : float
+        Of a decay the length of the windows, in periods.
+    mode : int
+        Of a backbone the number of the linear mode, from 1.
+    harmonics : int
+        Of backbones and responses.
+    excitation : str or int
+        Of a receptance the point of the force.
+    excitation_component : str
+        Direction of this force.
+    changes : mapping of dotted name to float
+        Of a response the parameters of the model in this measurement, such as its level.
+
+    Raises
+    ------
+    InputError
+        For keys that a kind needs and that are missing, and for values out of range.
+    """
+
+    kind: Kind
+    name: str = ""
+    file: str | None = None
+    channel: str | None = None
+    against: str | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
+    deviation: float | None = None
+    point: str | int = "B"
+    component: str = "x"
+    quantity: str = "displacement"
+    t_start: Annotated[float | None, Unit("s")] = None
+    t_end: Annotated[float | None, Unit("s")] = None
+    initial: Literal["rest", "sliding", "preload"] | tuple[float, ...] = "rest"
+    along: Literal["motion_x", "motion_y", "motion_z", "travel", "travel_y"] = "motion_x"
+    frequencies_hz: Annotated[tuple[float, ...] | None, Unit("Hz")] = None
+    modes: tuple[int, ...] | None = None
+    about: Literal["none", "rest", "sliding"] = "none"
+    frequency_hz: Annotated[float | None, Unit("Hz")] = None
+    window: float = 10.0
+    mode: int = 1
+    harmonics: int = 5
+    excitation: str | int = "B"
+    excitation_component: str = "x"
+    changes: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for key in _NEEDED.get(self.kind, ()):
+            if getattr(self, key) is None:
+                raise InputError(f"FitDataSettings: kind = '{self.kind}' needs the key '{key}'.")
+        if self.deviation is not None and not 0.0 < self.deviation < math.inf:
+            raise InputError(f"FitDataSettings: deviation = {self.deviation!r} must be a finite "
+                             f"number above zero.")
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """``[fit]``: parameters of the study that are fitted to measurements.
+
+    Parameters
+    ----------
+    parameters : mapping of dotted name to FitParameter
+        ``[fit.parameters]``: ranges by the dotted keys of the study,
+        ``normal.stiffness = { low = 1e6, high = 1e9, scale = "log" }``.
+    data : list of FitDataSettings
+        ``[[fit.data]]``: the measurements.
+    starts : int
+        Number of starts: the first guess, and places that fill the ranges.
+    seed : int
+        Seed of these places.
+    loss : 'linear', 'soft_l1', 'huber' or 'cauchy'
+        The last three heed outliers less.
+    loss_scale : float
+        Residual in standard deviations from which on it is an outlier.
+    exact : bool
+        Whether derivatives are exact where the data have some, else differences.
+
+    Raises
+    ------
+    InputError
+        Without parameters or data, and for values out of range.
+    """
+
+    parameters: Mapping[str, FitParameter] = field(default_factory=dict)
+    data: tuple[FitDataSettings, ...] = ()
+    starts: int = 1
+    seed: int = 0
+    loss: Literal["linear", "soft_l1", "huber", "cauchy"] = "linear"
+    loss_scale: float = 3.0
+    exact: bool = True
+
+    def __post_init__(self) -> None:
+        convert_fields(self)
+        if not self.parameters:
+            raise InputError("FitSettings: parameters is empty; name at least one with its range, "
+                             "like drive.stiffness_x = { low = 1e4, high = 1e6 }.")
+        if not self.data:
+            raise InputError("FitSettings: data is empty; give one measurement at least.")
+        if self.starts < 1 or self.seed < 0 or not self.loss_scale > 0.0:
+            raise InputError(f"FitSettings: starts = {self.starts} must be at least 1, seed = "
+                             f"{self.seed} zero or above, loss_scale = {self.loss_scale!r} above "
+                             f"zero.")
+
+
+def flat_parameters(table: Any) -> Any:
+    """``[fit]`` with dotted names in parameters, which TOML may read as nested tables."""
+    if not isinstance(table, Mapping) or not isinstance(table.get("parameters"), Mapping):
+        return table
+    return {**table, "parameters": dict(leaves(table["parameters"], ""))}

@@ -48,6 +48,7 @@ from fecontact.study.bodies_section import (
     bodies_from_tables,
     check_bodies,
 )
+from fecontact.study.fit_section import FitSettings, flat_parameters
 from fecontact.study.geometry_section import (
     Geometry,
     body_table,
@@ -75,7 +76,7 @@ from fecontact.system.quasistatic.history import LoadHistory
 # names, by names relative to its folder, and the keys that its file gives.
 _FILES, _KEYS_GIVEN = "# Content of files: ", "# Keys given: "
 
-NOT_OF_THE_RUN = ("output", "render", "sweep")
+NOT_OF_THE_RUN = ("output", "render", "sweep", "fit")
 
 _SECTIONS: Mapping[str, type] = {
     "body": BodySettings, "basis": BasisSettings, **PART_CLASSES,
@@ -125,6 +126,8 @@ class Study(Summarised, StudyModels):
         ``[render]``
     sweep : SweepSettings or None
         ``[sweep]``: many cases of this study; see :func:`fecontact.sweep`.
+    fit : FitSettings or None
+        ``[fit]``: parameters that are fitted to measurements; see :func:`fecontact.fit`.
     bodies : mapping of name to BodySections
         ``[bodies.NAME.geometry]``, ...: several bodies, in place of ``[geometry]``, ``[body]`` and
         ``[basis]``.
@@ -154,6 +157,7 @@ class Study(Summarised, StudyModels):
     render: RenderSettings = field(default_factory=RenderSettings)
     preload: PreloadSettings | None = None
     sweep: SweepSettings | None = None
+    fit: FitSettings | None = None
     bodies: Mapping[str, BodySections] = field(default_factory=dict)
     links: Mapping[str, LinkSettings] = field(default_factory=dict)
     path: Path | None = field(default=None, compare=False)
@@ -230,7 +234,7 @@ class Study(Summarised, StudyModels):
                                  f"interfaces stand in [interfaces.NAME.normal] and "
                                  f"[interfaces.NAME.friction].")
             if name not in (valid := ("gap", "geometry", "bodies", "interfaces", "links",
-                                      "preload", "sweep", *_SECTIONS)):
+                                      "preload", "sweep", "fit", *_SECTIONS)):
                 raise InputError(f"{title} has an unknown section or key '{name}'"
                                  f"{nearest(name, valid)}; there are: {choices(valid)}.")
         if "bodies" in tables:
@@ -252,6 +256,8 @@ class Study(Summarised, StudyModels):
                                "interfaces"),
             sweep=from_table(SweepSettings, flat_axes(tables["sweep"]), f"{title}: [sweep]")
             if "sweep" in tables else None,
+            fit=from_table(FitSettings, flat_parameters(tables["fit"]), f"{title}: [fit]")
+            if "fit" in tables else None,
             preload=from_table(PreloadSettings, tables["preload"], f"{title}: [preload]")
             if "preload" in tables else None,
             path=path, _keys=key_tree(tables),
@@ -306,7 +312,7 @@ class Study(Summarised, StudyModels):
         full = defaults and bool(self.bodies)
         interfaces = {"interfaces": {name: to_table(one, defaults=full) for name, one in
                                      self.interfaces.items()}} if self.interfaces else {}
-        for name in ("preload", "sweep"):
+        for name in ("preload", "sweep", "fit"):
             if getattr(self, name) is not None:
                 sections[name] = to_table(getattr(self, name), defaults=defaults)
         gap = {} if self.gap == 0.0 and not defaults else {"gap": plain(self.gap)}

@@ -255,20 +255,21 @@ def flat_axes(table: Any) -> Any:
         return table
     found = dict(table)
     if isinstance(table.get("axes"), Mapping):
-        found["axes"] = dict(_leaves(table["axes"], ""))
+        found["axes"] = dict(leaves(table["axes"], ""))
     if isinstance(table.get("cases"), list | tuple):
         found["cases"] = [flattened(case) if isinstance(case, Mapping) else case
                           for case in table["cases"]]
     return found
 
 
-def _leaves(table: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:
+def leaves(table: Mapping[str, Any], prefix: str) -> list[tuple[str, Any]]:
+    """Values of nested tables by dotted names; tables of numbers and texts alone are values."""
     found: list[tuple[str, Any]] = []
     for key, value in table.items():
         # A table that describes an axis holds only numbers and strings.
         if isinstance(value, Mapping) and any(isinstance(item, Mapping | list)
                                               for item in value.values()):
-            found += _leaves(value, f"{prefix}{key}.")
+            found += leaves(value, f"{prefix}{key}.")
         else:
             found.append((f"{prefix}{key}", value))
     return found

@@ -1,0 +1,169 @@
+"""Fits that a study describes: its ``[fit]`` section as data, and the fit of them."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError
+from fecontact.core.tables import located
+from fecontact.fitting.data import FitData
+from fecontact.fitting.data_in_time import DecayData, HistoryData, LoopData
+from fecontact.fitting.data_of_modes import (
+    BackboneData,
+    FrequencyData,
+    ReceptanceData,
+    ResponseData,
+)
+from fecontact.fitting.fit_model import fit
+from fecontact.fitting.result import Fit
+from fecontact.measured.measurement import Axis, Measurement
+from fecontact.measured.read_measurements import read_measurement
+from fecontact.measured.ring_down import ring_down
+from fecontact.study.fit_section import FitDataSettings, FitSettings
+from fecontact.study.study import Study
+from fecontact.system.contact_system import ContactSystem
+
+
+def fit_study(
+    study: Study, *, workers: int | None = 1, folder: str | Path | None = None,
+    overwrite: bool = False, progress: bool | Callable[[int, int], None] | None = None,
+) -> Fit:
+    """Fit the parameters of ``[fit]`` of a study to its measurements.
+
+    Parameters
+    ----------
+    study : Study
+        Study with a section ``[fit]``.
+    workers, folder, overwrite, progress
+        As for :func:`fecontact.fit`.
+
+    Raises
+    ------
+    InputError
+        Without this section, for files that cannot be read, and as :func:`fecontact.fit`.
+    """
+    settings = settings_of(study)
+    return fit(study, settings.parameters, study_data(study), starts=settings.starts,
+               seed=settings.seed, loss=settings.loss, loss_scale=settings.loss_scale,
+               exact=settings.exact, workers=workers, folder=folder, overwrite=overwrite,
+               progress=progress)
+
+
+def settings_of(study: Study) -> FitSettings:
+    """Section ``[fit]`` of a study; InputError without it."""
+    require_kind("fit_study", Study, study=study)
+    if study.fit is None:
+        raise InputError(f"{study.title} has no section [fit]; add one with the ranges of "
+                         f"parameters in [fit.parameters] and measurements in [[fit.data]].")
+    return study.fit
+
+
+def study_data(study: Study) -> tuple[FitData, ...]:
+    """Measurements of ``[[fit.data]]`` of a study.
+
+    Parameters
+    ----------
+    study : Study
+        Study with a section ``[fit]``.
+
+    Raises
+    ------
+    InputError
+        For files that cannot be read, channels that do not exist, and values that cannot be used.
+    """
+    found = []
+    for number, one in enumerate(settings_of(study).data):
+        with located(f"{study.title}: [[fit.data]] {number}:"):
+            found.append(_KINDS[one.kind](study, one))
+    return tuple(found)
+
+
+def _measurement(study: Study, one: FitDataSettings, axis: Axis) -> Measurement:
+    assert one.file is not None
+    found = read_measurement(study.folder / one.file, axis=axis, units=dict(one.units) or None)
+    return found.between(one.t_start, one.t_end) if axis == "time" else found
+
+
+def _initial(study: Study, one: FitDataSettings) -> Any:
+    if one.initial == "preload":
+        return _Preloaded(study)
+    return np.array(one.initial) if isinstance(one.initial, tuple) else one.initial
+
+
+class _Preloaded:
+    """State at the end of ``[preload]`` of a study, of a system with other parameters."""
+
+    def __init__(self, study: Study) -> None:
+        if study.preload is None:
+            raise InputError("initial = 'preload' needs the section [preload].")
+        self.path = study.preload
+
+    def __call__(self, system: ContactSystem) -> Any:
+        return self.path.load(system)
+
+
+def _loop(study: Study, one: FitDataSettings) -> FitData:
+    test = _measurement(study, one, "time")
+    return LoopData(test.series(one.against)[1], test.series(one.channel)[1], one.deviation,
+                    one.along, name=one.name)
+
+
+def _history(study: Study, one: FitDataSettings) -> FitData:
+    time, values, _, _ = _measurement(study, one, "time").series(one.channel)
+    return HistoryData(time, values, one.deviation, one.quantity, one.point, one.component,
+                       _initial(study, one), name=one.name)
+
+
+def _decay(study: Study, one: FitDataSettings) -> FitData:
+    curve, options = _curve(study, one)
+    assert one.t_end is not None
+    return DecayData(curve, _initial(study, one), one.t_end, one.quantity, one.point,
+                     one.component, options, name=one.name)
+
+
+def _backbone(study: Study, one: FitDataSettings) -> FitData:
+    return BackboneData(_curve(study, one)[0], one.mode, one.point, one.component,
+                        HarmonicBalance(one.harmonics), name=one.name)
+
+
+def _curve(study: Study, one: FitDataSettings) -> tuple[Any, dict[str, Any]]:
+    options: dict[str, Any] = {"window": one.window}
+    if one.frequency_hz is not None:
+        options["frequency"] = one.frequency_hz
+    test = _measurement(study, one, "time")
+    return ring_down(test, channel=test.index(one.channel), **options), options
+
+
+def _frequencies(study: Study, one: FitDataSettings) -> FitData:
+    return FrequencyData(np.array(one.frequencies_hz), one.deviation,
+                         None if one.modes is None else np.array(one.modes),
+                         None if one.about == "none" else one.about, name=one.name)
+
+
+def _receptance(study: Study, one: FitDataSettings) -> FitData:
+    test = _measurement(study, one, "frequency")
+    k = test.index(one.channel)
+    unit = test.channels[k].unit
+    kind: Any = ("accelerance" if unit.startswith(("m/s^2", "rad/s^2")) else
+                 "mobility" if unit.startswith(("m/s", "rad/s")) else "receptance")
+    return ReceptanceData(test.abscissa, np.asarray(test.values[:, k], dtype=complex),
+                          (one.excitation, one.excitation_component), (one.point, one.component),
+                          one.deviation, kind, None if one.about == "none" else one.about,
+                          name=one.name)
+
+
+def _response(study: Study, one: FitDataSettings) -> FitData:
+    test = _measurement(study, one, "frequency")
+    return ResponseData(test.abscissa, np.abs(test.values[:, test.index(one.channel)]),
+                        one.deviation, one.point, one.component, dict(one.changes),
+                        method=HarmonicBalance(one.harmonics, stability=None), name=one.name)
+
+
+_KINDS: dict[str, Callable[[Study, FitDataSettings], FitData]] = {
+    "loop": _loop, "history": _history, "ring-down": _decay, "backbone": _backbone,
+    "frequencies": _frequencies, "receptance": _receptance, "response": _response}
+

@@ -1,0 +1,176 @@
+"""Fits that a study describes: its section, the command, and what goes wrong."""
+
+import json
+
+import numpy as np
+import pytest
+
+import fecontact as fc
+from fecontact.fitting import LoopData, fit_study, study_data
+
+STUDY = """
+geometry = { shape = "beam", length = 0.1, height = 0.02, element_size = 0.01 }
+body = { material = "steel", thickness = 0.02 }
+basis = { modes = 6, contact_nodes = 4, damping = 0.01 }
+normal = { law = "linear", stiffness = 1e7, damping = 0.0 }
+friction = { law = "jenkins", stiffness = 5e5, friction_coefficient = 0.2 }
+load = { normal = 100.0 }
+drive = { stiffness_x = 1e6 }
+
+[fit]
+starts = 2
+
+[fit.parameters]
+friction.friction_coefficient = { low = 0.05, high = 1.0 }
+friction.stiffness = { low = 1e5, high = 1e7, scale = "log" }
+
+[[fit.data]]
+kind = "loop"
+file = "loop.csv"
+channel = "force"
+against = "pull"
+deviation = 0.5
+"""
+PULL = 1e-4 * np.concatenate([np.linspace(0.0, 1.0, 12), np.linspace(1.0, -1.0, 23)[1:]])
+
+
+@pytest.fixture
+def study(tmp_path):
+    """A study whose friction is 0.4 and 1e6 N/m in the measurement."""
+    path = tmp_path / "joint.toml"
+    path.write_text(STUDY)
+    truth = fc.Study.read(path).with_({"friction.friction_coefficient": 0.4,
+                                       "friction.stiffness": 1e6}).system()
+    force = LoopData(PULL, np.zeros(len(PULL)), 1.0).predicted(truth)
+    force = force + 0.5 * np.random.default_rng(1).standard_normal(len(force))
+    rows = "\n".join(f"{k}, {1e3 * x:.9g}, {F:.9g}" for k, (x, F) in enumerate(
+        zip(PULL, force, strict=True)))
+    (tmp_path / "loop.csv").write_text(f"time [s], pull [mm], force [N]\n{rows}\n")
+    return path
+
+
+def test_a_study_is_fitted(study, cli, tmp_path):
+    read = fc.Study.read(study)
+    assert fc.Study.from_toml(read.to_toml(), study) == read
+    data, = study_data(read)
+    assert data.displacement == pytest.approx(PULL)
+    found = fit_study(read)
+    for name, truth in (("friction.friction_coefficient", 0.4), ("friction.stiffness", 1e6)):
+        assert abs(found[name] - truth) < 4.0 * found.deviations[name]
+        assert found.deviations[name] < 0.1 * truth
+    folder = tmp_path / "found"
+    code, out, _ = cli("fit", str(study), "-o", str(folder))
+    assert code == 0
+    assert "friction.stiffness" in out
+    stored = json.loads((folder / "fit.json").read_text())
+    assert stored["parameters"]["friction.stiffness"]["value"] == pytest.approx(
+        found["friction.stiffness"])
+    assert (folder / "fit.png").stat().st_size > 5000
+    before = (folder / "start-0.jsonl").read_text()
+    assert cli("fit", str(study), "-o", str(folder))[0] == 0
+    assert (folder / "start-0.jsonl").read_text() == before
+    # Another start of the model is another fit.
+    code, _, told = cli("fit", str(study), "-o", str(folder), "--set", "load.normal=120")
+    assert code == 1
+    assert "is of a fit of another model" in told
+    assert cli("fit", str(study), "-o", str(folder), "--set", "load.normal=120",
+               "--overwrite")[0] == 0
+
+
+@pytest.mark.long
+def test_two_processes_give_the_same(study):
+    read = fc.Study.read(study)
+    alone, both = fit_study(read), fit_study(read, workers=2)
+    assert both.estimates.tolist() == alone.estimates.tolist()
+    assert both.covariance.tolist() == alone.covariance.tolist()
+
+
+def test_kinds_of_data_of_a_study(study, tmp_path):
+    time = np.arange(0.0, 0.5, 1e-3)
+    x = np.exp(-9.0 * time) * np.cos(250.0 * time)
+    hertz = np.linspace(10.0, 60.0, 21)
+    (tmp_path / "decay.csv").write_text("time [s], tip [mm]\n" + "\n".join(
+        f"{t:.6f}, {v:.9g}" for t, v in zip(time, x, strict=True)))
+    (tmp_path / "test.csv").write_text("f [Hz], H re [m/s^2/N], H im [m/s^2/N]\n" + "\n".join(
+        f"{f:.6f}, 1.0, {f:.6f}" for f in hertz))
+    text = STUDY.partition("[[fit.data]]")[0] + """
+[[fit.data]]
+kind = "ring-down"
+file = "decay.csv"
+t_end = 0.4
+initial = [0.0, 1.0]
+
+[[fit.data]]
+kind = "backbone"
+file = "decay.csv"
+window = 8.0
+frequency_hz = 40.0
+
+[[fit.data]]
+kind = "history"
+file = "decay.csv"
+deviation = 1e-5
+t_start = 0.1
+units = { tip = "m" }
+
+[[fit.data]]
+kind = "frequencies"
+frequencies_hz = [40.0, 90.0]
+modes = [1, 3]
+
+[[fit.data]]
+kind = "receptance"
+file = "test.csv"
+excitation = "C"
+excitation_component = "y"
+
+[[fit.data]]
+kind = "response"
+file = "test.csv"
+changes = { "drive.amplitude_x" = 1e-4 }
+"""
+    kinds = study_data(fc.Study.from_toml(text, study))
+    decay, backbone, history, frequencies, receptance, response = kinds
+    assert decay.curve.frequency == pytest.approx(
+        np.full(len(decay.curve), np.hypot(250.0, 9.0) / (2.0 * np.pi)), rel=1e-6)
+    assert decay.curve.amplitude.max() < 1e-3
+    assert decay.initial.tolist() == [0.0, 1.0]
+    assert backbone.curve.damping_ratio == pytest.approx(
+        np.full(len(backbone.curve), 9.0 / np.hypot(250.0, 9.0)), rel=1e-5)
+    assert history.time[0] == pytest.approx(0.1)
+    assert np.abs(history.values).max() > 0.1
+    assert frequencies.modes.tolist() == [1, 3]
+    assert receptance.kind == "accelerance"
+    assert receptance.excitation == ("C", "y")
+    assert receptance.measured[21:] == pytest.approx(hertz)
+    assert response.amplitude == pytest.approx(np.hypot(1.0, hertz))
+    assert response.changes == {"drive.amplitude_x": 1e-4}
+
+
+@pytest.mark.parametrize(("old", "new", "told"), [
+    ("[fit]\nstarts = 2", "[fit]\nstart = 2", "did you mean 'starts'"),
+    ("starts = 2", "starts = 0", "starts = 0 must be at least 1"),
+    ("low = 0.05", "low = 2.0", "high = 1 must lie above low = 2"),
+    ('kind = "loop"', 'kind = "loops"', 'must be "loop"'),
+    ('against = "pull"', "", "kind = 'loop' needs the key 'against'"),
+    ('"loop.csv"', '"lop.csv"', "there is no such file"),
+    ('"force"', '"forc"', "did you mean 'force'"),
+    ("deviation = 0.5", "deviation = 0.0", "must be a finite number above zero"),
+    ("friction.stiffness = {", "friction.stifness = {", "did you mean 'stiffness'"),
+    ('kind = "loop"', 'kind = "history"\ninitial = "preload"', "needs the section [preload]"),
+])
+def test_what_is_wrong_in_a_study_is_told(old, new, told, study, cli):
+    assert old in STUDY
+    study.write_text(STUDY.replace(old, new))
+    code, _, said = cli("fit", str(study))
+    assert code == 1
+    assert told in said
+    assert said.count("\n") == 1
+    assert not (study.parent / "results").exists()
+
+
+def test_a_study_without_the_section(study, cli):
+    study.write_text(STUDY.partition("[fit]")[0])
+    code, _, said = cli("fit", str(study))
+    assert code == 1
+    assert "has no section [fit]" in said
