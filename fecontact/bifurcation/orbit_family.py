@@ -225,19 +225,19 @@ def _followed(
     limits: Array | None, both: bool = False,
 ) -> Branch:
     """Follow a family from a start by collocation."""
-    found, u, tangent = start
-    problem: Any = found
+    problem: Any
+    tangent: Array | None
+    problem, u, tangent = start
     kind: Any = _ByCollocation
     if isinstance(method, HarmonicBalance):
-        problem, u, tangent = harmonic_starts.of_orbit(found, u, tangent, method)
-        problem, kind = replace(problem, limits=limits), _ByHarmonics
+        problem, u, tangent = harmonic_starts.start_of(start, method, limits)
+        kind = _ByHarmonics
         attributes = harmonic_attributes(problem)
     elif isinstance(method, Shooting):
-        problem, u, tangent = shooting_start(start, method.segments, method.rtol,
-                                             method.derivative_rtol, method.solver, limits)
+        problem, u, tangent = shooting_start(start, method, limits)
         kind, attributes = _ByShooting, shooting_attributes(problem)
     else:
-        attributes = attributes_of(found, limits)
+        attributes = attributes_of(problem, limits)
     kept = {entry.name: getattr(problem, entry.name) for entry in fields(problem)}
     if "precision" in kept:
         kept["precision"] = _PRECISION

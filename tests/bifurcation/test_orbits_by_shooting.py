@@ -212,8 +212,6 @@ def test_motions_of_both_kinds_are_those_of_runs(two_masses):
 def test_kind_errors(two_masses):
     field, sliding, orbits = two_masses
     doubling, = orbits.of_kind("period doubling")
-    with pytest.raises(InputError, match="collocation of degree 4, and so are the orbits beyond"):
-        orbit_branch(field, doubling, method=Shooting())
     with pytest.raises(InputError, match="both = True goes with motions, resonances, regular"):
         orbit_branch(field, doubling, both=True)
     with pytest.raises(InputError, match="follow the equilibrium over that one first"):

@@ -10,19 +10,18 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
-    sizes_of,
 )
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.method import MOST, MOST_SAMPLED, HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
-from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.orbits.restored import rescaled
 from fecontact.bifurcation.orbits.same_orbit import HALVING
-from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_positive
+from fecontact.bifurcation.orbits.starts import Begun
+from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.model_limits import beyond_fit, warn_of_limits
@@ -46,34 +45,15 @@ _OFF_AT_FOLD = 0.1
 _ON_TWO = ("branch point", HALVING)
 
 
-def from_motion(
-    field: VectorField, values: Array, free: int, motion: PeriodicMotion, method: HarmonicBalance,
-    options: ContinuationOptions, widths: Array, limits: Array | None, direction: float,
-    both: bool,
+def followed(
+    start: Begun, method: HarmonicBalance, options: ContinuationOptions, limits: Array | None,
+    **how: Any,
 ) -> Branch:
-    """Branch through the orbit to which a motion has settled.
-
-    ``widths`` (d + 1,) are scales of states and parameter, ``limits`` (d,) those of their growth.
-    """
-    problem, u = starts.corrected(*starts.from_samples(
-        field, values, free, motion.times, motion.states, motion.period, method, motion.periods,
-        widths))
-    return follow(replace(problem, limits=limits), u, None, method, options,
-                  direction=direction, both=both)
-
-
-def born(
-    field: VectorField, point: HopfPoint, method: HarmonicBalance, options: ContinuationOptions,
-    scales: ArrayLike | None, width: float | None,
-) -> Branch:
-    """Branch of the orbits that are born at a Hopf point."""
-    failed: FecontactError = InputError("There is nothing to start from.")
-    for problem, u, leaving in starts.at_hopf(field, point, method, options, scales, width):
-        try:
-            return follow(problem, u, leaving, method, options)
-        except FecontactError as error:
-            failed = error
-    raise failed
+    """Branch from a start by collocation; ``limits`` (d,) are those of the growth of scales."""
+    problem, u, tangent = starts.start_of(start, method, limits)
+    if tangent is None:
+        problem, u = starts.corrected(problem, u)
+    return follow(problem, u, tangent, method, options, **how)
 
 
 def beyond(
@@ -135,14 +115,9 @@ def _method_of(problem: HarmonicProblem) -> HarmonicBalance:
 def _rescaled(
     problem: HarmonicProblem, scales: ArrayLike | None, width: float | None
 ) -> HarmonicProblem:
-    """The problem with other scales of the states and another width of the diagram, if given."""
-    changed, d, limits = problem.scales.copy(), problem.field.dimension, problem.limits
-    if scales is not None:
-        changed[:d], limits = sizes_of(scales, changed[:d])[0], None
-    if width is not None:
-        require_positive("A branch", width=width)
-        changed[-1] = width
-    return replace(problem, scales=changed, limits=limits)
+    """As :func:`rescaled`; with given scales these no longer grow."""
+    return replace(rescaled(problem, scales, width),
+                   limits=problem.limits if scales is None else None)
 
 
 def attributes_of(problem: HarmonicProblem) -> dict[str, Any]:

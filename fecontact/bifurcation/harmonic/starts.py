@@ -1,18 +1,15 @@
-"""Starts of branches of orbits by harmonic balance: motions, Hopf points, special points.
+"""Starts of branches of orbits by harmonic balance: from collocation, and at special points.
 
 A start is a problem, its unknowns u and the direction in which the branch leaves.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.points import HopfPoint
-from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
-from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.layout import element_rows, layout_of, memory_blocks
@@ -23,16 +20,13 @@ from fecontact.bifurcation.harmonic.repeats import Repeats, ties_of
 from fecontact.bifurcation.harmonic.series import with_harmonics
 from fecontact.bifurcation.harmonic.timing import timing_of
 from fecontact.bifurcation.orbits import starts as orbit_starts
-from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.core.errors import AnalysisError, InputError
-from fecontact.core.types import Array, ArrayLike
+from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
 
 Start = tuple[HarmonicProblem, Array, Array]
 
 _CORRECTIONS = 40
-# Mesh on which a motion is sampled before it becomes a series.
-_INTERVALS, _DEGREE = 200, 4
 # Least size of an equation, in that of the largest one, by which it is divided at a branch point.
 _ZERO_ROW = 1e-8
 # Largest modal displacement at rest that is rounding.
@@ -96,63 +90,24 @@ def unknowns(problem: HarmonicProblem, states: Array, period: float) -> Array:
                            [problem.values[problem.free]]])
 
 
-def from_samples(
-    field: VectorField, values: Array, free: int, times: Array, states: Array,
-    period: float | None, method: HarmonicBalance, periods: int, scales: Array,
-) -> tuple[HarmonicProblem, Array]:
-    """Problem and first guess from a nearly periodic motion, as for collocation.
-
-    ``scales`` (d + 1,) are those of states and parameter.
-    """
-    found, nodes = orbit_starts.from_samples(field, values, free, times, states, period,
-                                             _INTERVALS, _DEGREE, periods, scales)
-    problem = problem_for(field, values, free, method, found.scales, periods)
-    sampled = orbit_starts.at_phase(found, nodes, problem.series.times)
+def start_of(
+    start: orbit_starts.Begun, method: HarmonicBalance, limits: Array | None
+) -> tuple[HarmonicProblem, Array, Array | None]:
+    """Problem, unknowns and direction, if there is one, from those by collocation."""
+    found, nodes, leaving = start
+    problem = replace(problem_for(found.field, found.parameters(nodes), found.free, method,
+                                  found.scales, found.periods), limits=limits)
+    phases = problem.series.times
+    sampled = orbit_starts.at_phase(found, nodes, phases)
     if problem.layout.memory:
         problem = replace(problem, kept=problem.kept.left_by(sampled))
     u = unknowns(problem, sampled, found.period(nodes))
-    return replace(problem, reference=problem.coefficients(u).copy()), u
-
-
-def of_orbit(
-    found: CollocationProblem, nodes: Array, leaving: Array, method: HarmonicBalance
-) -> Start:
-    """Start at an orbit by collocation, in the direction of its size.
-
-    ``leaving`` is the direction by collocation, which says whether the orbit grows or shrinks.
-    """
-    problem = problem_for(found.field, found.values, found.free, method, found.scales)
-    values = found.values.copy()
-    values[found.free] = nodes[-1]
-    problem = replace(problem, values=values)
-    u = unknowns(problem, orbit_starts.at_phase(found, nodes, problem.series.times),
-                 found.period(nodes))
-    size = u.copy()
-    size[: problem.reference.shape[1]], size[problem.size :] = 0.0, 0.0
-    size /= np.sqrt(problem.weights() @ size**2)
-    grows = orbit_starts.size_row(found, nodes) @ leaving
-    return (replace(problem, reference=problem.coefficients(u).copy()), u,
-            np.copysign(1.0, grows) * size)
-
-
-def at_hopf(
-    field: VectorField, point: HopfPoint, method: HarmonicBalance, options: ContinuationOptions,
-    scales: ArrayLike | None, width: float | None,
-) -> Iterator[Start]:
-    """Starts at a Hopf point, x = state + eps Re(vector exp(i w t)), for several amplitudes eps."""
-    values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
-    state = np.ascontiguousarray(point.u[:-1])
-    sizes, limits = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
-    widths = np.concatenate([sizes, [point.period, width_of(width, options, point.parameter)]])
-    problem = replace(problem_for(field, values, free, method, widths), limits=limits)
-    waves = np.exp(2.0j * np.pi * problem.series.times)[:, None]
-    leaving = unknowns(problem, (waves * point.eigenvector).real, 0.0)
-    leaving[-2:] = 0.0
-    leaving /= np.sqrt(problem.weights() @ leaving**2)
-    u = unknowns(problem, np.tile(state, (problem.samples, 1)), point.period)
-    for amplitude in orbit_starts.AMPLITUDES:
-        reference = problem.coefficients(leaving).copy()
-        yield replace(problem, reference=reference), u + amplitude * leaving, leaving
+    problem = replace(problem, reference=problem.coefficients(u).copy())
+    if leaving is None:
+        return problem, u, None
+    tangent = unknowns(problem, orbit_starts.at_phase(found, leaving, phases), 0.0)
+    tangent[-problem.common :] = leaving[found.size :]
+    return problem, u, tangent / np.sqrt(problem.weights() @ tangent**2)
 
 
 def restored(field: VectorField, point: BranchPoint) -> Start:

@@ -22,6 +22,7 @@ from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.continuation.sharpening import ROUGHLY, SHARPENED, Accuracy, sharpened
 from fecontact.bifurcation.fields.jumps import require_smooth_friction
 from fecontact.bifurcation.harmonic import branches as harmonic_branches
+from fecontact.bifurcation.harmonic import starts as harmonic_starts
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.orbit_methods import Collocation, Method, Shooting
 from fecontact.bifurcation.orbits import shooting_branches, starts
@@ -33,7 +34,7 @@ from fecontact.bifurcation.orbits.curves.resonant import (
     of_several,
 )
 from fecontact.bifurcation.orbits.motions import PeriodicMotion, solver_of
-from fecontact.bifurcation.orbits.restored import rescaled, restored
+from fecontact.bifurcation.orbits.restored import rescaled, restored, restored_shooting
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.bifurcation.orbits.state_error import state_error
 from fecontact.core.checks import require_flags, require_kind
@@ -50,6 +51,12 @@ _FIRST_STEPS = (1.0, 0.2, 0.04)
 _BRANCHING = ("period doubling", "branch point")
 # Points of curves of tori around which orbits of several periods lie.
 _STRONG = {"resonance 1:3": 3, "resonance 1:4": 4}
+
+# Mesh intervals on which a motion is put before it becomes a series, and samples of an orbit by
+# another method; distance, in the step length, of the neighbour that tells the direction there.
+_INTERVALS, _SAMPLES, _ALONG = 200, 8001, 1e-4
+# Steps to each side within which a special point is found again with few harmonics.
+_AROUND = 4
 
 T = TypeVar("T")
 
@@ -80,8 +87,9 @@ def orbit_branch(
     parameter : str, optional
         The parameter to vary; by default that of the point, or the only one of the field.
     method : Collocation, Shooting or HarmonicBalance, optional
-        By default that of the point's branch, else collocation. Twice the intervals, segments or
-        harmonics are used beyond a period doubling.
+        By default that of the point's branch, with twice the intervals, segments or harmonics
+        beyond a period doubling; else collocation. From any point by any method: harmonic balance
+        finds special points of others again with its own harmonics.
     options, bounds : ContinuationOptions and (float, float), optional
         Step lengths, tolerances, stopping conditions; range of the parameter in place of theirs.
     scales : (d,) sequence, optional
@@ -201,6 +209,14 @@ def _keeps(point: BranchPoint, method: Method | None) -> bool:
     return method is None or (isinstance(method, Shooting) and method.segments == found.segments)
 
 
+def _mesh_of(method: Method) -> tuple[int, int]:
+    """Intervals and degree of the mesh on which a start is put for a method."""
+    if isinstance(method, Collocation):
+        return method.intervals, method.degree
+    usual = Collocation()
+    return usual.intervals, usual.degree
+
+
 def _first_that_goes(attempts: Iterator[T], go: Callable[[T], Branch]) -> Branch:
     """Branch of the first attempt that succeeds."""
     failed: FecontactError = InputError("There is nothing to start from.")
@@ -216,18 +232,11 @@ def _from_hopf(
     field: VectorField, point: HopfPoint, method: Method,
     options: ContinuationOptions, scales: ArrayLike | None, width: float | None,
 ) -> Branch:
-    if isinstance(method, HarmonicBalance):
-        return harmonic_branches.born(field, point, method, options, scales, width)
-    if isinstance(method, Shooting):
-        return _first_that_goes(
-            starts.at_hopf(field, point, 50, 4, options, scales, width),
-            lambda found: shooting_branches.born(found[0], method.segments, method.rtol,
-                                                 method.derivative_rtol, method.solver, options,
-                                                 found[1]))
-    require_smooth_friction(field)
+    if isinstance(method, Collocation):
+        require_smooth_friction(field)
     return _first_that_goes(
-        starts.at_hopf(field, point, method.intervals, method.degree, options, scales, width),
-        lambda found: _followed(found[0], method, options, found[1]))
+        starts.at_hopf(field, point, *_mesh_of(method), options, scales, width),
+        lambda found: _FOLLOWED[type(method)](found[0], method, options, found[1]))
 
 
 def _from_motion(
@@ -243,19 +252,22 @@ def _from_motion(
     given[free] = inside(float(given[free]), options)
     sizes, limits = sizes_of(scales, motion.amplitudes + 1e-300)
     widths = np.append(sizes, width_of(width, options, given[free]))
-    if isinstance(method, HarmonicBalance):
-        return harmonic_branches.from_motion(field, given, free, motion, method, options, widths,
-                                             limits, direction, both)
     if isinstance(method, Shooting):
-        return shooting_branches.from_motion(
-            field, given, free, motion, method.segments, method.rtol, method.derivative_rtol,
-            method.solver, options, widths, limits, direction, both)
-    require_smooth_friction(field)
-    problem, u = starts.corrected_samples(
-        lambda intervals: starts.from_samples(
-            field, given, free, motion.times, motion.states, motion.period, intervals,
-            method.degree, motion.periods, widths), method.intervals)
-    return _followed((problem, u, None), method, options, limits, direction=direction, both=both)
+        return shooting_branches.from_motion(field, given, free, motion, method, options, widths,
+                                             limits, direction, both)
+
+    def sampled(intervals: int) -> tuple[CollocationProblem, Array]:
+        return starts.from_samples(field, given, free, motion.times, motion.states, motion.period,
+                                   intervals, degree, motion.periods, widths)
+
+    intervals, degree = _mesh_of(method)
+    if isinstance(method, Collocation):
+        require_smooth_friction(field)
+        problem, u = starts.corrected_samples(sampled, intervals)
+    else:
+        problem, u = sampled(_INTERVALS)
+    return _FOLLOWED[type(method)]((problem, u, None), method, options, limits,
+                                   direction=direction, both=both)
 
 
 def _around(
@@ -320,43 +332,84 @@ def _beyond(
     field: VectorField, point: BranchPoint, method: Method | None,
     options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
 ) -> Branch:
-    """The other orbits at a special point of a branch of orbits."""
-    if point.by_harmonics:
-        if not (method is None or isinstance(method, HarmonicBalance)):
-            raise InputError(f"{point.place} was found by harmonic balance, and so are the orbits "
-                             f"beyond it; leave the method out.")
-        return harmonic_branches.beyond(field, point, method, options, scales, width, direction)
-    if point.by_shooting:
-        if not (method is None or isinstance(method, Shooting)):
-            raise InputError(f"{point.place} was found by shooting, and so are the orbits beyond "
-                             f"it; leave the method out.")
-        return shooting_branches.doubled(
-            field, point, None if method is None else (method.segments, method.rtol,
-                                                       method.derivative_rtol),
-            options, scales, width, direction)
-    if not _keeps(point, method):
-        raise InputError(f"{point.place} was found by collocation of degree "
-                         f"{point.branch.attributes['degree']}, and so are the orbits beyond it; "
-                         f"leave the method out, or give other intervals.")
-    problem, u, tangent = restored(field, point)
+    """The other orbits at a special point of a branch of orbits, by any method."""
+    doubling, own = point.kind == "period doubling", _method_of(point)
+    chosen = method or own
+    if isinstance(chosen, HarmonicBalance) and point.by_harmonics:
+        return harmonic_branches.beyond(field, point, None if method is None else chosen, options,
+                                        scales, width, direction)
+    if isinstance(chosen, Shooting) and point.by_shooting and doubling:
+        return shooting_branches.beyond(field, point, None if method is None else chosen, options,
+                                        scales, width, direction)
+    require_smooth_friction(field)
+    if isinstance(own, Collocation) and _keeps(point, method or own):
+        problem, u, tangent = restored(field, point)
+    else:
+        problem, u, tangent = _collocated(field, point, chosen)
     problem = rescaled(problem, scales, width)
-    found = (starts.doubled(problem, u) if point.kind == "period doubling"
-             else starts.crossing(problem, u, tangent))
-    usual = _method_of(point)
-    assert isinstance(usual, Collocation)
-    intervals = usual.intervals * (2 if point.kind == "period doubling" else 1)
-    chosen = method if isinstance(method, Collocation) else replace(usual, intervals=intervals)
-    problem, u, tangent = _on_own_intervals(found, chosen)
+    if isinstance(chosen, HarmonicBalance):
+        there = _found_again(point, (problem, u, tangent), chosen, options)
+        return harmonic_branches.beyond(field, there, chosen, options, scales, width, direction)
+    if doubling and isinstance(chosen, Shooting):
+        single, first = shooting_branches.start_of((problem, u, tangent), replace(
+            chosen, segments=max(chosen.segments // 2, 1)), None)[:2]
+        return shooting_branches.doubled(single, first, options, direction)
+    found = starts.doubled(problem, u) if doubling else starts.crossing(problem, u, tangent)
+    if isinstance(chosen, Collocation):
+        if method is None and doubling:
+            chosen = replace(chosen, intervals=2 * chosen.intervals)
+        found = _on_own_intervals(found, chosen)
+    problem, u, tangent = found
     tangent = np.copysign(1.0, direction) * heading(tangent, problem.weights())
 
     # At the point both branches are indistinguishable, and the new one may bend strongly: step off
     # it, by less if the corrector fails.
     def go(part: float) -> Branch:
         step = max(part * options.step, options.smallest_step)
-        return _followed((problem, u + step * tangent, tangent), chosen,
-                         replace(options, step=step), None)
+        return _FOLLOWED[type(chosen)]((problem, u + step * tangent, tangent), chosen,
+                                       replace(options, step=step), None)
 
     return _first_that_goes(iter(_FIRST_STEPS), go)
+
+
+def _found_again(
+    point: BranchPoint, start: starts.Start, method: HarmonicBalance, options: ContinuationOptions
+) -> BranchPoint:
+    """A special point as few harmonics have it, a little beside that of all of them."""
+    problem, u, tangent = start
+    how = replace(method, harmonics=max(method.highest // 2, 1)
+                  if point.kind == "period doubling" else method.highest)
+    step = options.step
+    near = replace(options, points=2 * _AROUND + 1, largest_step=step, bounds=(-np.inf, np.inf),
+                   stop_at=(), events={}, progress=None, locate=True)
+    found = harmonic_branches.followed((problem, u - _AROUND * step * tangent, tangent), how, near,
+                                       None).of_kind(str(point.kind))
+    if not found:
+        raise AnalysisError(f"{point.place} is none with {how.highest} harmonics; take more.")
+    return min(found, key=lambda one: abs(one.parameter - point.parameter))
+
+
+def _collocated(field: VectorField, point: BranchPoint, method: Method) -> starts.Start:
+    """Orbit and direction of the branch, by collocation, of a point found by another method."""
+    problem: Any
+    problem, u, tangent = _restored(field, point)
+    motions = [replace(point, u=there, values={**point.values, "period": problem.period(there)})
+               .orbit(field, _SAMPLES) for there in (u, u + _ALONG * tangent)]
+    at = motions[0]
+    values, d = point.parameter_values(field), field.dimension
+    intervals, degree = _mesh_of(method)
+    found, nodes = starts.from_samples(
+        field, values, problem.free, at.times, at.states, at.period,
+        intervals if isinstance(method, Collocation) else _INTERVALS, degree, at.periods,
+        np.append(problem.scales[:d], problem.scales[-1]))
+    return found, nodes, starts.along(found, nodes, motions[1], _ALONG)
+
+
+def _restored(field: VectorField, point: BranchPoint) -> tuple[Any, Array, Array]:
+    """Problem, unknowns and tangent of a point of a branch of orbits, by its method."""
+    if point.by_harmonics:
+        return harmonic_starts.restored(field, point)
+    return (restored_shooting if point.by_shooting else restored)(field, point)
 
 
 def _goes_on(
@@ -452,3 +505,9 @@ def _sharpened(
     point = branch.points[index]
     before = next((one for one in branch.points[index::-1] if one.kind is None), branch.points[-1])
     return sharpened(point, restored(field, point), restored(field, before), accuracy)
+
+
+# How a start by collocation is followed by each method.
+_FOLLOWED: dict[type, Callable[..., Branch]] = {
+    Collocation: _followed, Shooting: shooting_branches.followed,
+    HarmonicBalance: harmonic_branches.followed}

@@ -9,6 +9,7 @@ from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
 from fecontact.bifurcation.continuation.points import special_point
 from fecontact.bifurcation.continuation.problem import sizes_of
 from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.motions import solver_of
 from fecontact.bifurcation.orbits.shooting import ShootingProblem
@@ -16,7 +17,7 @@ from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField
 
-P = TypeVar("P", CollocationProblem, ShootingProblem)
+P = TypeVar("P", CollocationProblem, ShootingProblem, HarmonicProblem)
 
 
 def restored(

@@ -11,6 +11,7 @@ from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.orbit_methods import Shooting
 from fecontact.bifurcation.orbits.mesh import interpolate
 from fecontact.bifurcation.orbits.motions import PeriodicMotion, solver_text
 from fecontact.bifurcation.orbits.restored import rescaled, restored_shooting
@@ -24,7 +25,7 @@ from fecontact.bifurcation.orbits.starts import Start, from_samples
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.ties import first_largest
 from fecontact.core.types import Array, ArrayLike
-from fecontact.integrate.solvers import SetValued, Solver
+from fecontact.integrate.solvers import SetValued
 from fecontact.system.fields.vector_field import VectorField
 
 # Distance of the two halves of an orbit, relative to the largest one, at which a branch of doubled
@@ -54,26 +55,25 @@ def _name(problem: ShootingProblem) -> str:
     return list(problem.field.parameters)[problem.free]
 
 
-def born(
-    start: Start, segments: int, rtol: float, derivative_rtol: float | None, solver: Solver,
-    options: ContinuationOptions, limits: Array | None,
+def followed(
+    start: Start, method: Shooting, options: ContinuationOptions, limits: Array | None
 ) -> Branch:
-    """Branch from a start at a Hopf point, for orbits that reach stick on steep friction.
+    """Branch from a start by collocation, for orbits that reach stick on steep friction.
 
     ``limits`` (d,) are those of the growth of the scales, here and below.
     """
-    problem, first, tangent = start_of(start, segments, rtol, derivative_rtol, solver, limits)
+    problem, first, tangent = start_of(start, method, limits)
     return continue_branch(problem, first, options, name=_name(problem), tangent=tangent,
                            attributes=attributes_of(problem))
 
 
 def start_of(
-    start: Start, segments: int, rtol: float, derivative_rtol: float | None, solver: Solver,
-    limits: Array | None,
+    start: Start, method: Shooting, limits: Array | None
 ) -> tuple[ShootingProblem, Array, Array]:
     """Problem, unknowns and direction by shooting, from those by collocation."""
     found, u, leaving = start
-    problem, first = shooting_from(found, u, segments, rtol, derivative_rtol, solver)
+    problem, first = shooting_from(found, u, method.segments, method.rtol, method.derivative_rtol,
+                                   method.solver)
     problem = replace(problem, limits=limits)
     shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
     tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
@@ -81,9 +81,8 @@ def start_of(
 
 
 def from_motion(
-    field: VectorField, values: Array, free: int, motion: PeriodicMotion, segments: int,
-    rtol: float, derivative_rtol: float | None, solver: Solver, options: ContinuationOptions,
-    widths: Array, limits: Array | None, direction: float, both: bool,
+    field: VectorField, values: Array, free: int, motion: PeriodicMotion, method: Shooting,
+    options: ContinuationOptions, widths: Array, limits: Array | None, direction: float, both: bool,
 ) -> Branch:
     """Branch through the orbit to which a motion of a contact system has settled.
 
@@ -104,7 +103,8 @@ def from_motion(
                                     field.system().basis.modes)
     found = from_samples(field, values, free, times, states, motion.period, _INTERVALS, _DEGREE,
                          motion.periods, widths)
-    problem, u = shooting_from(*found, segments, rtol, derivative_rtol, solver)
+    problem, u = shooting_from(*found, method.segments, method.rtol, method.derivative_rtol,
+                               method.solver)
     problem = replace(problem, limits=limits)
     branch, why = _from_event_to_event(problem, u, options, direction=direction, both=both)
     if branch is not None:
@@ -115,7 +115,8 @@ def from_motion(
             problem, u, options, name=_name(problem), direction=direction, both=both,
             attributes=attributes_of(problem))
     except (AnalysisError, InputError) as error:
-        remedy = stepping or (f"run it longer until it has settled, or take more than {segments} "
+        remedy = stepping or (f"run it longer until it has settled, or take more than "
+                              f"{method.segments} "
                               f"segments.")
         raise AnalysisError(f"No periodic orbit was found at {_name(problem)} = {values[free]:.6g} "
                             f"near the motion: Newton's method does not converge; {remedy}"
@@ -226,35 +227,41 @@ def goes_on(
         attributes=attributes_of(problem)))
 
 
-def doubled(
-    field: VectorField, point: BranchPoint, how: tuple[int, float, float | None] | None,
-    options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
+def beyond(
+    field: VectorField, point: BranchPoint, method: Shooting | None, options: ContinuationOptions,
+    scales: ArrayLike | None, width: float | None, direction: float,
 ) -> Branch:
-    """The branch of orbits of twice the period that begins at a period doubling.
+    """The orbits of twice the period that begin at a period doubling found by shooting.
 
-    They leave along the eigenvector of the multiplier -1, transported along the orbit, with
-    opposite sign in the second round. Where both rounds coincide again, at another doubling of the
-    single orbit, the branch ends with a point 'period halving': beyond it lie the same orbits with
-    their halves exchanged. ``how`` is segments, rtol and derivative_rtol, by default those of the
-    branch with twice the segments.
+    The method is by default that of the branch with twice the segments.
 
     Raises
     ------
     InputError
-        If the point is not a period doubling, or the number of segments differs.
+        If the number of segments differs.
     """
-    if point.kind != "period doubling":
-        raise InputError(f"{point.place} was found by shooting, by which other orbits begin at "
-                         f"period doublings alone.")
     problem, u, _ = restored_shooting(field, point)
     problem = rescaled(problem, scales, width)
-    if how is not None:
+    if method is not None:
         segments = 2 * (len(problem.mesh) - 1)
-        if how[0] != segments:
-            raise InputError(f"segments = {how[0]} must be {segments}, twice those of the "
+        if method.segments != segments:
+            raise InputError(f"segments = {method.segments} must be {segments}, twice those of the "
                              f"branch, for the orbits of twice the period; or leave the method "
                              f"out.")
-        problem = replace(problem, rtol=how[1], derivative_rtol=how[2])
+        problem = replace(problem, rtol=method.rtol, derivative_rtol=method.derivative_rtol)
+    return doubled(problem, u, options, direction)
+
+
+def doubled(
+    problem: ShootingProblem, u: Array, options: ContinuationOptions, direction: float
+) -> Branch:
+    """The branch of orbits of twice the period that begins at a period doubling u.
+
+    They leave along the eigenvector of the multiplier -1, transported along the orbit, with
+    opposite sign in the second round. Where both rounds coincide again, at another doubling of the
+    single orbit, the branch ends with a point 'period halving': beyond it lie the same orbits with
+    their halves exchanged.
+    """
     twice, start, tangent = _doubled(problem, u)
     tangent = np.copysign(1.0, direction) * heading(tangent, twice.weights())
     stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)

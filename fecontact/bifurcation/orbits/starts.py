@@ -5,6 +5,7 @@ A start is a problem, its unknowns u and the direction in which the branch leave
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -13,11 +14,14 @@ from fecontact.bifurcation.continuation.problem import ContinuationOptions, size
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, require_mesh
 from fecontact.bifurcation.orbits.mesh import equidistributed, interpolate, node_times
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.errors import AnalysisError, InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField
 
 Start = tuple[CollocationProblem, Array, Array]
+# The direction is not known of an orbit near a motion.
+Begun = tuple[CollocationProblem, Array, Array | None]
 
 _CORRECTIONS = 25
 # Times the intervals on which an orbit is found where the number asked for does not lead there.
@@ -120,21 +124,32 @@ def from_samples(
     if t[-1] - t[0] < T * (1.0 - 1e-9):
         raise InputError(f"The samples cover {t[-1] - t[0]:g} s, but the period is {T:g} s; give "
                          f"at least one period.")
-    # The phase of forced systems counts from t = 0.
-    phases = node_times(np.linspace(0.0, 1.0, 4 * intervals + 1), degree)
-
-    def sampled(phases: Array) -> Array:
-        offset = 0.0 if forcing is not None else t[-1] / T
-        place = t[-1] - T * np.mod(t[-1] / T - offset - phases, 1.0)
-        return np.stack([np.interp(place, t, column) for column in x.T], axis=1)
-
-    mesh = equidistributed(np.linspace(0.0, 1.0, 4 * intervals + 1), sampled(phases), degree,
-                           intervals)
+    fine = np.linspace(0.0, 1.0, 4 * intervals + 1)
+    sampled = partial(_at_phases, t, x, T, forcing is not None)
+    mesh = equidistributed(fine, sampled(node_times(fine, degree)), degree, intervals)
     nodes = sampled(node_times(mesh, degree))
     problem = CollocationProblem(field, values.copy(), free, mesh, degree, nodes,
                                  _with_period(scales, T), periods)
     return problem, np.concatenate([nodes.reshape(-1), [T] if forcing is None else [],
                                     [values[free]]])
+
+
+def _at_phases(t: Array, x: Array, period: float, forced: bool, phases: Array) -> Array:
+    """States (k, d) of a motion in its last period; phases of forced systems count from t = 0."""
+    offset = 0.0 if forced else t[-1] / period
+    place = t[-1] - period * np.mod(t[-1] / period - offset - phases, 1.0)
+    return np.stack([np.interp(place, t, column) for column in x.T], axis=1)
+
+
+def along(problem: CollocationProblem, u: Array, ahead: PeriodicMotion, distance: float) -> Array:
+    """Direction (N + 1,) from an orbit u to a motion at this distance, on the mesh of u."""
+    assert ahead.period is not None
+    assert ahead.parameter_values is not None
+    nodes = _at_phases(ahead.times, ahead.states, ahead.period, not problem.autonomous,
+                       node_times(problem.mesh, problem.degree))
+    there = np.concatenate([nodes.reshape(-1), [ahead.period] if problem.autonomous else [],
+                            [ahead.parameter_values[problem.free]]])
+    return (there - u) / distance
 
 
 def _with_period(scales: Array, period: float) -> Array:
