@@ -52,8 +52,8 @@ def _require_new(file: Path, force: bool) -> None:
 
 
 def import_(
-    file: Annotated[Path, Parameter(help="Mesh file: an Abaqus or CalculiX deck (.inp), Gmsh, "
-                                         "Nastran, MED, VTK.")],
+    file: Annotated[Path, Parameter(help="Mesh file: an Abaqus or CalculiX deck (.inp), Ansys "
+                                         "archive (.cdb), Gmsh, Nastran, MED, VTK.")],
     /,
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help=(

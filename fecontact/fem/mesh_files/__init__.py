@@ -16,7 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.checks import as_path, require_kind, require_regular_file
-from fecontact.core.errors import InputError, MeshError, ModelWarning, choices
+from fecontact.core.errors import (
+    InputError,
+    MeshError,
+    MissingLibraryError,
+    ModelWarning,
+    choices,
+)
 from fecontact.core.files.atomic_write import replaced
 from fecontact.core.resources.memory import available_memory, shown_memory
 from fecontact.core.types import ArrayLike, Coordinates, Integers
@@ -24,6 +30,7 @@ from fecontact.fem.attachments import counted_attachments
 from fecontact.fem.constraints import counted
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.abaqus import read_inp
+from fecontact.fem.mesh_files.ansys import read_cdb
 from fecontact.fem.mesh_files.gmsh import read_msh, write_msh
 from fecontact.fem.mesh_files.groups import Box, named_boundaries, named_constraints, named_points
 from fecontact.fem.mesh_files.med import read_med
@@ -43,17 +50,18 @@ def read_mesh(
 ) -> Mesh:
     """Read the mesh of a plane body or of a solid, with named boundaries and points, from a file.
 
-    Formats: Gmsh (.msh 2.2 and 4.1), Abaqus (.inp), Nastran (.bdf, .nas, .fem), MED (.med), VTK
-    (.vtk, .vtu). Files with tetrahedra, hexahedra, wedges or pyramids hold solids; with wedges or
-    pyramids all elements are cut into tetrahedra. Boundaries are groups of lines, of solids those
-    of surfaces: physical groups (Gmsh), surfaces, element sets and node sets on the outline
-    (Abaqus, MED), elements by property number (Nastran). Points are physical points, node sets,
-    groups inside the body, and lines of solids. VTK files have no groups. Curved sides of
-    second-order elements are kept, coincident nodes merged, nodes without a cell left out. Ties,
-    couplings, equations and sections of bolts of Abaqus files become ``mesh.constraints``, whose
-    nodes are not merged; masses, springs and dashpots become ``mesh.attachments``.
-    Sections of Abaqus files become ``mesh.materials``, in SI units if the file's forces are in N
-    and its mass fits to them, such as tonnes beside mm.
+    Formats: Gmsh (.msh 2.2 and 4.1), Abaqus (.inp), Ansys (.cdb, by mapdl-archive), Nastran (.bdf,
+    .nas, .fem), MED (.med), VTK (.vtk, .vtu). Files with tetrahedra, hexahedra, wedges or pyramids
+    hold solids; with wedges or pyramids all elements are cut into tetrahedra. Boundaries are groups
+    of lines, of solids those of surfaces: physical groups (Gmsh), surfaces, element sets and node
+    sets on the outline (Abaqus, MED), components of nodes on it (Ansys), elements by property
+    number (Nastran). Points are physical points, node sets, groups inside the body, and lines of
+    solids. VTK files have no groups. Curved sides of second-order elements are kept, coincident
+    nodes merged, nodes without a cell left out. Ties, couplings, equations and sections of bolts of
+    Abaqus files become ``mesh.constraints``, whose nodes are not merged; masses, springs and
+    dashpots become ``mesh.attachments``. Sections of Abaqus files, and materials of Ansys archives,
+    become ``mesh.materials``, in SI units if the file's forces are in N and its mass fits to them,
+    such as tonnes beside mm.
 
     Parameters
     ----------
@@ -67,7 +75,8 @@ def read_mesh(
         Points by new name: a group of the file, or the node nearest to a place [m] in the body.
     part : str, optional
         One of several bodies in the file: a physical group of cells (Gmsh), an element set, part or
-        instance (Abaqus), a group of cells (MED), a property number (Nastran); by default all.
+        instance (Abaqus), a component of elements (Ansys), a group of cells (MED), a property
+        number (Nastran); by default all.
 
     Raises
     ------
@@ -284,6 +293,7 @@ def _reader(path: Path) -> tuple[Callable[[Path], RawMesh], str]:
     readers: dict[str, tuple[Callable[[Path], RawMesh], str]] = {
         ".msh": (read_msh, "Gmsh"),
         ".inp": (read_inp, "Abaqus"),
+        ".cdb": (read_cdb, "Ansys"),
         ".med": (read_med, "MED"),
         ".vtk": (_read_vtk, "VTK"),
         ".vtu": (_read_vtu, "VTU"),
@@ -300,7 +310,7 @@ def _raw(path: Path) -> RawMesh:
     reader, format_name = _reader(path)
     try:
         return reader(path)
-    except (MeshError, InputError):
+    except (MeshError, InputError, MissingLibraryError):
         raise
     except MemoryError:
         raise MeshError(f"The file declares more data than fits into memory, of which "
