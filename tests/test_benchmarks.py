@@ -20,6 +20,7 @@ BENCHMARKS = {
     "eigen": ((), [(r"^square 13 x 13, P2.* (\S+)$", 0.0, 1e-12),
                    (r"^cube .* iterative .* (\S+)$", 0.0, 1e-8),
                    (r"^plate .* direct .* (\S+)$", 0.0, 1e-8)]),
+    "decks": ((), [(r"^fecontact, .inp +(\d+)", 5324.0, 0.0), (r"^fecontact, .cdb .* (\d+)$", 430.0, 0.0)]),
     "ensemble": (("4", "3"), [(r"1 thread +rtol 1e-05 .* error (\S+)$", 0.0, 1e-3)]),
     "fit_coverage": ((), [(r"^  alpha (\S+),", 5e4, 1e3), (r"^  gamma (\S+),", 0.8, 0.03),
                           (r"^  delta (\S+),", -1.1, 0.05),

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, get_args
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -33,6 +34,71 @@ from fecontact.fem.material import AnyMaterial
 Bricks = Literal["full", "incompatible"]
 
 _FLAT = 1e-12  # area of a degenerate cell, relative to its squared sides
+
+
+class _Checked:
+    """Nodes and cells that make a mesh, with the sides of the cells; MeshError if they do not.
+
+    Attributes
+    ----------
+    nodes, cells : arrays
+        As of the mesh; read-only.
+    kind : CellKind
+    facets : (M f, n) array
+        Sides of each cell in turn, so that inner ones occur twice.
+    number, count : arrays
+        Number of each of them without its orientation, and number of cells at each.
+    """
+
+    def __init__(self, given: Array, corners: Integers) -> None:
+        nodes = np.array(as_floats(given, "Mesh nodes"))
+        cells = np.array(as_integers(corners, "Mesh cells"))
+        if nodes.ndim != 2 or nodes.shape[1] not in (2, 3):
+            raise MeshError(f"Mesh nodes must have shape (N, 2), or (N, 3) for a solid, not "
+                            f"{nodes.shape}.")
+        dimension = nodes.shape[1]
+        if cells.ndim != 2 or (dimension, cells.shape[1]) not in CELL_KINDS or not len(cells):
+            raise MeshError(
+                f"Mesh cells must have shape (M, 3) for triangles or (M, 4) for quadrilaterals "
+                f"with M > 0, not {cells.shape}." if dimension == 2 else
+                f"Mesh cells of a solid must have shape (M, 4) for tetrahedra or (M, 8) for "
+                f"hexahedra with M > 0, not {cells.shape}."
+            )
+        if not np.isfinite(nodes).all():
+            raise MeshError("Mesh nodes hold values that are not finite.")
+        if cells.min() < 0 or cells.max() >= len(nodes):
+            raise MeshError(f"Mesh cells name nodes outside 0 ... {len(nodes) - 1}.")
+        unused = np.count_nonzero(np.bincount(cells.ravel(), minlength=len(nodes)) == 0)
+        if unused:
+            raise MeshError(f"{unused} mesh nodes belong to no cell; remove them.")
+        self.kind = kind = CELL_KINDS[dimension, cells.shape[1]]
+        self.nodes = nodes
+        self.cells = (_oriented(nodes, cells) if dimension == 2
+                      else oriented_solids(nodes, cells, kind))
+        self.facets = facets_of(self.cells, kind)
+        _, self.number, self.count = numbered_rows(np.sort(self.facets, axis=1))
+        self._require_sound()
+        for array in (self.nodes, self.cells):
+            array.setflags(write=False)
+        _CHECKED[id(self.nodes), id(self.cells)] = self
+
+    def _require_sound(self) -> None:
+        """MeshError for cells that overlap or do not fit together."""
+        count, number, facets = self.count, self.number, self.facets
+        crowded = facets[count[number] > 2]
+        if len(crowded):
+            what = "edge between mesh nodes" if self.nodes.shape[1] == 2 else "face of mesh nodes"
+            raise MeshError(
+                f"The {what} {' and '.join(map(str, crowded[0]))} belongs to more than two cells; "
+                f"remove overlapping cells."
+            )
+        require_apart(facets, number, count, self.nodes)
+        require_conforming(facets[count[number] == 1], self.nodes)
+        require_no_overlap(self.nodes, self.cells, self.kind, np.flatnonzero(count[number] == 1))
+
+
+# Those of meshes that are alive: another one of the same nodes and cells needs no checks.
+_CHECKED: "WeakValueDictionary[tuple[int, int], _Checked]" = WeakValueDictionary()
 
 
 @read_only_arrays
@@ -91,6 +157,7 @@ class Mesh(Summarised):
     materials: Mapping[str, AnyMaterial] = field(default_factory=dict)
     bricks: Bricks = "full"
     attachments: Sequence[Attachment] = ()
+    _checked: "_Checked" = field(init=False, repr=False, compare=False)
 
     @classmethod
     def grid(cls, x: ArrayLike, y: ArrayLike, z: ArrayLike | None = None) -> "Mesh":
@@ -124,29 +191,12 @@ class Mesh(Summarised):
         return cls(*structured((x, y) if z is None else (x, y, z)))
 
     def __post_init__(self) -> None:
-        nodes = np.array(as_floats(self.nodes, "Mesh nodes"))
-        cells = np.array(as_integers(self.cells, "Mesh cells"))
-        if nodes.ndim != 2 or nodes.shape[1] not in (2, 3):
-            raise MeshError(f"Mesh nodes must have shape (N, 2), or (N, 3) for a solid, not "
-                            f"{nodes.shape}.")
-        dimension = nodes.shape[1]
-        if cells.ndim != 2 or (dimension, cells.shape[1]) not in CELL_KINDS or not len(cells):
-            raise MeshError(
-                f"Mesh cells must have shape (M, 3) for triangles or (M, 4) for quadrilaterals "
-                f"with M > 0, not {cells.shape}." if dimension == 2 else
-                f"Mesh cells of a solid must have shape (M, 4) for tetrahedra or (M, 8) for "
-                f"hexahedra with M > 0, not {cells.shape}."
-            )
-        if not np.isfinite(nodes).all():
-            raise MeshError("Mesh nodes hold values that are not finite.")
-        if cells.min() < 0 or cells.max() >= len(nodes):
-            raise MeshError(f"Mesh cells name nodes outside 0 ... {len(nodes) - 1}.")
-        if len(np.unique(cells)) != len(nodes):
-            raise MeshError(
-                f"{len(nodes) - len(np.unique(cells))} mesh nodes belong to no cell; remove them."
-            )
-        kind = CELL_KINDS[dimension, cells.shape[1]]
-        cells = _oriented(nodes, cells) if dimension == 2 else oriented_solids(nodes, cells, kind)
+        checked = _CHECKED.get((id(self.nodes), id(self.cells)))
+        if checked is None or checked.nodes is not self.nodes or checked.cells is not self.cells:
+            checked = _Checked(self.nodes, self.cells)
+        object.__setattr__(self, "_checked", checked)
+        nodes, cells = checked.nodes, checked.cells
+        dimension, kind = nodes.shape[1], checked.kind
         require_kind("Mesh", Mapping, boundaries=self.boundaries, points=self.points)
         for name in (*self.boundaries, *self.points):
             require_kind("Mesh: boundaries and points", str, name=name)
@@ -168,20 +218,9 @@ class Mesh(Summarised):
         for name, value in (("nodes", nodes), ("cells", cells), ("points", points),
                             ("curved_edges", curved), ("curved_middles", middles)):
             object.__setattr__(self, name, value)
-        count = self._cells_at_facets
-        crowded = self._facets[count[self._facet_number] > 2]
-        if len(crowded):
-            what = ("edge between mesh nodes" if dimension == 2 else "face of mesh nodes")
-            raise MeshError(
-                f"The {what} {' and '.join(map(str, crowded[0]))} belongs to more than two cells; "
-                f"remove overlapping cells."
-            )
-        require_apart(self._facets, self._facet_number, count, nodes)
-        require_conforming(self.outline, nodes)
-        require_no_overlap(nodes, cells, kind, np.flatnonzero(count[self._facet_number] == 1))
         boundaries = {name: self._on_outline(name, facets) for name, facets in boundaries.items()}
         object.__setattr__(self, "boundaries", boundaries)
-        for array in (nodes, cells, curved, middles, *boundaries.values(), *points.values()):
+        for array in (curved, middles, *boundaries.values(), *points.values()):
             array.setflags(write=False)
         if len(curved):
             self.edge_numbers(curved, "curved_edges")
@@ -223,24 +262,20 @@ class Mesh(Summarised):
         """
         return self._facets[self._cells_at_facets[self._facet_number] == 1]
 
-    @cached_property
+    @property
     def _facets(self) -> Integers:
         """Sides of each cell in turn, so that inner ones occur twice."""
-        return facets_of(self.cells, self.kind)
-
-    @cached_property
-    def _numbered_facets(self) -> tuple[Integers, Integers, Integers]:
-        return numbered_rows(np.sort(self._facets, axis=1))
+        return self._checked.facets
 
     @property
     def _facet_number(self) -> Integers:
         """Number of each of ``_facets`` without its orientation."""
-        return self._numbered_facets[1]
+        return self._checked.number
 
     @property
     def _cells_at_facets(self) -> Integers:
         """Number of cells at each distinct side."""
-        return self._numbered_facets[2]
+        return self._checked.count
 
     def _on_outline(self, name: str, facets: Integers) -> Integers:
         """The sides of a boundary, those of a solid as in the outline."""

@@ -13,6 +13,7 @@ _ON_EDGE = 1e-5  # distance of a node on an edge, per length: coordinates in sin
 # Cells whose places are compared at once, and the depth in a cell at which a place lies within it,
 # relative to its centre.
 _AT_ONCE, _WITHIN = 4000, 0.1
+_CELLS = 50_000  # whose corners are looked at together
 # Gauss points from 0 to 1, exact for determinants of second-order cells: degree 5 a direction.
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _GAUSS, _WEIGHTS = 0.5 * (1.0 + _GAUSS), 0.5 * _WEIGHTS
@@ -42,11 +43,15 @@ def oriented_solids(nodes: Array, cells: Integers, kind: CellKind) -> Integers:
 
 def _corner_volumes(nodes: Array, cells: Integers, kind: CellKind) -> tuple[Array, Array]:
     """Least and largest Jacobian determinants (M,) at the corners."""
-    corners = nodes[cells[:, list(kind.order)]]
     local = np.array(kind.places[:kind.corners], float)[:1 if kind.simplex else None]
     _, slopes = shape_functions(kind.dimension, kind.corners, local)
-    determinants = np.linalg.det(np.einsum("pkj,mki->mpij", slopes, corners))
-    return determinants.min(axis=1), determinants.max(axis=1)
+    least, largest = np.empty(len(cells)), np.empty(len(cells))
+    for first in range(0, len(cells), _CELLS):
+        part = slice(first, first + _CELLS)
+        corners = nodes[cells[part][:, list(kind.order)]]
+        determinants = np.linalg.det(np.einsum("pkj,mki->mpij", slopes, corners))
+        least[part], largest[part] = determinants.min(axis=1), determinants.max(axis=1)
+    return least, largest
 
 
 def solid_volumes(nodes: Array, cells: Integers, kind: CellKind) -> Array:
@@ -94,11 +99,12 @@ def require_no_overlap(nodes: Array, cells: Integers, kind: CellKind, outline: I
     """
     from scipy.spatial import KDTree
 
-    sides = nodes[cells[:, np.array(kind.facets)]]
-    on_side, normal = sides.mean(axis=2), _side_normals(sides)
-    centre = nodes[cells].mean(axis=1)
-    inside = np.einsum("mfd,mfd->mf", on_side - centre[:, None], normal)
-    radius = np.linalg.norm(nodes[cells] - centre[:, None], axis=2).max(axis=1)
+    centre, radius = np.empty((len(cells), kind.dimension)), np.empty(len(cells))
+    for first in range(0, len(cells), _CELLS):
+        part = slice(first, first + _CELLS)
+        corners = nodes[cells[part]]
+        centre[part] = corners.mean(axis=1)
+        radius[part] = np.linalg.norm(corners - centre[part, None], axis=2).max(axis=1)
     at_outline = np.unique(outline // len(kind.facets))
     places = np.concatenate([centre[at_outline, None],
                              0.5 * (centre[at_outline, None] + nodes[cells[at_outline]])], axis=1)
@@ -114,8 +120,12 @@ def require_no_overlap(nodes: Array, cells: Integers, kind: CellKind, outline: I
             cell = large[np.concatenate([np.asarray(found, np.int64) for found in near])]
             own = at_outline[first + place // some.shape[1]]
             at = some.reshape(-1, kind.dimension)[place]
-            depth = np.einsum("pfd,pfd->pf", on_side[cell] - at[:, None], normal[cell])
-            within = (depth > _WITHIN * inside[cell]).all(axis=1) & (own != cell)
+            held, of = np.unique(cell, return_inverse=True)
+            sides = nodes[cells[held][:, np.array(kind.facets)]]
+            on_side, normal = sides.mean(axis=2), _side_normals(sides)
+            inside = np.einsum("mfd,mfd->mf", on_side - centre[held, None], normal)
+            depth = np.einsum("pfd,pfd->pf", on_side[of] - at[:, None], normal[of])
+            within = (depth > _WITHIN * inside[of]).all(axis=1) & (own != cell)
             for a, b in zip(own[within], cell[within], strict=True):
                 # Two cells with a common side lie apart, see require_apart.
                 if len(np.intersect1d(cells[a], cells[b])) < len(kind.facets[0]):

@@ -188,7 +188,7 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     if any(group.size and (group.min() < 0 or group.max() >= len(points)) for group in named):
         raise MeshError("A group, or the middle of a side, names nodes that the file does not "
                         "hold.")
-    used = np.unique(corners)
+    used = np.flatnonzero(np.bincount(corners))
     if not np.isfinite(points[used]).all():
         raise MeshError("The nodes hold values that are not finite.")
     size = float(np.linalg.norm(np.ptp(points[used], axis=0)))
@@ -207,7 +207,7 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
 
     first = (np.arange(len(points)) if raw.apart
              else _first_of_coincident(points, _COINCIDENT * size))
-    used = np.unique(first[corners])
+    used = np.flatnonzero(np.bincount(first[corners]))
     number = np.full(len(points), -1, np.int64)
     number[used] = np.arange(len(used))
     number = number[first]
