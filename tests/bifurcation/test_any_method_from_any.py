@@ -42,7 +42,7 @@ def hardening():
     row = np.array([[0.0], [1.0], [0.0]])
     basis = fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": row[None], "B": row})
     return fc.ContactSystem(basis, normal=BilateralPolynomial(-0.5, 1.0), drive=fc.Drive(
-        stiffness_y=1.0, damping_y=0.1, amplitude_y=1.0, angular_frequency=1.0))
+        stiffness_y=1.0, damping_y=0.1, amplitude_y=1.0, frequency_hz=0.5 / np.pi))
 
 
 @cache
@@ -52,7 +52,7 @@ def sliding():
     return fc.ContactSystem(
         fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": row[None], "B": row}),
         normal=PrescribedForce(1.0), friction=ConstantFriction(0.4, smoothing_slope=300.0),
-        drive=fc.Drive(stiffness_x=1.0, amplitude_x=1.0, angular_frequency=0.6))
+        drive=fc.Drive(stiffness_x=1.0, amplitude_x=1.0, frequency_hz=0.3 / np.pi))
 
 
 @cache

@@ -816,8 +816,8 @@ def test_missing_files_and_unknown_suffixes(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"b\.msh: there is no such file"):
         read_mesh(tmp_path / "b.msh")
     with pytest.raises(InputError, match=r"b\.stl: files of this kind are not read; the suffixes "
-                                         r"that are: \.bdf, \.fem, \.inp, \.med, \.msh, \.nas, "
-                                         r"\.vtk, \.vtu\."):
+                                         r"that are: \.bdf, \.cdb, \.fem, \.inp, \.med, \.msh, "
+                                         r"\.nas, \.vtk, \.vtu\."):
         read_mesh(tmp_path / "b.stl")
 
 
