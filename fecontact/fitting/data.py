@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -27,6 +27,8 @@ class FitData:
     """
 
     name: str = ""
+    # Field that holds the measured numbers.
+    compared: ClassVar[str] = "values"
 
     @property
     def title(self) -> str:
@@ -36,12 +38,13 @@ class FitData:
     @property
     def measured(self) -> Array:
         """Measured numbers (n,)."""
-        raise NotImplementedError
+        return np.asarray(getattr(self, self.compared))
 
     @property
     def deviations(self) -> Array | None:
         """Standard deviations (n,) of the measured numbers; None if they are not known."""
-        raise NotImplementedError
+        found: Array | None = getattr(self, "deviation")  # noqa: B009 (a field of subclasses)
+        return found
 
     def predicted(self, system: ContactSystem) -> Array:
         """Numbers (n,) that a model gives in place of the measured ones; FecontactError if none."""
@@ -165,16 +168,6 @@ class FunctionData(FitData):
         places = np.arange(1.0, len(values) + 1.0) if self.abscissa is None else self.abscissa
         freeze(self, **finite_columns("FunctionData", values=values, abscissa=places),
                deviation=spread(self.deviation, len(values), "FunctionData"))
-
-    @property
-    def measured(self) -> Array:
-        """Measured numbers (n,)."""
-        return self.values
-
-    @property
-    def deviations(self) -> Array | None:
-        """Standard deviations (n,)."""
-        return self.deviation
 
     def predicted(self, system: ContactSystem) -> Array:
         """Numbers (n,) of the function."""

@@ -1,7 +1,7 @@
 """Data in time and along paths: histories, ring-downs, hysteresis loops."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -80,16 +80,6 @@ class HistoryData(FitData):
         freeze(self, **columns, deviation=spread(self.deviation, len(columns["time"]),
                                                  "HistoryData"))
 
-    @property
-    def measured(self) -> Array:
-        """Measured values (n,)."""
-        return self.values
-
-    @property
-    def deviations(self) -> Array | None:
-        """Standard deviations (n,)."""
-        return self.deviation
-
     def predicted(self, system: ContactSystem) -> Array:
         """Quantity of a run (n,)."""
         run = _run(system, self.initial, self.time, self.rtol)
@@ -123,9 +113,39 @@ class HistoryData(FitData):
                       slice(0, len(self.time)))]
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CurveData(FitData):
+    """Base class of data that are a curve of frequency and damping over amplitude."""
+
+    @property
+    def _curve(self) -> AmplitudeCurve:
+        found: AmplitudeCurve = getattr(self, "curve")  # noqa: B009 (a field of subclasses)
+        return found
+
+    @property
+    def measured(self) -> Array:
+        """Frequencies [Hz], then damping ratios."""
+        return np.concatenate([self._curve.frequency, self._curve.damping_ratio])
+
+    @property
+    def deviations(self) -> Array | None:
+        """Standard deviations of both; None without any."""
+        curve = self._curve
+        if curve.frequency_deviation is None or curve.damping_deviation is None:
+            return None
+        return np.concatenate([curve.frequency_deviation, curve.damping_deviation])
+
+    def curves(self) -> list[Curve]:
+        """Frequency and damping ratio over amplitude."""
+        curve = self._curve
+        n, label = len(curve), f"amplitude [{curve.unit}]"
+        return [Curve(label, curve.amplitude, "frequency [Hz]", slice(0, n), True),
+                Curve(label, curve.amplitude, "damping ratio", slice(n, 2 * n), True)]
+
+
 @read_only_arrays
 @dataclass(frozen=True, eq=False)
-class DecayData(FitData):
+class DecayData(CurveData):
     """Frequency and damping over amplitude of a ring-down, compared with those of a run.
 
     The run is evaluated as the measurement was. At amplitudes outside of it, frequency and damping
@@ -166,16 +186,6 @@ class DecayData(FitData):
         if not (isinstance(self.t_end, int | float) and 0.0 < self.t_end < np.inf):
             raise InputError(f"DecayData: t_end = {self.t_end!r} must be a time above zero.")
 
-    @property
-    def measured(self) -> Array:
-        """Frequencies [Hz], then damping ratios."""
-        return measured_of(self.curve)
-
-    @property
-    def deviations(self) -> Array | None:
-        """Standard deviations of both."""
-        return deviations_of(self.curve)
-
     def predicted(self, system: ContactSystem) -> Array:
         """Frequencies and damping ratios of a run, at the measured amplitudes."""
         highest = float(self.curve.frequency.max())
@@ -188,10 +198,6 @@ class DecayData(FitData):
             "frequency": float(np.median(self.curve.frequency)), **self.options,
             "overlap": _OVERLAP})
         return _extended(found, self.curve.amplitude)
-
-    def curves(self) -> list[Curve]:
-        """Frequency and damping ratio over amplitude."""
-        return curves_of(self.curve)
 
 
 def _extended(curve: AmplitudeCurve, amplitude: Array) -> Array:
@@ -209,25 +215,6 @@ def _extended(curve: AmplitudeCurve, amplitude: Array) -> Array:
             values += np.where(beyond > 0.0, beyond, 0.0) * (
                 (at_end - within) / inner)[:, None]
     return np.concatenate(values)
-
-
-def measured_of(curve: AmplitudeCurve) -> Array:
-    """Frequencies and damping ratios (2 N,) of a curve."""
-    return np.concatenate([curve.frequency, curve.damping_ratio])
-
-
-def deviations_of(curve: AmplitudeCurve) -> Array | None:
-    """Standard deviations (2 N,) of frequencies and damping ratios; None without any."""
-    if curve.frequency_deviation is None or curve.damping_deviation is None:
-        return None
-    return np.concatenate([curve.frequency_deviation, curve.damping_deviation])
-
-
-def curves_of(curve: AmplitudeCurve) -> list[Curve]:
-    """Frequency and damping ratio over amplitude."""
-    n, label = len(curve), f"amplitude [{curve.unit}]"
-    return [Curve(label, curve.amplitude, "frequency [Hz]", slice(0, n), True),
-            Curve(label, curve.amplitude, "damping ratio", slice(n, 2 * n), True)]
 
 
 @read_only_arrays
@@ -258,6 +245,8 @@ class LoopData(FitData):
         For arrays that do not fit together or to the path, or an unknown action without a path.
     """
 
+    compared: ClassVar[str] = "force"
+
     displacement: Array
     force: Array
     deviation: Any = None
@@ -282,16 +271,6 @@ class LoopData(FitData):
         if self.path is None:
             freeze(self, path=LoadPath(**{self.along: tuple(columns["displacement"].tolist())},
                                        steps=1))
-
-    @property
-    def measured(self) -> Array:
-        """Measured forces (n,) [N]."""
-        return self.force
-
-    @property
-    def deviations(self) -> Array | None:
-        """Standard deviations (n,) [N]."""
-        return self.deviation
 
     def predicted(self, system: ContactSystem) -> Array:
         """Forces (n,) of the model [N]."""

@@ -1,13 +1,13 @@
 """Data over frequency: natural frequencies, backbones, receptances, responses at one level."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fecontact.analysis.complex_modes import complex_modes, prestressed_modes
 from fecontact.analysis.receptance import Kind, Place, receptance
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.response import frequency_response
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import nonlinear_mode
@@ -16,7 +16,7 @@ from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ComplexArray, Integers
 from fecontact.fitting.data import Curve, FitData, finite_columns, freeze, spread
-from fecontact.fitting.data_in_time import curves_of, deviations_of, measured_of
+from fecontact.fitting.data_in_time import CurveData
 from fecontact.measured.amplitude_curve import AmplitudeCurve, mode_curve
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.quasistatic.loading import load_history
@@ -50,6 +50,8 @@ class FrequencyData(FitData):
         For values that are not finite, or numbers of modes that do not fit to them.
     """
 
+    compared: ClassVar[str] = "frequencies_hz"
+
     frequencies_hz: Array
     deviation: Any = None
     modes: Integers | None = None
@@ -64,16 +66,6 @@ class FrequencyData(FitData):
             raise InputError(f"FrequencyData: modes must be {n} whole numbers from 1, one for each "
                              f"frequency.")
         freeze(self, **values, modes=modes, deviation=spread(self.deviation, n, "FrequencyData"))
-
-    @property
-    def measured(self) -> Array:
-        """Measured frequencies (n,) [Hz]."""
-        return self.frequencies_hz
-
-    @property
-    def deviations(self) -> Array | None:
-        """Standard deviations (n,) [Hz]."""
-        return self.deviation
 
     def predicted(self, system: ContactSystem) -> Array:
         """Frequencies (n,) of the model [Hz]."""
@@ -98,7 +90,7 @@ class FrequencyData(FitData):
 
 @read_only_arrays
 @dataclass(frozen=True, eq=False)
-class BackboneData(FitData):
+class BackboneData(CurveData):
     """Frequency and damping over amplitude, compared with a nonlinear mode by harmonic balance.
 
     Parameters
@@ -131,32 +123,20 @@ class BackboneData(FitData):
         require_kind("BackboneData", AmplitudeCurve, curve=self.curve)
         require_kind("BackboneData", (HarmonicBalance, type(None)), method=self.method)
 
-    @property
-    def measured(self) -> Array:
-        """Frequencies [Hz], then damping ratios."""
-        return measured_of(self.curve)
-
-    @property
-    def deviations(self) -> Array | None:
-        """Standard deviations of both."""
-        return deviations_of(self.curve)
-
     def predicted(self, system: ContactSystem) -> Array:
         """Frequencies and damping ratios of the mode at the measured amplitudes."""
         A = self.curve.amplitude
         mode = nonlinear_mode(system, (float(A.min()) / _MARGIN, float(A.max()) * _MARGIN),
                               self.mode, observe=(self.point, self.component), method=self.method,
                               options=self.options)
+        if mode.branch.status is BranchStatus.INTERRUPTED:
+            raise KeyboardInterrupt
         found = mode_curve(mode)
         if found.amplitude.max() < A.max():
             raise AnalysisError(f"The nonlinear mode ends at the amplitude "
                                 f"{found.amplitude.max():.4g}, below the largest measured one, "
                                 f"{A.max():.4g}.")
         return np.concatenate(found.at(np.maximum(A, found.amplitude.min())))
-
-    def curves(self) -> list[Curve]:
-        """Frequency and damping ratio over amplitude."""
-        return curves_of(self.curve)
 
 
 @read_only_arrays
@@ -256,6 +236,8 @@ class ResponseData(FitData):
         For arrays that do not fit together or are not finite.
     """
 
+    compared: ClassVar[str] = "amplitude"
+
     frequency_hz: Array
     amplitude: Array
     deviation: Any = None
@@ -275,16 +257,6 @@ class ResponseData(FitData):
         freeze(self, **columns, deviation=spread(self.deviation, len(columns["amplitude"]),
                                                  "ResponseData"))
 
-    @property
-    def measured(self) -> Array:
-        """Measured amplitudes (n,)."""
-        return self.amplitude
-
-    @property
-    def deviations(self) -> Array | None:
-        """Standard deviations (n,)."""
-        return self.deviation
-
     def predicted(self, system: ContactSystem) -> Array:
         """Amplitudes of the model (n,)."""
         wanted = self.frequency_hz
@@ -293,6 +265,8 @@ class ResponseData(FitData):
         found = frequency_response(
             system.with_(self.changes or {}), (low, high * (1.0 + 1e-9)), self.parameter,
             observe=(self.point, self.component), method=method, options=self.options)
+        if found.branches[0].status is BranchStatus.INTERRUPTED:
+            raise KeyboardInterrupt
         curve = _spline(found.branches[0].parameter, found.amplitude())
         return np.array([_nearest(*curve, at, seen)
                          for at, seen in zip(wanted, self.amplitude, strict=True)])

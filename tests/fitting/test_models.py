@@ -121,6 +121,16 @@ def test_normal_load_and_coefficient_are_found_as_their_product_alone():
 
 # Motions -----------------------------------------------------------------------------------------
 
+def test_amplitudes_beyond_a_run_go_on_linearly():
+    """A linear decay has one frequency and one damping ratio at all amplitudes."""
+    data = DecayData(AmplitudeCurve([1e-9, 1e-4, 1.0], [25.0] * 3, [0.01] * 3),
+                     lambda system: state(system, 1e-3), 0.6)
+    linear = mass(damping=4.0 * np.sqrt(5e4 / 2.0) * 0.012)
+    w = np.sqrt(5e4 / 2.0)
+    assert data.predicted(linear) == pytest.approx(
+        np.repeat([w / (2.0 * np.pi), 0.012], 3), rel=1e-4)
+
+
 @pytest.mark.long
 def test_den_hartogs_friction_from_a_decay():
     """Exact decay by 4 F / k a cycle: half cycles about +-F / k, with noise of 1 %."""
