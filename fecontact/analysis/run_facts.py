@@ -57,7 +57,7 @@ def largest_displacement(trajectory: Trajectory) -> tuple[float, str]:
     if basis.mode_shapes is not None:
         shapes, places = basis.mode_shapes.shapes, basis.mode_shapes.nodes
     else:
-        used = np.abs(basis.T).any(axis=(1, 2))
+        used = basis.moving_points
         shapes, places = basis.T[used, : basis.dimension], basis.positions[used]
     rows = shapes.reshape(-1, basis.modes).T
     best, node = 0.0, 0

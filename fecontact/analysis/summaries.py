@@ -63,10 +63,11 @@ def _part(trajectory: Trajectory, state: ContactState) -> float:
 def largest_displacement(trajectory: Trajectory) -> float:
     """Largest displacement of B, C, the contact nodes and other named points at any time."""
     basis = trajectory.system.basis
-    moved = np.einsum("pkm,tm->tpk", basis.T[:, : basis.dimension], trajectory.modal_coordinates)
+    rows = basis.T[basis.moving_points, : basis.dimension]
+    moved = np.einsum("pkm,tm->tpk", rows, trajectory.modal_coordinates)
     if basis.dimension == 3:
-        return float(np.linalg.norm(moved, axis=-1).max())
-    return float(np.hypot(moved[..., 0], moved[..., 1]).max())
+        return float(np.linalg.norm(moved, axis=-1).max(initial=0.0))
+    return float(np.hypot(moved[..., 0], moved[..., 1]).max(initial=0.0))
 
 
 def amplitude_x(trajectory: Trajectory, point: Point | None = None) -> float:
@@ -141,9 +142,9 @@ def peak_friction_force(trajectory: Trajectory, face: str | None = None) -> floa
 
 
 def _nodes(trajectory: Trajectory, face: str | None) -> slice:
-    """Contact nodes of an interface by its name; all of them by default."""
+    """Contact nodes of an interface by its name; by default all but those of large deflections."""
     if face is None:
-        return slice(None)
+        return slice(trajectory.system.basis.interface_nodes)
     faces = {one.name: one.nodes for one in contact_faces(trajectory.system.basis) if one.name}
     if face not in faces:
         raise InputError(f"There is no interface '{face}'; " + (

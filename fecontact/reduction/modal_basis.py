@@ -239,6 +239,13 @@ class ModalBasis(Summarised):
                          [count for _, count in self.groups]).astype(bool)
 
     @property
+    def moving_points(self) -> NDArray[np.bool_]:
+        """Whether each point (P,) of T is a place that some mode moves; springs are none."""
+        found = np.array(np.abs(self.T).any(axis=(1, 2)))
+        found[2 : 2 + self.contact_nodes] &= ~self.spring_nodes
+        return found
+
+    @property
     def interface_groups(self) -> tuple[tuple[str, int], ...]:
         """Names and sizes of the groups whose laws a system gives: all but large deflections."""
         return self.groups[: len(self.groups) - len(self.large_deflections)]

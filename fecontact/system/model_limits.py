@@ -121,7 +121,7 @@ def warn_of_limits(sentences: Iterable[str], what: str) -> None:
 
 def _too_far(system: ContactSystem, times: Array, states: Array) -> str | None:
     basis = system.basis
-    used = np.abs(basis.T).any(axis=(1, 2))
+    used = basis.moving_points
     places = basis.positions[used]
     if basis.mode_shapes is not None:
         places = np.vstack([places, basis.mode_shapes.nodes])

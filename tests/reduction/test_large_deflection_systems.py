@@ -19,6 +19,7 @@ from fecontact import (
     simulate,
 )
 from fecontact.analysis import DeflectionSteps, complex_modes, deflection_path
+from fecontact.analysis.summaries import largest_displacement, peak_normal_force
 from fecontact.bifurcation import HarmonicBalance, frequency_response, nonlinear_mode
 from fecontact.fem.finite_strain import FiniteStrainModel
 from fecontact.integrate import CVODE, EventDriven, Rodas5P, TimeStepping
@@ -116,10 +117,12 @@ STUDY = """
 geometry = { shape = "beam", length = 1.0, height = 0.004, element_size = 0.05 }
 body = { material = "steel", thickness = 0.01, fixed = { left = "xy", right = "xy" } }
 simulation = { t_end = 0.01, outputs = 11 }
+load = { gravity = [0.0, -9.81] }
 
 [basis]
 modes = 1
 contact = []
+points = { middle = [0.5, 0.002] }
 large_deflections = { largest_displacement = 2e-3 }
 """
 
@@ -128,8 +131,13 @@ def test_study():
     """The study has the basis that Python makes, with the same forces."""
     study = Study.from_toml(STUDY)
     basis = study.modal_basis()
-    made = modal_basis(study.elastic_body(), 1, contact=(),
+    made = modal_basis(study.elastic_body(), 1, contact=(), C="",
                        large_deflections=LargeDeflections(2e-3))
     for one, other in zip(basis.large_deflections, made.large_deflections, strict=True):
         assert (one.cubic == other.cubic).all()
-    assert study.run().status.name.lower() == "finished"
+    run = study.run()
+    assert run.status.name.lower() == "finished"
+    # Springs between coordinates are no places that move.
+    moved = np.abs(run.displacement("middle")).max()
+    assert largest_displacement(run) == pytest.approx(moved, rel=1e-9)
+    assert peak_normal_force(run) == 0.0

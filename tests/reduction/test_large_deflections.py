@@ -170,6 +170,20 @@ def test_statics_of_the_reduced_and_the_whole_body():
     assert rest.stable
 
 
+def test_end_of_a_cantilever_follows_its_arc():
+    """P L^2 / EI = 1: the end comes down by 0.30172 L and in by 0.05643 L (Mattiasson 1981)."""
+    h = 0.01
+    body = ElasticBody(rectangle(L, h, 40, 1, points={"last": (L, 0.0)}), STEEL,
+                       fixed={"left": "xy"}, thickness=B)
+    basis = modal_basis(body, 3, contact=(), points={"last": (L, 0.5 * h)}, reduction="residual",
+                        loads=["right"], large_deflections=LargeDeflections(0.35 * L, 2))
+    force = E * B * h**3 / 12.0 / L**2
+    rest = equilibrium(ContactSystem(basis, load=Load(boundaries=(
+        BoundaryLoad("right", shear=force / (h * B)),))))
+    x, y = (basis.point_row("last", axis) @ rest.modal_coordinates for axis in "xy")
+    assert [-x, y] == pytest.approx([0.05643, 0.30172], rel=0.015)
+
+
 def test_run_keeps_its_energy_and_watches_its_range():
     """Free vibration of the reduced beam: energy to the tolerance; too far, it says so."""
     basis = bent("hinged", H)
