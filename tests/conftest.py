@@ -60,7 +60,8 @@ LONG = {
     "test_near_solver", "test_runs_in_blocks", "test_pickled_systems", "test_study_convergence",
     "test_executors", "test_event_branches", "test_homoclinic_by_projection",
     "test_codim2_switching", "test_sampling_error", "test_ends_by_method", "test_canards",
-    "test_static_friction_borders", "test_touch_down",
+    "test_static_friction_borders", "test_touch_down", "test_fitted_models", "test_fit_statistics",
+    "test_fit_command", "test_ring_down",
 }
 
 
