@@ -179,7 +179,7 @@ class ResponseSettings:
 
     @property
     def first(self) -> float:
-        """Where responses start."""
+        """First value of the parameter."""
         return self.checked_bounds[0] if self.start is None else self.start
 
     @property

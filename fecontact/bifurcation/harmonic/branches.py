@@ -115,7 +115,7 @@ def _method_of(problem: HarmonicProblem) -> HarmonicBalance:
 def _rescaled(
     problem: HarmonicProblem, scales: ArrayLike | None, width: float | None
 ) -> HarmonicProblem:
-    """As :func:`rescaled`; with given scales these no longer grow."""
+    """The problem with other scales and width, if given; given scales no longer grow."""
     return replace(rescaled(problem, scales, width),
                    limits=problem.limits if scales is None else None)
 

@@ -43,7 +43,7 @@ _EDGES = {
 }
 _CORNERS = {"hexahedron": 8, "wedge": 6, "pyramid": 5, "tetra": 4, "triangle": 3, "quad": 4}
 _BY_CORNERS = {8: "hexahedron", 6: "wedge", 5: "pyramid", 4: "tetra"}
-# What changes the stiffness and is not read, by the commands of an archive.
+# Commands of an archive that stiffen the model and are not read.
 _REFUSED = {"CE": "constraint equations (CE)", "CP": "coupled degrees of freedom (CP)",
             "CPBLOCK": "coupled degrees of freedom (CPBLOCK)"}
 _LOADS = {"D": "supports (D)", "F": "forces (F)", "SFE": "pressures (SFE)", "BF": "body loads (BF)"}
