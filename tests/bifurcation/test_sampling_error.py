@@ -208,10 +208,10 @@ def test_samples_are_doubled_until_a_response_is_accurate(stability):
 def test_harmonics_and_samples_grow_together():
     found = frequency_response(
         jenkins_system(), (1.15 / TURN, 1.2 / TURN), method=HarmonicBalance(
-            1, 16, tolerance=2e-3, sampling_tolerance=5e-3, stability=None),
+            1, 16, tolerance=2e-3, sampling_tolerance=2e-3, stability=None),
         options=ContinuationOptions(points=4)).branches[0]
     assert found.column("truncation_error").max() <= 2e-3
-    assert found.attributes["sampling_error"] <= 5e-3
+    assert found.attributes["sampling_error"] <= 2e-3
     assert found.attributes["harmonics"] > 2
     assert found.attributes["samples"] > 16 * found.attributes["harmonics"]
 

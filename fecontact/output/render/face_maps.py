@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fecontact.core.types import Array
 from fecontact.core.units import quantity
 from fecontact.output.plots.solids.plans import FacePlan, draw_arrows, draw_plan
+from fecontact.output.render.canvas import canvas_of
 from fecontact.output.render.scene import DARK, NODE_COLOURS
 from fecontact.output.render.solid_motion import SolidMotion
 
@@ -118,11 +119,8 @@ class FaceMaps:
     @cached_property
     def _drawn(self) -> tuple[Any, Any, list[Any]]:
         """Canvas, what does not change, and what does."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(self.width / 100, self.height / 100), dpi=100, facecolor="white")
-        canvas, maps, columns = FigureCanvasAgg(figure), self._maps, self._columns()
+        figure, canvas = canvas_of(self.width, self.height)
+        maps, columns = self._maps, self._columns()
         rows, drawn = -(-len(maps) // columns), []
         wide, high = (1.0 - 2.0 * _SIDE) / columns, 1.0 / rows
         title, gap = _TITLE * self._size / self.height, _GAP * self._size

@@ -13,6 +13,7 @@ from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.run import thinned
 from fecontact.output.plots.style import COLOURS, DASHES, distinct_colours, legend_label
+from fecontact.output.render.canvas import canvas_of
 from fecontact.output.render.frames_data import Motion
 from fecontact.reduction.assembly.contact_faces import contact_faces
 
@@ -104,11 +105,7 @@ class ForceChart:
     @cached_property
     def _drawn(self) -> tuple[Image, tuple[int, int], NDArray[np.intp]]:
         """The strip without cursor, the rows of its axes, and the column of each frame."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(self.width / 100, self.height / 100), dpi=100, facecolor="white")
-        canvas = FigureCanvasAgg(figure)
+        figure, canvas = canvas_of(self.width, self.height)
         left, below = 7.0 * self.font / self.width, 3.4 * self.font / self.height
         motion, trajectory = self.motion, self.motion.trajectory
         first, last = float(motion.times[0]), float(motion.times[-1])

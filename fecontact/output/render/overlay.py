@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.units import quantity, suitable_unit
+from fecontact.output.render.canvas import canvas_of
 from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import COLOURS, Motion
 from fecontact.output.render.scene import (
@@ -20,7 +21,6 @@ from fecontact.output.render.scene import (
 
 Image = NDArray[np.uint8]
 
-_DPI = 100
 FONT = 10.5  # points at 960 x 540
 _LEAST_CHART = 90.0  # pixels at 960 x 540
 _MOST_CHART = 0.6  # of the room between title and legend
@@ -54,13 +54,6 @@ class Strips:
         """Height of the strip below the scene in pixels."""
         return 2 * round(34 * self.size)
 
-    def _strip(self, width: int, height: int) -> tuple[Any, Any]:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI, facecolor="white")
-        return figure, FigureCanvasAgg(figure)
-
     def _text(self, figure: Any, x: float, y: float, text: str, **options: Any) -> Any:
         options = {"fontsize": FONT * self.size, "color": DARK, "va": "center",
                    "family": "DejaVu Sans"} | options
@@ -68,7 +61,7 @@ class Strips:
 
     def header(self, title: str | None, note: str) -> Image:
         """The upper strip: a title, shortened to the room that a note leaves beside it."""
-        figure, canvas = self._strip(self.width, self.header_height)
+        figure, canvas = canvas_of(self.width, self.header_height)
         beside = self._text(figure, 0.81, 0.46, note, ha="right")
         if title:
             drawn = self._text(figure, 0.03, 0.46, title, fontsize=1.25 * FONT * self.size)
@@ -172,7 +165,7 @@ class Overlay(Strips):
 
     @cached_property
     def _clock_parts(self) -> tuple[Any, Any, Any]:
-        figure, canvas = self._strip(round(0.17 * self.width), self.header_height)
+        figure, canvas = canvas_of(round(0.17 * self.width), self.header_height)
         text = self._text(figure, 1.0 - 0.03 / 0.17, 0.46, "", ha="right",
                           fontsize=1.1 * FONT * self.size)
         return figure, canvas, text
@@ -188,7 +181,7 @@ class Overlay(Strips):
 
     @cached_property
     def _footer(self) -> Image:
-        figure, canvas = self._strip(self.width, self.footer_height)
+        figure, canvas = canvas_of(self.width, self.footer_height)
         self._colour_scale(figure)
         self._legend(figure)
         return pixels(canvas)
