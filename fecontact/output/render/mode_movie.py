@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fecontact.core.checks import require_kind, require_scale
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ComplexArray
+from fecontact.output.render.canvas import canvas_of
 from fecontact.output.render.frames_data import body_labels
 from fecontact.output.render.movie import MOVING, Image, Progress, target, write_images
 from fecontact.output.render.offscreen import require_rendering
@@ -95,7 +96,7 @@ class _ModeStrips(Strips):
 
     def around(self, scene: Image, phase: float) -> Image:
         """The whole picture from that of the scene."""
-        figure, canvas = self._strip(self.width, self.footer_height)
+        figure, canvas = canvas_of(self.width, self.footer_height)
         self.colour_scale(figure, "displacement, relative to the largest", 1.0,
                           COLOUR_MAPS["displacement"])
         self._text(figure, 0.97, 0.5, f"phase {np.degrees(phase) % 360.0:3.0f}°", ha="right")

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.units import quantity, suitable_unit
+from fecontact.output.render.canvas import canvas_of
 from fecontact.output.render.face_maps import PRESSURE_MAP, FaceMaps
 from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import COLOURS
@@ -73,7 +74,7 @@ class SolidOverlay(Overlay):
 
     @cached_property
     def _footer(self) -> Image:
-        figure, canvas = self._strip(self.width, self.footer_height)
+        figure, canvas = canvas_of(self.width, self.footer_height)
         name, unit = COLOURS[self.motion.colour]
         largest, peak = self.motion.largest_colour or 1.0, self.motion.peak
         factor, symbol = suitable_unit(largest, unit)
