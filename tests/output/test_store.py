@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from synthetic import YOUNGS_MODULUS, basis, run
 from vtkmodules.util.numpy_support import vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkVersion
 from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline
 from vtkmodules.vtkIOHDF import vtkHDFReader
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
@@ -17,6 +18,8 @@ from fecontact.output.files import pvd
 from fecontact.output.files.frames import frame_indices, von_mises
 from fecontact.reduction import ModeShapes
 from fecontact.system.powers import POWERS
+
+OLD_VTK = (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) < (9, 6)
 
 LENGTH, HEIGHT = 0.2, 0.02
 
@@ -60,7 +63,8 @@ def test_vtk_reads_grid_times_and_rigid_motion(tmp_path, triangles):
                                    rtol=2e-5, atol=1e-12)
         assert point_data(grid, "displacement").dtype == np.float32
         assert not point_data(grid, "von_mises").any()
-    assert len(mesh_times) == 1  # the grid is stored once and read once
+    # The grid is stored once, and read once by VTK from 9.6 on.
+    assert len(mesh_times) == 1 or OLD_VTK
     points = vtk_to_numpy(grid.GetPoints().GetData())
     assert np.array_equal(points, np.column_stack([body.mode_shapes.nodes, 0 * x]))
     cells = [[grid.GetCell(k).GetPointId(j) for j in range(grid.GetCell(k).GetNumberOfPoints())]
