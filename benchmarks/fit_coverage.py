@@ -92,7 +92,7 @@ def decays(trials: int) -> None:
     state = np.array([3e-3 * 2.0**0.5, 0.0, 0.0])
     run = fc.simulate(truth, 0.8, initial=state, outputs=4001)
     x = run.displacement("B")[:, 0]
-    options = {"window": 6.0, "frequency": 33.0}
+    options = {"window": 6.0, "frequency_hz": 33.0}
     coverage("ring-downs, noise 1 %", truth, model(0.25, 5e-4), {
         "friction.friction_coefficient": FitParameter(0.05, 1.0, 0.25, "log"),
         "friction.yield_displacement": FitParameter(5e-5, 5e-3, 5e-4, "log"),

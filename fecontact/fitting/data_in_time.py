@@ -125,15 +125,15 @@ class CurveData(FitData):
     @property
     def measured(self) -> Array:
         """Frequencies [Hz], then damping ratios."""
-        return np.concatenate([self._curve.frequency, self._curve.damping_ratio])
+        return np.concatenate([self._curve.frequency_hz, self._curve.damping_ratio])
 
     @property
     def deviations(self) -> Array | None:
         """Standard deviations of both; None without any."""
         curve = self._curve
-        if curve.frequency_deviation is None or curve.damping_deviation is None:
+        if curve.frequency_deviation_hz is None or curve.damping_deviation is None:
             return None
-        return np.concatenate([curve.frequency_deviation, curve.damping_deviation])
+        return np.concatenate([curve.frequency_deviation_hz, curve.damping_deviation])
 
     def curves(self) -> list[Curve]:
         """Frequency and damping ratio over amplitude."""
@@ -188,14 +188,14 @@ class DecayData(CurveData):
 
     def predicted(self, system: ContactSystem) -> Array:
         """Frequencies and damping ratios of a run, at the measured amplitudes."""
-        highest = float(self.curve.frequency.max())
+        highest = float(self.curve.frequency_hz.max())
         count = max(64, int(np.ceil(self.t_end * highest * _SAMPLES)) + 1)
         run = _run(system, self.initial, np.linspace(0.0, self.t_end, count), self.rtol)
         values = history(run, self.quantity, self.point, self.component)
         order = {"displacement": 0, "velocity": 1}.get(self.quantity, 0)
         # Windows of the same length, close together, between which the curve is interpolated.
         found = ring_down(run.time, values.values, derivative=order, **{
-            "frequency": float(np.median(self.curve.frequency)), **self.options,
+            "frequency_hz": float(np.median(self.curve.frequency_hz)), **self.options,
             "overlap": _OVERLAP})
         return _extended(found, self.curve.amplitude)
 

@@ -133,7 +133,7 @@ def _backbone(study: Study, one: FitDataSettings) -> FitData:
 def _curve(study: Study, one: FitDataSettings) -> tuple[Any, dict[str, Any]]:
     options: dict[str, Any] = {"window": one.window}
     if one.frequency_hz is not None:
-        options["frequency"] = one.frequency_hz
+        options["frequency_hz"] = one.frequency_hz
     test = _measurement(study, one, "time")
     return ring_down(test, channel=test.index(one.channel), **options), options
 

@@ -13,7 +13,7 @@ from fecontact.core.types import Array, ArrayLike
 from fecontact.core.units import Summarised, span
 from fecontact.reduction.modal_basis import ModalBasis
 
-_COLUMNS = ("frequency", "damping_ratio", "frequency_deviation", "damping_deviation", "time")
+_COLUMNS = ("frequency_hz", "damping_ratio", "frequency_deviation_hz", "damping_deviation", "time")
 
 
 @read_only_arrays
@@ -33,11 +33,11 @@ class AmplitudeCurve(Summarised):
     ----------
     amplitude : (N,) array
         Amplitudes in ``unit``.
-    frequency : (N,) array
+    frequency_hz : (N,) array
         Undamped frequencies [Hz].
     damping_ratio : (N,) array
         Damping ratios [-].
-    frequency_deviation, damping_deviation : (N,) arrays or None
+    frequency_deviation_hz, damping_deviation : (N,) arrays or None
         Standard deviations of both; None if they are not known.
     time : (N,) array or None
         Times to which the points belong [s]; None unless they come from a ring-down.
@@ -56,9 +56,9 @@ class AmplitudeCurve(Summarised):
     """
 
     amplitude: Array
-    frequency: Array
+    frequency_hz: Array
     damping_ratio: Array
-    frequency_deviation: Array | None = None
+    frequency_deviation_hz: Array | None = None
     damping_deviation: Array | None = None
     time: Array | None = None
     unit: str = "m"
@@ -78,7 +78,7 @@ class AmplitudeCurve(Summarised):
                 raise InputError(f"AmplitudeCurve: {name} has the shape {values.shape}; it must "
                                  f"have one value for each of the {len(amplitude)} amplitudes.")
             object.__setattr__(self, name, values)
-        for name in ("amplitude", "frequency"):
+        for name in ("amplitude", "frequency_hz"):
             if not (getattr(self, name) > 0.0).all():
                 raise InputError(f"AmplitudeCurve: every {name} must be above zero.")
 
@@ -101,17 +101,17 @@ class AmplitudeCurve(Summarised):
             raise InputError(f"AmplitudeCurve.at: amplitude = {amplitude!r} must lie within the "
                              f"curve, from {known[0]:.6g} to {known[-1]:.6g} {self.unit}.")
         if len(known) == 1:
-            return (np.full(wanted.shape, self.frequency[order[0]]),
+            return (np.full(wanted.shape, self.frequency_hz[order[0]]),
                     np.full(wanted.shape, self.damping_ratio[order[0]]))
         found = PchipInterpolator(np.log(known), np.stack(
-            [self.frequency[order], self.damping_ratio[order]], axis=1))(np.log(wanted))
+            [self.frequency_hz[order], self.damping_ratio[order]], axis=1))(np.log(wanted))
         return np.asarray(found[..., 0]), np.asarray(found[..., 1])
 
     def summary(self) -> list[tuple[str, str]]:
         """Amplitudes, frequencies, damping ratios, and the note."""
         return [("observed", self.observed or "unnamed"), ("points", f"{len(self)}"),
                 ("amplitude", span(self.amplitude, self.unit)),
-                ("frequency", span(self.frequency, "Hz")),
+                ("frequency", span(self.frequency_hz, "Hz")),
                 ("damping ratio", span(self.damping_ratio)),
                 *([("note", self.note)] if self.note else [])]
 

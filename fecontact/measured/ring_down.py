@@ -27,7 +27,7 @@ _CHUNK = 400_000  # samples fitted at a time
 
 
 def ring_down(
-    source: Source, values: ArrayLike | None = None, *, frequency: float | None = None,
+    source: Source, values: ArrayLike | None = None, *, frequency_hz: float | None = None,
     window: float = 10.0, overlap: float = 0.5, t_start: float | None = None,
     t_end: float | None = None, derivative: int | None = None, resample: bool = False,
     **channel: Any,
@@ -49,7 +49,7 @@ def ring_down(
     ----------
     source, values
         Times [s] and values; or a :class:`~fecontact.Trajectory` or :class:`Measurement` alone.
-    frequency : float, optional
+    frequency_hz : float, optional
         Frequency of the mode [Hz], to a fifth; by default that of the highest peak of the spectrum.
     window : float
         Length L of the windows, in periods.
@@ -85,7 +85,7 @@ def ring_down(
     if not (isinstance(overlap, Real) and 0.0 <= overlap < 1.0):
         raise InputError(f"ring_down: overlap = {overlap!r} must be from 0 to below 1.")
     step = float(t[1] - t[0])
-    f = _frequency(t, x, frequency)
+    f = _frequency(t, x, frequency_hz)
     half = _half_window(t, step, f, window)
     middles = np.arange(half, len(x) - half, max(1, round(2 * half * (1.0 - overlap))))
     scale = float(np.abs(x).max())
@@ -134,7 +134,7 @@ def _part(t: Array, x: Array, t_start: float | None, t_end: float | None) -> tup
 def _frequency(t: Array, x: Array, given: float | None) -> float:
     """Frequency of the mode [Hz], given or by the highest peak of the spectrum."""
     if given is not None:
-        require_positive("ring_down", frequency=given)
+        require_positive("ring_down", frequency_hz=given)
         return float(given)
     peaks = amplitude_spectrum(t, x).peaks(1) if len(t) >= 8 else []
     if not peaks or not peaks[0].frequency_hz > 0.0:

@@ -131,7 +131,7 @@ changes = { "drive.amplitude_x" = 1e-4 }
 """
     kinds = study_data(fc.Study.from_toml(text, study))
     decay, backbone, history, frequencies, receptance, response = kinds
-    assert decay.curve.frequency == pytest.approx(
+    assert decay.curve.frequency_hz == pytest.approx(
         np.full(len(decay.curve), np.hypot(250.0, 9.0) / (2.0 * np.pi)), rel=1e-6)
     assert decay.curve.amplitude.max() < 1e-3
     assert decay.initial.tolist() == [0.0, 1.0]

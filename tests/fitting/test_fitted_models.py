@@ -206,7 +206,7 @@ def test_bouc_wen_from_a_ring_down():
     run = fc.simulate(truth, 0.8, initial=initial(truth), outputs=time)
     x = run.displacement("B")[:, 0] + 3e-5 * np.random.default_rng(6).standard_normal(len(time))
     curve = ring_down(time, x, window=6.0)
-    assert np.ptp(curve.frequency) > 2.0
+    assert np.ptp(curve.frequency_hz) > 2.0
     found = fc.fit(model(0.15, 1e-3), {
         "friction.friction_coefficient": (0.05, 1.0),
         "friction.yield_displacement": FitParameter(5e-5, 5e-3, scale="log")},

@@ -9,13 +9,14 @@ from fecontact.plot import plot_amplitude_curve
 
 
 def curve(**changes):
-    given = {"amplitude": [2e-4, 1e-3, 4e-3], "frequency": [40.0, 39.5, 38.0],
+    given = {"amplitude": [2e-4, 1e-3, 4e-3], "frequency_hz": [40.0, 39.5, 38.0],
              "damping_ratio": [0.01, 0.012, 0.02], **changes}
     return AmplitudeCurve(**given)
 
 
 def test_ticks_of_a_logarithmic_axis_are_in_the_unit_of_its_label():
-    bars = curve(frequency_deviation=[0.1, 0.1, 0.2], damping_deviation=[1e-3] * 3, observed="B x")
+    bars = curve(frequency_deviation_hz=[0.1, 0.1, 0.2], damping_deviation=[1e-3] * 3,
+                 observed="B x")
     figure = plot_amplitude_curve([bars, curve()], names=["test", "model"])
     upper, lower = figure.axes
     figure.canvas.draw()

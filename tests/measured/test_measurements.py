@@ -60,9 +60,9 @@ def test_text_with_titles(tmp_path):
     assert found.notes == ()
     assert found.problems == ()
     assert found.series("tip")[2:] == ("m", "tip")
-    curve = ring_down(found, channel="tip", frequency=40.0)
-    direct = ring_down(TIME, 1e-3 * MOTION, frequency=40.0)
-    assert curve.frequency == pytest.approx(direct.frequency, rel=1e-6)
+    curve = ring_down(found, channel="tip", frequency_hz=40.0)
+    direct = ring_down(TIME, 1e-3 * MOTION, frequency_hz=40.0)
+    assert curve.frequency_hz == pytest.approx(direct.frequency_hz, rel=1e-6)
     assert curve.amplitude == pytest.approx(direct.amplitude, rel=1e-6)
 
 

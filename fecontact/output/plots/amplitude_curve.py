@@ -56,9 +56,9 @@ def plot_amplitude_curve(
         panels = figure.subplots(2, 1, sharex=True)
         for curve, name, colour in zip(given, names or [""] * len(given),
                                        distinct_colours(len(given)), strict=True):
-            known = curve.frequency_deviation is not None or len(curve) < _LEAST
+            known = curve.frequency_deviation_hz is not None or len(curve) < _LEAST
             for axis, values, deviation in (
-                    (panels[0], curve.frequency, curve.frequency_deviation),
+                    (panels[0], curve.frequency_hz, curve.frequency_deviation_hz),
                     (panels[1], curve.damping_ratio, curve.damping_deviation)):
                 bars = None if deviation is None else _DEVIATIONS * np.asarray(deviation)
                 axis.errorbar(curve.amplitude, values, bars, color=colour, label=name or None,
