@@ -36,8 +36,8 @@ normal = { stiffness = 0.3e6, roughness_height = 5.2e-6, damping = 6.0 }
 friction = { static_coefficient = 0.8, kinetic_coefficient = 0.55, decay = 1000.0 }
 ground = { speed = 2e-3 }
 load = { normal = 14.0 }
-drive = { stiffness_x = 5610.0, damping_x = 0.768, amplitude_x = 0.5e-3, frequency_hz = 2.1963 }
-simulation = { t_end = 1.0, outputs = 101 }
+drive = { stiffness_x = 5610.0, damping_x = 0.768, amplitude_x = 0.5e-3, frequency_hz = 2.196 }
+simulation = { t_end = 1.0, outputs = 1001 }
 """
 
 
@@ -321,7 +321,7 @@ def check_results(names, printed, folder):
     # What friction takes from the block is its force times the slip, at each node.
     power = (data.friction_force * data.slip_velocity).sum("node")
     assert float(power.integrate("time")) == pytest.approx(run.energies.friction[-1], rel=0.01)
-    assert printed.splitlines()[0] == "(101, 5) N"
+    assert printed.splitlines()[0] == "(1001, 5) N"
     assert printed.splitlines()[1].endswith("'xy', 'yz', 'xz'] Pa")
     best = names["table"].to_xarray().amplitude_x
     assert best.shape == (2, 2)
