@@ -35,7 +35,7 @@ def swept_curve(
     force : complex or (N,) complex array
         First harmonics P of the force [N].
     modal_mass : float, optional
-        Modal mass m [kg], if it is known; see :func:`modal_mass_at`.
+        Modal mass m [kg], if it is known; see :func:`~fecontact.measured.modal_mass_at`.
     unit, observed : str
         Unit of the displacement, and its title.
 

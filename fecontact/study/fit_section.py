@@ -149,7 +149,7 @@ class FitDataSettings:
     about : 'none', 'rest' or 'sliding'
         Equilibrium about which the contact is linearised for natural frequencies and receptances.
     frequency_hz : float, optional
-        Of a decay the frequency of the mode; by default that of the highest peak.
+        Of a decay the frequency of the mode [Hz]; by default that of the highest peak.
     window : float
         Of a decay the length of the windows, in periods.
     mode : int
