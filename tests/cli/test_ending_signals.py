@@ -30,7 +30,7 @@ simulation = { t_end = 1e5, outputs = 100001 }
 output = { frames = 0 }
 """
 RUN = """
-import signal, sys, threading
+import contextlib, signal, sys, threading
 from fecontact.cli import execute
 from fecontact.integrate.rodas5p.driver import Run
 from fecontact.system import model_limits
@@ -39,7 +39,9 @@ model_limits.PERIODS = 1e15  # the run is meant to last
 advance = Run.advance
 def told(run, steps):
     if run.outputs:
-        print("running", file=sys.stderr, flush=True)
+        # The terminal may be gone before its signal is heard.
+        with contextlib.suppress(OSError):
+            print("running", file=sys.stderr, flush=True)
     return advance(run, steps)
 Run.advance = told
 sys.exit(execute(["run", sys.argv[1]]))
