@@ -65,12 +65,12 @@ class _Contact:
             whole = np.zeros((len(axes), 6, 6))
             whole[:, :3, :3] = axes * ([[0.0], [0.0], [1.0]] if self.spring else 1.0)
             whole[:, 3:, 3:] = axes * (0.0 if self.spring else 1.0)
-            return sp.csr_array(sp.block_diag(list(whole), format="csr"))
+            return sp.csr_array(sp.block_diag(list(map(sp.csr_array, whole)), format="csr"))
         x, y = self.normals.T
         zero, one = np.zeros_like(x), np.full_like(x, 0.0 if self.spring else 1.0)
         frames = np.array([[y * one, -x * one, zero], [x, y, zero],
                            [zero, zero, one]]).transpose(2, 0, 1)
-        return sp.csr_array(sp.block_diag(list(frames), format="csr"))
+        return sp.csr_array(sp.block_diag(list(map(sp.csr_array, frames)), format="csr"))
 
 
 def assembled_basis(
