@@ -78,9 +78,12 @@ def _made(one: CompiledLaw) -> CompiledLaw | None:
     ways = (_at_once_in_time, _one_by_one_in_time) if signal else (_at_once, _one_by_one)
     inside = part(one.python, error_model="numpy", forceinline=True)
     for way in ways:
-        # Compiled code is stored beside the law, under a name of its own.
+        # Compiled code is stored beside the law, under a name of its own. Numba reads the source at
+        # that place, which must be the beginning of a function.
+        place = one.python.__code__
         function = FunctionType(
-            way.__code__.replace(co_filename=one.python.__code__.co_filename),
+            way.__code__.replace(co_filename=place.co_filename,
+                                 co_firstlineno=place.co_firstlineno),
             {**globals(), "law": inside}, one.python.__name__)
         function.__module__ = one.python.__module__
         function.__qualname__ = f"{one.python.__qualname__}.eight.{way.__name__}"
