@@ -37,7 +37,7 @@ SHOWN = {  # by frequencies of the source [rad/s]
 
 @dataclass(frozen=True)
 class Row:
-    """What one model does at one frequency of the source [rad/s]."""
+    """Motion of one model at one frequency of the source [rad/s]."""
 
     frequency: float
     modes: int

@@ -97,7 +97,7 @@ class _Checked:
         require_no_overlap(self.nodes, self.cells, self.kind, np.flatnonzero(count[number] == 1))
 
 
-# Those of meshes that are alive: another one of the same nodes and cells needs no checks.
+# Of existing meshes: a further mesh of the same nodes and cells is not checked again.
 _CHECKED: "WeakValueDictionary[tuple[int, int], _Checked]" = WeakValueDictionary()
 
 

@@ -111,9 +111,9 @@ def finite_columns(owner: str, **columns: Any) -> dict[str, Array]:
     shapes = {values.shape for values in found.values()}
     first = next(iter(found.values()))
     if len(shapes) > 1 or first.ndim != 1 or not len(first):
-        told = ", ".join(f"{name} {values.shape}" for name, values in found.items())
-        raise InputError(f"{owner}: the columns have the shapes {told}; give as many values in "
-                         f"each.")
+        listed = ", ".join(f"{name} {values.shape}" for name, values in found.items())
+        raise InputError(f"{owner}: the columns have the shapes {listed}; give as many values "
+                         f"in each.")
     for name, values in found.items():
         if not np.isfinite(values).all():
             raise InputError(f"{owner}: {name} holds values that are no finite numbers, the first "

@@ -60,7 +60,7 @@ def fit(
     folder : path, optional
         Where evaluations are kept: a fit that was cancelled goes on there.
     overwrite : bool
-        Whether to begin anew in this folder.
+        Whether to replace the evaluations in this folder.
     progress : bool or callable, optional
         True for a bar; a function is called with the numbers of finished and of all starts.
 

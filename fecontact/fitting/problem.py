@@ -70,7 +70,7 @@ class Problem:
 
     @property
     def parts(self) -> list[slice]:
-        """Which of the numbers belong to each data set."""
+        """Ranges of the residuals that belong to each data set."""
         ends = np.cumsum([0, *(len(one.measured) for one in self.data)]).tolist()
         return [slice(a, b) for a, b in pairwise(ends)]
 

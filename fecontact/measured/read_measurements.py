@@ -152,7 +152,7 @@ def _read_mat(path: Path, units: Mapping[str, str]) -> list[Measurement]:
             return _read_hdf5(path, units)
     from scipy.io import loadmat
 
-    content = loadmat(path, squeeze_me=True, struct_as_record=False)
+    content = loadmat(path, squeeze_me=True, struct_as_record=False, spmatrix=False)
     return _from_tree({name: _plain(value) for name, value in content.items()
                        if not name.startswith("__")}, str(path), units)
 

@@ -125,7 +125,7 @@ def _read_mtx(path: Path, name: str | None) -> tuple[Any, NDArray[np.int64] | No
         entries = rows * columns // (1 if symmetry == "general" else 2)
     if 2 * entries > path.stat().st_size:  # a digit and a blank each, at least
         raise InputError(f"The file declares {entries} numbers, more than it holds.")
-    return mmread(path), None
+    return mmread(path, spmatrix=False), None
 
 
 def _read_mat(path: Path, name: str | None) -> tuple[Any, None]:
@@ -137,7 +137,7 @@ def _read_mat(path: Path, name: str | None) -> tuple[Any, None]:
                             if not key.startswith("#")}, name), None
     from scipy.io import loadmat
 
-    variables = loadmat(path)
+    variables = loadmat(path, spmatrix=False)
     return _chosen({key: value for key, value in variables.items()
                     if not key.startswith("__")}, name), None
 
