@@ -191,9 +191,9 @@ class Mesh(Summarised):
         return cls(*structured((x, y) if z is None else (x, y, z)))
 
     def __post_init__(self) -> None:
-        checked = _CHECKED.get((id(self.nodes), id(self.cells)))
-        if checked is None or checked.nodes is not self.nodes or checked.cells is not self.cells:
-            checked = _Checked(self.nodes, self.cells)
+        # What is known holds its arrays, so that no others can have their numbers.
+        checked = _CHECKED.get((id(self.nodes), id(self.cells))) or _Checked(
+            self.nodes, self.cells)
         object.__setattr__(self, "_checked", checked)
         nodes, cells = checked.nodes, checked.cells
         dimension, kind = nodes.shape[1], checked.kind

@@ -65,6 +65,18 @@ def test_response_of_a_mode_that_sticks_is_linear():
     assert peak.damping_ratio == pytest.approx(0.01 / np.sqrt(1.5), rel=1e-5)
 
 
+def test_force_of_a_moving_dashpot_is_that_at_the_frequency_of_the_mode():
+    """x'' + .2 x' + x = x0 (sin w t + .2 w cos w t): |P| = .2 w a at w = 1."""
+    system = jenkins_system().with_(
+        friction=fc.laws.ConstantFriction(0.0),
+        drive=fc.Drive(stiffness_x=1.0, damping_x=0.2, amplitude_x=0.02, frequency_hz=1.0 / TURN,
+                       dashpots="relative"))
+    mode = nonlinear_mode(system, (1e-2, 1.0), method=HarmonicBalance(1, 16))
+    peak = mode_response(mode, system).peak()
+    assert TURN * peak.frequency_hz == pytest.approx(1.0, rel=1e-7)
+    assert peak.amplitude == pytest.approx(0.1 * np.sqrt(1.04), rel=1e-6)
+
+
 def test_response_of_a_mode_obeys_the_describing_function():
     """[(1 - w^2) X + f_c]^2 + [.02 w X + f_s]^2 = F^2, on both sides of the peaks."""
     system = jenkins_system()

@@ -1,4 +1,5 @@
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -88,3 +89,25 @@ def test_mesh_survives_pickling() -> None:
 def test_unusable_meshes_are_refused(arguments: tuple, message: str) -> None:
     with pytest.raises(MeshError, match=message):
         Mesh(*arguments)
+
+
+def test_nodes_and_cells_of_a_mesh_are_checked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mesh of the same arrays takes what is known; of others, of moved nodes too, all is new."""
+    from fecontact.fem import mesh as module
+
+    counted = []
+    check = module.require_no_overlap
+    monkeypatch.setattr(module, "require_no_overlap",
+                        lambda *given: (counted.append(given), check(*given)))
+    mesh = Mesh(NODES, CELLS)
+    again = replace(mesh, points={"B": [0]})
+    assert len(counted) == 1
+    assert again.nodes is mesh.nodes
+    assert again.boundaries == mesh.boundaries
+    folded = mesh.nodes.copy()
+    folded[4] = (-0.5, 0.5)
+    with pytest.raises(MeshError, match="folded"):
+        Mesh(folded, mesh.cells)
+    assert len(Mesh(mesh.nodes + 1.0, mesh.cells).outline) == 6
+    assert len(counted) == 2
+    assert len(replace(pickle.loads(pickle.dumps(mesh)), points={"B": [0]}).outline) == 6
