@@ -12,7 +12,7 @@ _DEGREE, _FEWEST = 4, 8
 
 
 def swept_curve(
-    frequency: ArrayLike, response: ArrayLike, force: ArrayLike, *,
+    frequency_hz: ArrayLike, response: ArrayLike, force: ArrayLike, *,
     modal_mass: float | None = None, unit: str = "m", observed: str = "",
 ) -> AmplitudeCurve:
     r"""Frequency and damping over amplitude from a response swept through one resonance.
@@ -28,7 +28,7 @@ def swept_curve(
 
     Parameters
     ----------
-    frequency : (N,) array
+    frequency_hz : (N,) array
         Frequencies of the sweep [Hz], about one resonance alone.
     response : (N,) complex array
         First harmonics X of the displacement, ``x = Re(X exp(i w t))``.
@@ -51,11 +51,11 @@ def swept_curve(
     AnalysisError
         If the sweep does not determine the modal mass, as that of one side of a resonance.
     """
-    f = as_floats(frequency, "swept_curve: frequency")
+    f = as_floats(frequency_hz, "swept_curve: frequency_hz")
     X, P = (np.asarray(as_numbers(values, f"swept_curve: {name}"), dtype=complex)
             for name, values in (("response", response), ("force", force)))
     if f.ndim != 1 or X.shape != f.shape or P.shape not in ((), f.shape) or len(f) < _FEWEST:
-        raise InputError(f"swept_curve: frequency, response and force have the shapes {f.shape}, "
+        raise InputError(f"swept_curve: frequency_hz, response and force have the shapes {f.shape}, "
                          f"{X.shape} and {P.shape}; give at least {_FEWEST} values of each, or one "
                          f"force.")
     if not ((f > 0.0).all() and np.isfinite(f).all() and np.isfinite(X).all()
