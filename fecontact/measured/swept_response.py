@@ -55,9 +55,9 @@ def swept_curve(
     X, P = (np.asarray(as_numbers(values, f"swept_curve: {name}"), dtype=complex)
             for name, values in (("response", response), ("force", force)))
     if f.ndim != 1 or X.shape != f.shape or P.shape not in ((), f.shape) or len(f) < _FEWEST:
-        raise InputError(f"swept_curve: frequency_hz, response and force have the shapes {f.shape}, "
-                         f"{X.shape} and {P.shape}; give at least {_FEWEST} values of each, or one "
-                         f"force.")
+        raise InputError(f"swept_curve: frequency_hz, response and force have the shapes "
+                         f"{f.shape}, {X.shape} and {P.shape}; give at least {_FEWEST} values of "
+                         f"each, or one force.")
     if not ((f > 0.0).all() and np.isfinite(f).all() and np.isfinite(X).all()
             and np.isfinite(P).all() and (np.abs(X) > 0.0).all()
             and (np.abs(P) > 0.0).all()):

@@ -79,6 +79,8 @@ def test_without_deviations_they_follow_from_the_residuals():
         t.ppf(0.95, 38) * s * np.sqrt(covariance[0, 0]), rel=1e-6)
     profile = profile_likelihood(found, OFFSET, points=41, level=0.9)
     assert profile.interval == pytest.approx((low, high), rel=3e-3)
+    rise = ((profile.values - best[0]) / (s * np.sqrt(covariance[0, 0]))) ** 2
+    assert profile.chi_square - profile.best == pytest.approx(rise, rel=1e-4, abs=1e-6)
 
 
 def test_the_scale_of_a_parameter_does_not_change_the_estimate():

@@ -145,7 +145,7 @@ def test_a_run_and_a_nonlinear_mode_give_the_same_curve():
     frequency, ratio = curve.at(backbone.amplitude)
     assert backbone.amplitude[-1] > 4.0 * backbone.amplitude[0]
     assert backbone.frequency_hz == pytest.approx(frequency, rel=1e-3)
-    assert backbone.damping_ratio == pytest.approx(ratio, rel=1e-2)
+    assert backbone.damping_ratio == pytest.approx(ratio, rel=3e-3)
 
 
 def test_swept_responses_of_a_hardening_mode():
