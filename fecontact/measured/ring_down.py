@@ -48,8 +48,7 @@ def ring_down(
     Parameters
     ----------
     source, values
-        Times [s] and values; or a :class:`~fecontact.Trajectory` or
-        :class:`~fecontact.measured.Measurement` alone.
+        Times [s] and values; or a ``Trajectory`` or ``Measurement`` alone.
     frequency_hz : float, optional
         Frequency of the mode [Hz], to a fifth; by default that of the highest peak of the spectrum.
     window : float
