@@ -24,7 +24,8 @@ class Shown:
     @property
     def displacement(self):
         """(N, P, d) of the nodes at all times."""
-        return np.einsum("pcm,tm->tpc", self.array("bodies", "shapes"), self.array("coordinates"))
+        shapes = self.array("bodies", "shapes")
+        return np.einsum("pcm,tm->tpc", shapes, self.array("coordinates")[:, : shapes.shape[2]])
 
     @property
     def stress(self):

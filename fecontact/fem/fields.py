@@ -15,7 +15,7 @@ from fecontact.core.units import Summarised, quantity, span
 from fecontact.fem.cell_gradients import PAIRS
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_geometry import facets_of, oriented_solids
-from fecontact.fem.elements.cell_kinds import CELL_KINDS, numbered_rows
+from fecontact.fem.elements.cell_kinds import CELL_KINDS, numbered_rows, shape_functions
 from fecontact.fem.elements.refinement import PARTS
 from fecontact.fem.incompatible_modes import mode_gradients
 from fecontact.fem.interpolation import element_kind, interpolation
@@ -43,7 +43,9 @@ class BodyFields(Summarised):
     displacement : (N, 2) array, of a solid (N, 3)
         In x, y (, z) [m].
     stress : (N, 4) array, of a solid (N, 6)
-        Stresses xx, yy, zz, xy (, yz, xz), means over the adjacent elements [Pa].
+        Stresses xx, yy, zz, xy (, yz, xz), means over the adjacent elements [Pa]. After large
+        deflections these are the second ones of Piola and Kirchhoff, in axes that turn with the
+        material; see :attr:`cauchy_stress`.
     """
 
     nodes: Array
@@ -84,6 +86,41 @@ class BodyFields(Summarised):
         shears = xy**2 if self.stress.shape[1] == 4 else (self.stress[:, 3:] ** 2).sum(axis=1)
         return np.asarray(np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
                                   + 3.0 * shears))
+
+    @property
+    def cauchy_stress(self) -> Array:
+        r"""True stress in x, y (, z) after large deflections, in the order of ``stress`` [Pa].
+
+        :math:`\sigma = F S F^T / \det F` with the deformation gradient F, a mean over the adjacent
+        elements as the second stress S of Piola and Kirchhoff is. Strains across a plane body count
+        as zero, an error of the size of the strain. For fields of small deflections ``stress``
+        itself is the true stress.
+        """
+        count, d = self.nodes.shape
+        F = np.eye(3) + np.zeros((count, 3, 3))
+        F[:, :d, :d] += self._gradients()
+        S = np.zeros((count, 3, 3))
+        pairs = PAIRS[3][: self.stress.shape[1]]
+        for values, (i, j) in zip(self.stress.T, pairs, strict=True):
+            S[:, i, j] = S[:, j, i] = values
+        true = F @ S @ F.transpose(0, 2, 1) / np.linalg.det(F)[:, None, None]
+        return np.stack([true[:, i, j] for i, j in pairs], axis=1)
+
+    def _gradients(self) -> Array:
+        """Displacement gradients (N, d, d) at the nodes, means over the adjacent elements."""
+        (count, d), members = self.nodes.shape, self.elements
+        width = members.shape[1]
+        kind = element_kind(d, width)
+        local = np.array(kind.places[:width], dtype=float)
+        _, slopes = shape_functions(d, width, local)
+        jacobian = np.einsum("nkj,eki->enij", slopes, self.nodes[members])
+        grad = np.einsum("nkj,eki->enij", slopes, self.displacement[members]) @ (
+            np.linalg.inv(jacobian))
+        size = np.abs(np.linalg.det(jacobian)).mean(axis=1)
+        found, around = np.zeros((count, d, d)), np.zeros(count)
+        np.add.at(found, members, size[:, None, None, None] * grad)
+        np.add.at(around, members, size[:, None])
+        return found / around[:, None, None]
 
     def at(self, place: Sequence[float]) -> tuple[Array, Array]:
         """Displacement (d,) [m] and stress [Pa] at a place, interpolated within its element.
@@ -134,12 +171,28 @@ def _solid_cells(nodes: Array, elements: Integers) -> Integers:
 
 
 def stress_of(
-    body: ElasticBody, displacements: Array, axes: StressAxes = "global"
+    body: ElasticBody, displacements: Array, axes: StressAxes = "global", *, finite: bool = False,
+    factors: Array | None = None,
 ) -> Array:
     """Stresses (N, 4, m) of displacements (2 N, m), or (N, 6, m) of (3 N, m), at the nodes [Pa].
 
     In the order xx, yy, zz, xy (, yz, xz); means over the adjacent elements. With ``axes =
     'material'`` anisotropic cells give the components 11, 22, 33, 12 (, 23, 13) in their axes.
+
+    Parameters
+    ----------
+    body : ElasticBody
+        The body.
+    displacements : (d N, m) array
+        Displacements of the nodes in m states [m].
+    axes : 'global' or 'material'
+        Axes of the components.
+    finite : bool
+        True for Green and Lagrange's strain, whose stress is the second one of Piola and Kirchhoff:
+        its components belong to axes that turn with the material.
+    factors : (9 M, m) array, optional
+        Factors of incompatible modes of bricks, by cell, mode and axis; by default those without
+        force in linear elasticity.
 
     Raises
     ------
@@ -147,8 +200,10 @@ def stress_of(
         For material axes of a plane body of which none is normal to its plane.
     """
     require_choice("stress_of", "axes", axes, get_args(StressAxes))
-    chosen = np.flatnonzero((body.anisotropic[1] >= 0) | body.has_incompatible_modes)
-    parts = [_stress_by_cells(body, displacements, axes, chosen)] if len(chosen) else []
+    chosen = np.flatnonzero(
+        (body.anisotropic[1] >= 0) | body.has_incompatible_modes | finite)
+    parts = [_stress_by_cells(body, displacements, axes, chosen, finite, factors)] if len(
+        chosen) else []
     if len(chosen) == len(body.mesh.cells):
         return parts[0]
     for constants, gradients in body.material_gradients:
@@ -165,7 +220,8 @@ def stress_of(
 
 
 def _stress_by_cells(
-    body: ElasticBody, displacements: Array, axes: StressAxes, chosen: Integers
+    body: ElasticBody, displacements: Array, axes: StressAxes, chosen: Integers, finite: bool,
+    factors: Array | None,
 ) -> Array:
     """Part of the chosen cells in the stresses, means over all elements at a node."""
     import scipy.sparse as sp
@@ -185,10 +241,11 @@ def _stress_by_cells(
         # grad (e, n, i, j, m): derivative of displacement i in direction j at node n of the cell
         grad = np.einsum("kjen,ekim->enijm", slopes[:, :, cells], fields[members[cells]])
         if body.has_incompatible_modes:
-            grad += mode_gradients(body, cells, displacements, local.T)
-        strains = np.stack([grad[:, :, i, j] if i == j else grad[:, :, i, j] + grad[:, :, j, i]
-                            for i, j in PAIRS[d]], axis=2)
+            grad += mode_gradients(body, cells, displacements, local.T, factors)
+        strains = np.stack([_strain(grad, i, j, finite) for i, j in PAIRS[d]], axis=2)
         of_strain = body.cell_stiffness(cells)[:, :components, used]
+        if d == 2 and body.plane == "stress":
+            of_strain[:, 2] = 0.0
         if axes == "material":
             of_strain = _to_material_axes(body, cells, components) @ of_strain
         stress = np.einsum("ers,ensm->enrm", of_strain, strains) * size[cells, None, None, None]
@@ -197,6 +254,14 @@ def _stress_by_cells(
                               shape=(count, len(rows)))
         total += gather @ stress.reshape(len(rows), -1)
     return total.reshape(count, components, -1)
+
+
+def _strain(slopes: Array, i: int, j: int, finite: bool) -> Array:
+    """Strain (e, n, m), twice if it is a shear, of displacement gradients (e, n, d, d, m)."""
+    found = 0.5 * (slopes[:, :, i, j] + slopes[:, :, j, i])
+    if finite:
+        found = found + 0.5 * (slopes[:, :, :, i] * slopes[:, :, :, j]).sum(axis=2)
+    return np.asarray(found if i == j else 2.0 * found)
 
 
 def _to_material_axes(body: ElasticBody, cells: Integers, components: int) -> Array:

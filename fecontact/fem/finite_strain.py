@@ -34,8 +34,12 @@ from fecontact.fem.assembly import pattern
 from fecontact.fem.cell_gradients import cell_gradients
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.equations import selects
+from fecontact.fem.fields import stress_of
 from fecontact.fem.incompatible_modes import bubble_gradients
 from fecontact.fem.stress_stiffness import USED
+
+# Strain up to which St. Venant and Kirchhoff's material stands for metals.
+LARGE_STRAIN = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +126,15 @@ class FiniteStrainModel:
         """Displacements (N, d) of the nodes of the body from the free unknowns (f,)."""
         d = self.body.dimension
         return np.asarray(self.expansion @ q).reshape(-1, d)[: len(self.body.nodes)]
+
+    def stress(self, q: Array) -> Array:
+        """Second stress of Piola and Kirchhoff (N, 4, k), of solids (N, 6, k), at the nodes [Pa].
+
+        For free unknowns (f, k), in the order of :func:`fecontact.fem.fields.stress_of`.
+        """
+        u, own = np.asarray(self.expansion @ q), self.body.nodes.size
+        return stress_of(self.body, u[:own], finite=True,
+                         factors=u[own:] if self.body.has_incompatible_modes else None)
 
     def free(self, forces: Array) -> Array:
         """Forces (f,) or (f, k) on the free unknowns of nodal forces (d N,) or (d N, k)."""

@@ -31,19 +31,25 @@ def reductions(body: Any, cells: Integers) -> Array:
     return np.linalg.solve(np.linalg.cholesky(own), coupling)
 
 
-def mode_gradients(body: Any, cells: Integers, shapes: Array, local: Array) -> Array:
+def mode_gradients(
+    body: Any, cells: Integers, shapes: Array, local: Array, factors: Array | None = None
+) -> Array:
     """Gradients (e, q, 3, 3, m), d_j of component i, of the modes under displacements (3 N, m).
 
-    They are those at local coordinates (q, 3) of the cells.
+    They are those at local coordinates (q, 3) of the cells. ``factors`` (9 M, m) of all cells
+    stand for those without force under the displacements.
     """
-    own, coupling = _matrices(body, cells)
-    members = body.basis.element_dofs.T[cells]
-    fields = shapes.reshape(len(body.nodes), 3, -1)[members]
-    # Subtract a node: rigid displacements may be much larger than differences.
-    fields = (fields - fields[:, :1]).reshape(len(members), 24, -1)
-    factors = -np.linalg.solve(own, coupling @ fields).reshape(len(members), 3, 3, -1)
+    if factors is None:
+        own, coupling = _matrices(body, cells)
+        members = body.basis.element_dofs.T[cells]
+        fields = shapes.reshape(len(body.nodes), 3, -1)[members]
+        # Subtract a node: rigid displacements may be much larger than differences.
+        fields = (fields - fields[:, :1]).reshape(len(members), 24, -1)
+        given = -np.linalg.solve(own, coupling @ fields).reshape(len(members), 3, 3, -1)
+    else:
+        given = factors.reshape(-1, 3, 3, factors.shape[1])[cells]
     _, bubbles, _ = _slopes(body, cells, local)
-    return np.asarray(np.einsum("eqbj,ebim->eqijm", bubbles, factors))
+    return np.asarray(np.einsum("eqbj,ebim->eqijm", bubbles, given))
 
 
 def bubble_gradients(body: Any, cells: Integers) -> Array:

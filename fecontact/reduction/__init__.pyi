@@ -13,9 +13,9 @@ from .assembly.tightened import TightenedBolts, tightened
 from .convergence import ModeConvergence, mode_convergence
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import Normalisation, normalisation
-from .large_deflections.fit import LargeDeflections
 from .large_deflections.forces import LargeDeflectionForces
-from .mode_shapes import BodyPart, ModeShapes, ReductionQuality
+from .large_deflections.options import LargeDeflections
+from .mode_shapes import BodyPart, ModeShapes, NonlinearStress, ReductionQuality
 from .point_masses import point_masses
 from .polynomial_stiffness import polynomial_stiffness
 from .reduce_body import reduce_bodies
@@ -39,6 +39,7 @@ __all__ = [
     "ModeConvergence",
     "ModeShapes",
     "NonlinearSpring",
+    "NonlinearStress",
     "Normalisation",
     "PiecewiseSpring",
     "PlaySpring",

@@ -382,7 +382,8 @@ class ModalBasis(Summarised):
 
         For example ``basis.fields(equilibrium(system).modal_coordinates)``; with ``body`` those of
         one of several bodies. Stresses are as good as the modes are for the loads: see ``loads`` of
-        :func:`~fecontact.modal_basis`.
+        :func:`~fecontact.modal_basis`. With large deflections they are the second ones of Piola
+        and Kirchhoff, see :class:`~fecontact.fem.BodyFields`.
 
         Raises
         ------
@@ -407,7 +408,8 @@ class ModalBasis(Summarised):
             first, end = names[body][0], sum(names[body])
             elements = elements[(elements[:, 0] >= first) & (elements[:, 0] < end)] - first
         return BodyFields(shapes.nodes[first:end], elements, shapes.shapes[first:end] @ values,
-                          shapes.stress[first:end] @ values)
+                          shapes.stress_terms[first:end]
+                          @ shapes.stress_coordinates(values[None])[0])
 
     def with_dashpots(self, dashpots: Mapping[str | int, Sequence[float]]) -> "ModalBasis":
         """A copy with dashpots between points of the body and the inertial frame.
@@ -469,7 +471,10 @@ class ModalBasis(Summarised):
                 turning, coriolis=turning.coriolis[np.ix_(chosen, chosen)],
                 stiffening=turning.stiffening[np.ix_(chosen, chosen)], load=turning.load[chosen]),
             mode_shapes=None if given is None else replace(
-                given, shapes=given.shapes[..., chosen], stress=given.stress[..., chosen]),
+                given, shapes=given.shapes[..., chosen], stress=given.stress[..., chosen],
+                nonlinear_stress=None if given.nonlinear_stress is None else replace(
+                    given.nonlinear_stress,
+                    coordinates=given.nonlinear_stress.coordinates[:, chosen])),
             link_load=None if self.link_load is None else self.link_load[chosen],
             large_deflections=tuple(replace(one, coordinates=one.coordinates[:, chosen])
                                     for one in self.large_deflections),

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,32 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.fem.interpolation import interpolation
 from fecontact.fem.points import rotating_rows
+
+
+@read_only_arrays
+@dataclass(frozen=True, eq=False)
+class NonlinearStress:
+    """Stress of large deflections beside the linear one: a sum of products of coordinates.
+
+    Term k is ``stress[..., k] prod_i Q_i^powers[k, i]`` with ``Q = coordinates @ q``.
+
+    Attributes
+    ----------
+    coordinates : (d, m) array
+        Rows of the coordinates of modes with large deflections.
+    powers : (p, d) integer array
+        Their exponents in each of p products, of the degrees two and three.
+    stress : (N, 4, p), of solids (N, 6, p) array
+        Second stress of Piola and Kirchhoff at the nodes [Pa per unit of each product].
+    """
+
+    coordinates: Array
+    powers: Integers
+    stress: Array
+
+    def products(self, q: Array) -> Array:
+        """Products (F, p) at modal coordinates (F, m)."""
+        return np.asarray(np.prod((q @ self.coordinates.T)[:, None] ** self.powers, axis=2))
 
 
 @read_only_arrays
@@ -38,6 +65,8 @@ class ModeShapes:
         Nodes of each finite element: corners, mid-sides, centre; by default the cells.
     outline_nodes : (k,) integer array, optional
         Contact node to whose patch each facet of a solid's outline belongs, -1 for none.
+    nonlinear_stress : NonlinearStress, optional
+        Stress of large deflections that is not linear in the coordinates.
     """
 
     nodes: Array
@@ -48,6 +77,20 @@ class ModeShapes:
     restriction: Any
     elements: Integers | None = None
     outline_nodes: Integers | None = None
+    nonlinear_stress: NonlinearStress | None = None
+
+    @cached_property
+    def stress_terms(self) -> Array:
+        """Stresses (N, c, m + p) of the m coordinates and of the p products behind them."""
+        if self.nonlinear_stress is None:
+            return self.stress
+        return np.concatenate([self.stress, self.nonlinear_stress.stress], axis=2)
+
+    def stress_coordinates(self, q: Array) -> Array:
+        """Coordinates (F, m) followed by the products (F, p) that :attr:`stress_terms` need."""
+        if self.nonlinear_stress is None:
+            return q
+        return np.hstack([q, self.nonlinear_stress.products(q)])
 
     def rows_at(self, place: Sequence[float], name: str) -> Array:
         """Displacements and rotations (3, m) of the modes at a place within an element, or (6, m).

@@ -43,9 +43,9 @@ from fecontact.reduction.eigenmodes import (
     free_modes,
     frequencies_of,
 )
-from fecontact.reduction.large_deflections.fit import LargeDeflections, condensed_body
-from fecontact.reduction.large_deflections.forces import large_deflection_forces
-from fecontact.reduction.large_deflections.nodes import with_springs
+from fecontact.reduction.large_deflections.fit import condensed_body
+from fecontact.reduction.large_deflections.nodes import with_large_deflections
+from fecontact.reduction.large_deflections.options import LargeDeflections
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes, ReductionQuality
 from fecontact.reduction.prestress import (
@@ -219,14 +219,8 @@ def modal_basis(
     )
     if condensed is not None:
         assert large_deflections is not None
-        numbers = condensed.modes
-        largest = np.linalg.norm(shapes.reshape(-1, d, len(w))[:, :, numbers], axis=1).max(axis=0)
-        bent, elongations = large_deflection_forces(
-            condensed, np.einsum("fk,fij->kij", system.mass @ free_shapes, condensed.fields), w,
-            largest, large_deflections.largest_displacement)
-        least = 2.0 * large_deflections.stretching_damping * w * (np.arange(len(w)) >= own)
-        added = np.diag(np.maximum(least - np.diag(basis.damping), 0.0))
-        return with_springs(replace(basis, damping=basis.damping + added), bent, elongations)
+        projected = np.einsum("fk,fij->kij", system.mass @ free_shapes, condensed.fields)
+        return with_large_deflections(basis, condensed, projected, large_deflections, own)
     return basis if turning is None else basis.with_rotation_speed(turning.speed)
 
 

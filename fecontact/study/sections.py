@@ -28,7 +28,7 @@ from fecontact.laws.base import PerNode
 from fecontact.laws.excitation import Load
 from fecontact.laws.wear import ArchardWear, EnergyWear, WearLaw
 from fecontact.reduction.damping import LossFactor, Rayleigh
-from fecontact.reduction.large_deflections.fit import LargeDeflections
+from fecontact.reduction.large_deflections.options import LargeDeflections
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import modal_basis
 from fecontact.study.materials_section import MaterialSettings

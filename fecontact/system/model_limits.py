@@ -18,6 +18,7 @@ from fecontact.core.magnitude import magnitude
 from fecontact.core.types import Array
 from fecontact.fem.chords import chords
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.finite_strain import LARGE_STRAIN
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.excitation import AXES
 from fecontact.laws.friction.stribeck import ConstantFriction
@@ -197,7 +198,7 @@ def _beyond_fit(system: ContactSystem, times: Array, states: Array) -> str | Non
 
 
 def beyond_fit(basis: ModalBasis, coordinates: Array) -> str | None:
-    """Message about coordinates (N, m) outside the range in which their forces were fitted."""
+    """Message about coordinates (N, m) beyond the fitted range of their forces, or large strain."""
     for one in basis.large_deflections:
         with np.errstate(over="ignore", invalid="ignore"):
             reach = one.reach(coordinates)
@@ -205,6 +206,12 @@ def beyond_fit(basis: ModalBasis, coordinates: Array) -> str | None:
             return (f"a mode with large deflections is deflected by {reach:.3g} times the range in "
                     f"which its forces were fitted, up to {one.largest_displacement:.3g} m; make "
                     f"the basis with a larger largest_displacement.")
+        # Bending grows in proportion to the deflection, stretching with its square.
+        strain = reach * one.largest_strain
+        if strain > LARGE_STRAIN:
+            return (f"a mode with large deflections strains the body by up to {strain:.2g}; above "
+                    f"{LARGE_STRAIN:g} metals yield and rubber has another law, so lower the "
+                    f"loads.")
     return None
 
 

@@ -13,11 +13,14 @@ from browsing import NO_WEBGL, SOFTWARE_WEBGL, Opened, launched, sync_api
 from joined_bodies import stack_run
 from matplotlib import colormaps
 from matplotlib.image import imread
+from meshes_for_tests import rectangle
 from report_reading import Shown
 from synthetic import run
 from test_report import EVIL, true_fields
 
+from fecontact import ContactSystem, ElasticBody, Material, modal_basis, simulate
 from fecontact.io import report, report_frame, report_sweep
+from fecontact.reduction import LargeDeflections
 from fecontact.sweeps import SweepTable
 
 
@@ -77,6 +80,27 @@ def test_what_is_computed_is_that_of_the_run(browser, path, trajectory):
             assert not places[:, 2].any()
             values = np.array(opened.of_player("Array.from(player.values)"))
             assert np.abs(values - stress[index]).max() < 1e-4 * stress.max()
+
+
+def test_stress_of_large_deflections_is_that_of_the_run(browser, tmp_path):
+    """Products of coordinates stand behind those of the modes, which alone move the body."""
+    body = ElasticBody(rectangle(1.0, 0.004, 10, 1), Material(2e11, 0.3, 7800.0),
+                       fixed={"left": "xy", "right": "xy"})
+    basis = modal_basis(body, 1, contact=(), large_deflections=LargeDeflections(0.004))
+    start = np.zeros(2 * basis.modes)
+    start[0] = 0.9 * basis.large_deflections[0].ranges[0, 1]
+    moving = simulate(ContactSystem(basis), 1e-3, initial=start, outputs=11)
+    path = report(moving, tmp_path / "run.html", scale=1.0)
+    with Opened(browser, path) as opened:
+        for index in (0, 7):
+            opened.page.evaluate("time => document.querySelector('.stage').player.clock.set(time)",
+                                 float(moving.time[index]))
+            fields = basis.fields(moving.modal_coordinates[index])
+            places = np.reshape(list(opened.of_player("Array.from(player.places)")), (-1, 3))
+            assert np.abs(places[:, :2] - fields.nodes - fields.displacement).max() < 1e-6
+            values = np.array(opened.of_player("Array.from(player.values)"))
+            assert np.abs(values - fields.von_mises).max() < 2e-4 * fields.von_mises.max()
+        assert not opened.complaints
 
 
 def test_painted_colours_are_those_of_the_stresses(browser, path, trajectory):

@@ -10,6 +10,7 @@ from scipy.integrate import cumulative_trapezoid
 
 import fecontact as fc
 from fecontact import (
+    AnalysisError,
     BoundaryLoad,
     ContactSystem,
     Drive,
@@ -27,7 +28,10 @@ from fecontact.bifurcation import HarmonicBalance, nonlinear_mode
 from fecontact.output.files.hdf5 import read_basis, write_basis
 from fecontact.reduction import LargeDeflections
 from fecontact.reduction.large_deflections.fit import CondensedBody
-from fecontact.reduction.large_deflections.forces import large_deflection_forces
+from fecontact.reduction.large_deflections.forces import (
+    large_deflection_forces,
+    static_response,
+)
 
 E, L, H, B = 2e11, 1.0, 0.004, 0.01
 STEEL = Material(E, 0.0, 7800.0)
@@ -72,9 +76,11 @@ def test_springs_have_the_potential(d, m):
     R = rng.normal(size=(m, d, d))
     R = R + np.swapaxes(R, 1, 2)
     ranges = np.outer(rng.uniform(0.5, 2.0, d), [-1.0, 1.5])
-    fitted = CondensedBody(modes, A, C, np.zeros((1, d, d)), ranges, 0.0, 0.0, 1)
+    fitted = CondensedBody(modes, A, C, np.zeros((1, d, d)), np.zeros((0, d), int),
+                           np.zeros((1, 4, 0)), ranges, 0.0, 0.0, 0.0, 0.0, 1)
+    R = static_response(fitted, R, w)
+    assert not R[modes].any()
     forces, rows = large_deflection_forces(fitted, R, w, rng.uniform(0.5, 2.0, d), 1.0)
-    R[modes] = 0.0
 
     def potential(x):
         q = x[modes]
@@ -170,6 +176,21 @@ def test_statics_of_the_reduced_and_the_whole_body():
     assert rest.stable
 
 
+def test_modes_are_chosen_by_accuracy():
+    """The third mode of a clamped beam follows the first one; antisymmetric modes do not."""
+    def made(count, accuracy):
+        return modal_basis(beam("clamped"), count, contact=(), large_deflections=LargeDeflections(
+            2.5 * H, accuracy=accuracy)).large_deflections[0]
+
+    loose, tight = made(6, 0.06), made(6, 0.01)
+    assert len(loose.ranges) == 1
+    assert 0.01 < loose.displacement_error < 0.06
+    assert (tight.coordinates.argmax(axis=1) == [0, 2]).all()
+    assert max(tight.force_error, tight.displacement_error) < 0.01
+    with pytest.raises(AnalysisError, match=r"with the modes 0, 1 .* above accuracy = 0.01"):
+        made(2, 0.01)
+
+
 def test_end_of_a_cantilever_follows_its_arc():
     """P L^2 / EI = 1: the end comes down by 0.30172 L and in by 0.05643 L (Mattiasson 1981)."""
     h = 0.01
@@ -240,7 +261,7 @@ def test_clamped_plate_under_pressure():
     The whole body, by :func:`deflection_path`, comes to 0.692 and 1.305 with 10 x 10 cells, the
     reduced one of one mode to a percent less.
     """
-    a, h, nu = 1.0, 0.02, 0.316
+    a, h, nu = 1.0, 0.016, 0.316
     x = 0.5 * a * np.linspace(0.0, 1.0, 6) ** 1.8  # finer at the clamped edges
     mesh = fc.Mesh.grid(x, x, [0.0, h])
     body = ElasticBody(mesh, Material(E, nu, 7800.0), fixed={
@@ -286,6 +307,9 @@ def test_limits_are_said():
     free = ElasticBody(rectangle(L, H, 8, 1), STEEL)
     with pytest.raises(InputError, match="rigid motions"):
         modal_basis(free, 4, contact=(), large_deflections=given)
+    for accuracy in (0.0, -1.0, 1.0, float("nan")):
+        with pytest.raises(InputError, match="accuracy"):
+            LargeDeflections(H, accuracy=accuracy)
     for modes in (0, 7, (1, 1), (-1,), "a"):
         with pytest.raises(InputError, match="modes = "):
             LargeDeflections(H, modes)

@@ -53,6 +53,29 @@ def test_elastica():
     assert path.energies[-1] == pytest.approx(np.trapezoid(force, moved), rel=0.01)
 
 
+def test_stress_of_a_deflected_cantilever():
+    """The outer fibres carry the moment of the force about them, in axes that turn with the rod."""
+    path = deflection_path(cantilever(96), end_load(2.0))
+    fields, end = path.fields(), path.displacement("right")[-1]
+    force = 2.0 * EI / L**2
+    for x in (0.25, 0.5):
+        node = int(np.argmin(np.linalg.norm(fields.nodes - [x, H], axis=1)))
+        arm = L + end[0] - x - fields.displacement[node, 0]
+        exact = -6.0 * force * arm / (B * H**2)
+        assert fields.stress[node, 0] == pytest.approx(exact, rel=0.01)
+        assert np.abs(fields.stress[node, 1:]).max() < 0.01 * abs(exact)
+        # The true stress acts along the rod, which is at the angle of its nodes.
+        xx, yy, _, xy = fields.cauchy_stress[node]
+        assert xx + yy == pytest.approx(exact, rel=0.015)
+        ahead = int(np.argmin(np.linalg.norm(fields.nodes - [x + 1.0 / 48.0, H], axis=1)))
+        along = (fields.nodes + fields.displacement)[[node, ahead]]
+        slope = np.arctan2(*np.diff(along, axis=0)[0, ::-1])
+        assert slope > 0.3
+        assert 0.5 * np.arctan2(-2.0 * xy, yy - xx) == pytest.approx(slope, abs=0.05)
+    with pytest.raises(InputError, match="state = 99"):
+        path.fields(99)
+
+
 def test_quadratic_elements_converge_to_the_elastica():
     """With the order four of energies, from the stiff side."""
     ends = [deflection_path(cantilever(n), end_load(1.0)).displacement("right")[-1, 1]
@@ -62,20 +85,26 @@ def test_quadratic_elements_converge_to_the_elastica():
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.5)
 
 
-def stretched_beam(load):
-    """Deflection in the middle of a clamped beam under a line load [N/m], with its tension."""
-    def shape(N):
-        k = np.sqrt(N / EI)
-        C = load * L / (2.0 * N * k * np.sinh(0.5 * k * L))
-        return k, C
+def stretched_shape(load, N):
+    """Wave number and factor of the shape of a clamped beam under a line load and a tension."""
+    k = np.sqrt(N / EI)
+    return k, load * L / (2.0 * N * k * np.sinh(0.5 * k * L))
 
+
+def stretched_tension(load):
+    """Tension [N] of a clamped beam under a line load [N/m]."""
     def excess(N):
-        k, C = shape(N)
+        k, C = stretched_shape(load, N)
         stretch = quad(lambda x: (C * k * np.sinh(k * x) - load * x / N)**2, 0.0, 0.5 * L)[0] / L
         return E * B * H * stretch - N
 
-    N = brentq(excess, 1e-3 * EI, 1e5 * EI, rtol=1e-12)
-    k, C = shape(N)
+    return brentq(excess, 1e-3 * EI, 1e5 * EI, rtol=1e-12)
+
+
+def stretched_beam(load):
+    """Deflection in the middle of a clamped beam under a line load [N/m]."""
+    N = stretched_tension(load)
+    k, C = stretched_shape(load, N)
     return C * (1.0 - np.cosh(0.5 * k * L)) + load * L**2 / (8.0 * N)
 
 
@@ -98,6 +127,11 @@ def test_clamped_beam_stretches(kind):
         loads = Load(boundaries=(BoundaryLoad("top", pressure=-line / B),))
         path = deflection_path(halves(kind), loads, steps=DeflectionSteps(first=0.5))
         assert path.displacement("right")[-1, -1] == pytest.approx(thick * H, rel=0.01)
+    # The mean of the stress over the height in the middle is that of the tension.
+    fields = path.fields()
+    end = fields.nodes[:, 0] > 0.5 * L - 1e-9
+    stress, tension = fields.stress[end, 0], stretched_tension(line) / (B * H)
+    assert 0.5 * (stress.max() + stress.min()) == pytest.approx(tension, rel=0.03)
 
 
 def arch(rise):

@@ -109,11 +109,12 @@ def displacement(field: ModeShapes, q: Array) -> Array:
 
 def von_mises(field: ModeShapes, q: Array) -> Array:
     """Von Mises stress (F, N) at the nodes [Pa] at modal coordinates q (F, m)."""
-    nodes, count, modes = field.stress.shape
-    components = field.stress.transpose(1, 0, 2).reshape(count * nodes, modes)
+    nodes, count, terms = field.stress_terms.shape
+    components = field.stress_terms.transpose(1, 0, 2).reshape(count * nodes, terms)
     # Squares of large numbers would overflow.
-    unit = magnitude(q)
-    values = (q / unit) @ components.T
+    factors = field.stress_coordinates(q)
+    unit = magnitude(factors)
+    values = (factors / unit) @ components.T
     size = magnitude(values)
     xx, yy, zz, *shears = np.moveaxis((values / size).reshape(len(q), count, nodes), 1, 0)
     square = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
@@ -129,11 +130,12 @@ def cell_stress(field: ModeShapes, q: Array) -> Array:
     They are the means of their corners.
     """
     count, corners = field.cells.shape
-    _, components, modes = field.stress.shape
+    stress, factors = field.stress_terms, field.stress_coordinates(q)
+    _, components, terms = stress.shape
     # Corner by corner: all at once would hold the stress of each cell several times.
-    mean = sum(field.stress[field.cells[:, corner]] for corner in range(corners)) / corners
-    unit = magnitude(q)
-    found = (q / unit) @ mean.reshape(components * count, modes).T
+    mean = sum(stress[field.cells[:, corner]] for corner in range(corners)) / corners
+    unit = magnitude(factors)
+    found = (factors / unit) @ mean.reshape(components * count, terms).T
     with np.errstate(over="ignore"):
         return np.asarray(found * unit).reshape(len(q), count, components)
 

@@ -27,7 +27,12 @@ from fecontact.core.progress import held_back_interrupt
 from fecontact.core.types import Array
 from fecontact.reduction.large_deflections.forces import LargeDeflectionForces
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, ReductionQuality
+from fecontact.reduction.mode_shapes import (
+    BodyPart,
+    ModeShapes,
+    NonlinearStress,
+    ReductionQuality,
+)
 from fecontact.reduction.rotating import ModalRotation
 
 # Higher levels of deflate take longer and gain three per cent.
@@ -190,6 +195,10 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
     for name in ("elements", "outline_nodes"):
         if getattr(basis.mode_shapes, name) is not None:
             store_compressed(shapes, name, getattr(basis.mode_shapes, name))
+    if basis.mode_shapes.nonlinear_stress is not None:
+        nonlinear = shapes.create_group("nonlinear_stress")
+        for name, value in vars(basis.mode_shapes.nonlinear_stress).items():
+            store_compressed(nonlinear, name, value)
     restriction = basis.mode_shapes.restriction.tocsr()
     for name in ("data", "indices", "indptr"):
         shapes.create_dataset(f"restriction/{name}", data=getattr(restriction, name))
@@ -257,12 +266,13 @@ def _read_large_deflections(group: Any, modes: int) -> tuple[LargeDeflectionForc
         one = member(group, str(number))
         quadratic = bounded(one, "quadratic", (None,))
         coordinates = bounded(one, "coordinates", (None, modes))
-        size, force, displacement = (float(one.attrs[name]) for name in (
-            "largest_displacement", "force_error", "displacement_error"))
+        numbers = {name: float(one.attrs[name]) for name in (
+            "largest_displacement", "largest_strain", "force_error", "displacement_error",
+            "stress_error")}
         found.append(LargeDeflectionForces(
             str(one.attrs["group"]), quadratic, bounded(one, "cubic", (len(quadratic),)),
-            coordinates, bounded(one, "ranges", (len(coordinates), 2)), size, force, displacement,
-            int(one.attrs["states"])))
+            coordinates, bounded(one, "ranges", (len(coordinates), 2)),
+            states=int(one.attrs["states"]), **numbers))
     return tuple(found)
 
 
@@ -300,9 +310,16 @@ def _read_mode_shapes(group: Any, modes: int, T: Array) -> ModeShapes:
         nodes_of = array(group, "outline_nodes", (len(outline),), "i")
         if nodes_of.size and not -1 <= nodes_of.min() <= nodes_of.max() < len(T) - 2:
             raise DamagedError("'outline_nodes' names contact nodes that are not there")
+    components, nonlinear = 4 if d == 2 else 6, None
+    if "nonlinear_stress" in group:
+        given = member(group, "nonlinear_stress")
+        coordinates = bounded(given, "coordinates", (None, modes))
+        powers = array(given, "powers", (None, len(coordinates)), "i")
+        nonlinear = NonlinearStress(coordinates, powers, bounded(
+            given, "stress", (N, components, len(powers)), 1e100))
     return ModeShapes(nodes, cells, outline, bounded(group, "shapes", (N, d, modes)),
-                      bounded(group, "stress", (N, 4 if d == 2 else 6, modes), 1e100),
-                      sound_sparse(restriction), _elements(group, N, d), nodes_of)
+                      bounded(group, "stress", (N, components, modes), 1e100),
+                      sound_sparse(restriction), _elements(group, N, d), nodes_of, nonlinear)
 
 
 def _elements(group: Any, nodes: int, dimension: int) -> Any:

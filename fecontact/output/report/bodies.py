@@ -44,16 +44,23 @@ class _Reached:
 class Motions:
     """What a page shows of modal coordinates (N, m): their ranges over bodies and time.
 
-    ``drift`` (m,) or (2, m) is the motion along x (and y) that is not magnified.
+    Behind them stand the products (N, p) of nonlinear stress, see
+    ``ModeShapes.stress_coordinates``. ``drift`` (m,) or (2, m) is the motion along x (and y) that
+    is not magnified.
     """
 
     bodies: DrawnBodies
     coordinates: Array
     drift: Array | None = None
 
+    @property
+    def modal(self) -> Array:
+        """Modal coordinates (N, m)."""
+        return self.coordinates[:, : self.bodies.shapes.shape[2]]
+
     @cached_property
     def _whole(self) -> _Reached:
-        return _reached(self.bodies.shapes, self.coordinates, _length)
+        return _reached(self.bodies.shapes, self.modal, _length)
 
     @cached_property
     def _magnified(self) -> _Reached:
@@ -63,7 +70,7 @@ class Motions:
         shapes = self.bodies.shapes.copy()
         for axis, rows in enumerate(np.atleast_2d(self.drift)):
             shapes[:, axis] -= rows
-        return _reached(shapes, self.coordinates, _length)
+        return _reached(shapes, self.modal, _length)
 
     @cached_property
     def _stresses(self) -> Array:
@@ -108,7 +115,7 @@ class Motions:
         high = (nodes + scale * moved.high).max(axis=0)
         if self.drift is not None:
             for axis, rows in enumerate(np.atleast_2d(self.drift)):
-                drift = self.coordinates @ rows
+                drift = self.modal @ rows
                 low[axis], high[axis] = low[axis] + drift.min(), high[axis] + drift.max()
         ends = [np.minimum(low, nodes.min(axis=0)), np.maximum(high, nodes.max(axis=0))]
         return [float(end) for end in np.stack(ends, axis=1).ravel()]
@@ -120,20 +127,20 @@ class Motions:
                 self.largest_stress / _VON_MISES[self.bodies.stress.shape[1]])
 
     def coordinate_steps(self) -> Array:
-        """Steps (m,) of the coordinates."""
-        found = []
-        for field, error in zip((self.bodies.shapes, self.bodies.stress), self._errors,
-                                strict=True):
-            rows = np.abs(field).reshape(-1, field.shape[2])
-            found.append(_steps(rows, TOLERANCE * error))
-        return np.min(found, axis=0)
+        """Steps (m + p,) of the coordinates."""
+        moved, stress = (
+            _steps(np.abs(field).reshape(-1, field.shape[2]), TOLERANCE * error)
+            for field, error in zip((self.bodies.shapes, self.bodies.stress), self._errors,
+                                    strict=True))
+        stress[: len(moved)] = np.minimum(stress[: len(moved)], moved)
+        return stress
 
     def shape_steps(self) -> tuple[Array, Array]:
-        """Steps (m,) of shapes and stresses."""
-        used = np.abs(self.coordinates)
+        """Steps (m,) of shapes and (m + p,) of stresses."""
         found = []
         for field, error in zip((self.bodies.shapes, self.bodies.stress), self._errors,
                                 strict=True):
+            used = np.abs(self.coordinates[:, : field.shape[2]])
             sizes = np.abs(field).max(axis=(0, 1), initial=0.0)
             found.append(np.minimum(_steps(used, _SHAPES * error),
                                     np.where(sizes > 0.0, _ALONE * sizes, 1.0)))

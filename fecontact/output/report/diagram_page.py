@@ -111,6 +111,7 @@ def write_diagrams(
     }
     header["orbits"], q = _orbit_tables(motions, shown.row, payload)
     if shown.basis.mode_shapes is not None:
+        q = shown.basis.mode_shapes.stress_coordinates(q)
         seen = Motions(drawn_bodies(shown.basis), q)
         largest = seen.largest_displacement
         scale = max(1.0, round_125(_VISIBLE * seen.bodies.extent / largest)) if largest else 1.0

@@ -40,8 +40,9 @@ class DrawnBodies:
         Lines on them.
     shapes : (P, d, m) array
         Mode shapes.
-    stress : (P, c, m) array
-        Stresses of the modes [Pa per unit coordinate], ``COMPONENTS[c]``.
+    stress : (P, c, m + p) array
+        Stresses of the modes and of p products of their coordinates [Pa per unit coordinate],
+        ``COMPONENTS[c]``.
     modes : list of (str, str, str, str)
         Name, frequency in Hz, damping ratio and kind of each mode, as text.
     labels : tuple of (str, int)
@@ -185,7 +186,8 @@ def drawn_bodies(basis: ModalBasis) -> DrawnBodies:
     modes = [[name, f"{hz:.6g}", ratio, kind] for name, hz, ratio, kind in zip(
         mode_names(basis), basis.frequencies_hz, ratios, kinds, strict=True)]
     # Rigid modes without the round-off of their stresses.
-    stress = field.stress * (basis.angular_frequencies > 0.0)
+    stress = field.stress_terms.copy()
+    stress[..., : basis.modes] *= basis.angular_frequencies > 0.0
     if basis.dimension == 3:
         return along_edges(_drawn_solids(basis, field, stress, modes))
     return DrawnBodies(field.nodes, as_triangles(field.cells), field.outline, field.shapes, stress,

@@ -144,7 +144,10 @@ def run_block(
         contact = drawn_contact(found, motion)
         header["contact"] = contact_table(contact, payload)
     if motion is not None:
-        motions = Motions(drawn_bodies(system.basis), found.modal_coordinates, drift_rows(motion))
+        shapes = system.basis.mode_shapes
+        assert shapes is not None
+        motions = Motions(drawn_bodies(system.basis),
+                          shapes.stress_coordinates(found.modal_coordinates), drift_rows(motion))
         scale = _visible_scale(motions, motion) if scale is None else float(scale)
         box = motions.box(scale)
         header |= moving_tables(motions, scale, box, drawn_ground(motion, box), payload)

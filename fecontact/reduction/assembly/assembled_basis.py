@@ -22,7 +22,7 @@ from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs, sp
 from fecontact.reduction.assembly.point_pairing import PointPairing
 from fecontact.reduction.large_deflections.nodes import with_springs
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.reduction.mode_shapes import BodyPart, ModeShapes
+from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, NonlinearStress
 from fecontact.reduction.rotating import ModalRotation
 
 
@@ -270,6 +270,8 @@ class _Places:
             nodes = slice(part.nodes[0], sum(part.nodes))
             moved[nodes, :, self.columns(part.name)] = one.shapes
             stress[nodes, :, self.columns(part.name)] = one.stress
+        bent = [(part, one.nonlinear_stress) for part, one in given
+                if one.nonlinear_stress is not None]
         elements = [one.cells if one.elements is None else one.elements for _, one in given]
         alike = len({array.shape[1] for array in elements}) == 1
         cells = [one.cells for _, one in given]
@@ -289,7 +291,22 @@ class _Places:
             nodes=np.concatenate([one.nodes for _, one in given]), cells=together(cells),
             outline=together(outlines), shapes=moved, stress=stress,
             restriction=sp.csr_array(sp.vstack(list(restriction))),
-            elements=together(elements) if alike else None)
+            elements=together(elements) if alike else None,
+            nonlinear_stress=self._joined_stress(bent) if bent else None)
+
+    def _joined_stress(self, given: Sequence[tuple[BodyPart, NonlinearStress]]) -> NonlinearStress:
+        """Nonlinear stress of all bodies, each of its own coordinates and nodes."""
+        d, p = np.sum([one.powers.shape[::-1] for _, one in given], axis=0)
+        coordinates, powers = np.zeros((d, self.modes)), np.zeros((p, d), dtype=np.int64)
+        stress = np.zeros((self.nodes, given[0][1].stress.shape[1], p))
+        row = term = 0
+        for part, one in given:
+            rows = slice(row, row := row + len(one.coordinates))
+            terms = slice(term, term := term + len(one.powers))
+            coordinates[rows, self.columns(part.name)] = one.coordinates
+            powers[terms, rows] = one.powers
+            stress[part.nodes[0] : sum(part.nodes), :, terms] = one.stress
+        return NonlinearStress(coordinates, powers, stress)
 
 
 def _simplices(cells: Integers, dimension: int) -> Integers:

@@ -276,7 +276,10 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
         damping=modes.T @ damping @ modes,
         T=basis.T @ modes,
         mode_shapes=None if shapes is None else replace(
-            shapes, shapes=shapes.shapes @ modes, stress=shapes.stress @ modes),
+            shapes, shapes=shapes.shapes @ modes, stress=shapes.stress @ modes,
+            nonlinear_stress=None if shapes.nonlinear_stress is None else replace(
+                shapes.nonlinear_stress,
+                coordinates=shapes.nonlinear_stress.coordinates @ modes)),
         quality=None,
         inertia_rows=None if basis.inertia_rows is None else basis.inertia_rows @ modes,
         boundary_rows=basis.boundary_rows @ modes,

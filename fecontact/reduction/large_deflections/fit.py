@@ -15,78 +15,30 @@ squares from paths of equilibria in many directions a, of both signs; frequencie
 (Implicit condensation: Hollkamp and Gordon, J. Sound Vib. 318, 2008.)
 """
 
+import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, combinations_with_replacement, permutations, product
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import AnalysisError, InputError, require_not_negative, require_positive
+from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.types import Array, Integers
-from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.finite_strain import FiniteStrainModel
-from fecontact.fem.load_steps import DeflectionSteps, follow
 from fecontact.reduction.eigenmodes import FreeSystem
+from fecontact.reduction.large_deflections.options import MOST, LargeDeflections
+from fecontact.reduction.large_deflections.samples import LoadedStates, Samples
 
-# Most modes: the numbers of loads and springs grow with their third and fourth power.
-MOST = 6
 # Modes that are loaded at once, and random loads on which the fit is tried.
 _TOGETHER, _TRIALS = 3, 4
 # Arcs between the fitted states and between those of trials, in the linear response to a load.
 _STEP, _TRIAL_STEP = 0.3, 0.43
 # Length of a field relative to the longest below which it is rounding or of no weight.
 _NO_FIELD = 1e-4
-
-
-@dataclass(frozen=True)
-class LargeDeflections:
-    """Options of ``modal_basis(large_deflections=)``: forces of large deflections of some modes.
-
-    Parameters
-    ----------
-    largest_displacement : float
-        Displacement in the first of the modes up to which the forces are fitted, such as twice the
-        thickness of a clamped plate, a third of the length of a cantilever, twice the rise of an
-        arch [m]. Other modes are deflected with the same energy at most.
-    modes : int or sequence of int
-        Number of modes with large deflections, lowest first, or their numbers from 0; six at most.
-        All other coordinates of the basis stay linear beside them.
-    stretching_damping : float
-        Least damping ratio of the vectors that complete the modes, from zero to below 1. Without
-        damping they keep ringing at frequencies far above those of the modes, which runs have to
-        resolve; 0.1 takes the ringing away and hardly changes the motion of the modes.
-
-    Raises
-    ------
-    InputError
-        For values out of range.
-    """
-
-    largest_displacement: Annotated[float, Unit("m")]
-    modes: int | tuple[int, ...] = 1
-    stretching_damping: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_positive("LargeDeflections", largest_displacement=self.largest_displacement)
-        require_not_negative("LargeDeflections", stretching_damping=self.stretching_damping)
-        if self.stretching_damping >= 1.0:
-            raise InputError(f"LargeDeflections: stretching_damping = {self.stretching_damping!r} "
-                             f"must be below 1.")
-        given = self.modes
-        chosen = range(given) if type(given) is int else given
-        if not isinstance(chosen, range | tuple | list) or not 1 <= len(chosen) <= MOST or (
-                len(set(chosen)) < len(chosen)
-                or any(type(one) is not int or one < 0 for one in chosen)):
-            raise InputError(f"LargeDeflections: modes = {given!r} must be a number of modes from "
-                             f"1 to {MOST}, or up to {MOST} different numbers from 0.")
-        if not isinstance(given, int):
-            object.__setattr__(self, "modes", tuple(given))
-
-    @property
-    def numbers(self) -> tuple[int, ...]:
-        """Numbers of the modes from 0."""
-        return tuple(range(self.modes)) if isinstance(self.modes, int) else self.modes
+# Relative difference of frequencies in internal resonance, and displacement of a mode left out,
+# relative to the largest displacement, from which it counts.
+_RESONANT, _COUPLED = 0.05, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +54,18 @@ class CondensedBody:
         B_ijkl q_j q_k q_l``.
     fields : (f, d, d) array
         Quadratic displacements theta of the free unknowns.
+    powers : (p, d) integer array
+        Exponents of the products of coordinates of the degrees two and three.
+    stress : (N, c, p) array
+        Stress at the nodes that belongs to each of them.
     ranges : (d, 2) array
         Least and largest coordinate of the fitted states [m kg^(1/2)].
-    force_error, displacement_error : float
+    largest_strain : float
+        Largest component of the strain in the fitted states.
+    force_error, displacement_error, stress_error : float
         Largest errors in states that were not fitted: of the loads, relative to the largest one
-        of each path, and of the displacement, relative to ``largest_displacement``.
+        of each path, of the displacement, relative to ``largest_displacement``, and of the stress,
+        relative to the largest one.
     states : int
         Number of static solutions that were fitted.
     """
@@ -115,9 +74,13 @@ class CondensedBody:
     cubic: Array
     quartic: Array
     fields: Array
+    powers: Integers
+    stress: Array
     ranges: Array
+    largest_strain: float
     force_error: float
     displacement_error: float
+    stress_error: float
     states: int
 
     def independent_fields(self, system: FreeSystem, kept: Array) -> Array:
@@ -142,7 +105,12 @@ def condensed_body(
     InputError
         For a body that can move without strain, or modes that the basis does not have.
     AnalysisError
-        If the statics do not reach the largest displacement.
+        If the statics do not reach the largest displacement, or the fit not its accuracy.
+
+    Warns
+    -----
+    ModelWarning
+        For modes left out whose frequencies and displacements are those of an internal resonance.
     """
     if system.rigid.shape[1]:
         raise InputError("large_deflections is for bodies that supports hold against all rigid "
@@ -151,95 +119,100 @@ def condensed_body(
     if numbers.max() >= len(w):
         raise InputError(f"large_deflections: mode {numbers.max()} is not among the {len(w)} modes "
                          f"of the basis, which count from 0; ask for more modes.")
-    statics = _Statics(body, system, w[numbers], shapes[:, numbers], given.largest_displacement)
-    d = len(numbers)
-    fitted = _Samples.of([statics.path(load, _STEP) for load in _loads(d)])
-    rng = np.random.default_rng(0)
-    trials = [statics.path(load, _TRIAL_STEP) for load in (
-        (np.eye(1), -np.eye(1)) if d == 1 else rng.standard_normal((_TRIALS, 1, d)))]
-    potential = _fitted_potential(fitted)
-    fields = _fitted_fields(fitted)
-    errors = []
-    for one in trials:
-        tried = _Samples.of([one])
-        forces = tried.q + _slopes(tried.q) @ potential
-        moved = _monomials(tried.q, 2) @ fields
-        errors.append((np.linalg.norm(forces - tried.loads, axis=1).max()
-                       / np.linalg.norm(tried.loads, axis=1).max(),
-                       np.abs(moved - tried.rest).max()))
-    force_error, displacement_error = np.max(errors, axis=0)
-    unit = statics.unit
-    cubic, quartic = _tensors(potential, d, float(w[numbers[0]] * unit[0]) ** 2, unit)
-    return CondensedBody(
-        numbers, cubic, quartic, _full_fields(fields, d, unit, statics.size),
-        np.stack([fitted.q.min(axis=0), fitted.q.max(axis=0)], axis=1) * unit[:, None],
-        float(force_error), float(displacement_error), len(fitted.q))
+    states = LoadedStates(body, system, w, shapes, int(numbers[0]), given.largest_displacement)
+    while True:
+        fit = _Fit(states, numbers)
+        if given.accuracy is None or max(fit.force_error, fit.displacement_error) <= (
+                given.accuracy):
+            break
+        left = np.setdiff1d(np.arange(len(w)), numbers)
+        if len(numbers) == MOST or not len(left):
+            raise AnalysisError(
+                f"large_deflections: with the modes {', '.join(map(str, numbers))} the forces are "
+                f"off by {100.0 * fit.force_error:.2g} % and the displacements by "
+                f"{100.0 * fit.displacement_error:.2g} %, above accuracy = {given.accuracy:g}; "
+                f"lower largest_displacement" + (
+                    "." if len(numbers) == MOST else ", or ask for more modes of the basis."))
+        numbers = np.append(numbers, left[fit.lacking[left].argmax()])
+    for sentence in _resonances(states, fit, w):
+        warnings.warn(f"large_deflections: {sentence}", ModelWarning, stacklevel=4)
+    return fit.condensed(w)
+
+
+class _Fit:
+    """Potential, displacements and stress of some modes, and their errors."""
+
+    def __init__(self, states: LoadedStates, modes: Integers) -> None:
+        self.states, self.modes, d = states, modes, len(modes)
+        self.fitted = fitted = states.samples(modes, _loads(d), _STEP)
+        rng = np.random.default_rng(0)
+        loads = [np.ones(1), -np.ones(1)] if d == 1 else list(rng.standard_normal((_TRIALS, d)))
+        self.potential = _fitted_potential(fitted)
+        self.fields, self.stress = _fitted(fitted.q, fitted.rest), _fitted(fitted.q, fitted.stress)
+        errors, largest = [], 0.0
+        self.lacking = np.zeros(len(states.unit))
+        for load in loads:
+            tried = states.samples(modes, [load], _TRIAL_STEP)
+            products = _products(tried.q)
+            forces = tried.q + _slopes(tried.q) @ self.potential - tried.loads
+            quadratic = _monomials(tried.q, 2)
+            moved = quadratic @ self.fields[: quadratic.shape[1]] - tried.rest
+            errors.append((np.linalg.norm(forces, axis=1).max()
+                           / np.linalg.norm(tried.loads, axis=1).max(), np.abs(moved).max(),
+                           np.abs(products @ self.stress - tried.stress).max()))
+            largest = max(largest, tried.largest_stress)
+            self.lacking = np.maximum(self.lacking, np.abs(
+                moved @ states.inertia).max(axis=0) * states.reach)
+        self.force_error, self.displacement_error, off = map(float, np.max(errors, axis=0))
+        self.stress_error = off / largest
+
+    def condensed(self, w: Array) -> CondensedBody:
+        """The fit in modal coordinates."""
+        modes, fitted, d = self.modes, self.fitted, len(self.modes)
+        unit = self.states.unit[modes]
+        cubic, quartic = _tensors(self.potential, d, float(w[modes[0]] * unit[0]) ** 2, unit)
+        powers = np.concatenate([_powers(d, 2), _powers(d, 3)])
+        components = 4 if self.states.model.body.dimension == 2 else 6
+        stress = (self.stress / np.prod(unit**powers, axis=1)[:, None]).T
+        return CondensedBody(
+            modes, cubic, quartic,
+            _full_fields(self.fields[: d * (d + 1) // 2], d, unit, self.states.size), powers,
+            stress.reshape(-1, components, len(powers)),
+            np.stack([fitted.q.min(axis=0), fitted.q.max(axis=0)], axis=1) * unit[:, None],
+            fitted.strain, self.force_error, self.displacement_error, self.stress_error,
+            len(fitted.q))
+
+
+def _resonances(states: LoadedStates, fit: _Fit, w: Array) -> Iterator[str]:
+    """Sentences about internal resonances of modes with large deflections and others."""
+    powers = np.concatenate([_powers(len(fit.modes), 2), _powers(len(fit.modes), 3)])
+    moved = np.abs(fit.fields @ states.inertia) * states.reach
+    for k in np.setdiff1d(np.arange(len(w)), fit.modes):
+        for part, exponents in zip(moved[:, k], powers, strict=True):
+            if part < _COUPLED:
+                continue
+            chosen = np.repeat(fit.modes, exponents)
+            sums = [abs(float(np.dot(signs, w[chosen]))) for signs in product(
+                (1.0, -1.0), repeat=len(chosen))]
+            if min(abs(one / w[k] - 1.0) for one in sums) < _RESONANT:
+                names = " + ".join(f"{count} x mode {mode}" for mode, count in zip(
+                    fit.modes, exponents, strict=True) if count)
+                yield (f"mode {k}, {w[k] / (2.0 * np.pi):.4g} Hz, is in internal resonance with "
+                       f"{names} and moves by {100.0 * part:.2g} % of largest_displacement with "
+                       f"them; add it to modes.")
+                break
 
 
 def _loads(d: int) -> list[Array]:
-    """Directions (1, d) of loads: each mode alone, and up to three together, with all signs."""
+    """Directions (d,) of loads: each mode alone, and up to three together, with all signs."""
     found = []
     for count in range(1, min(d, _TOGETHER) + 1):
         for chosen in combinations(range(d), count):
             for signs in product((1.0, -1.0), repeat=count):
-                load = np.zeros((1, d))
-                load[0, list(chosen)] = signs
+                load = np.zeros(d)
+                load[list(chosen)] = signs
                 found.append(load)
     return found
-
-
-@dataclass(frozen=True, eq=False)
-class _Samples:
-    """States of equilibrium: coordinates (n, d), loads (n, d), remaining displacements (n, f).
-
-    Coordinates and loads are in units of equal energy, one where the first mode alone has the
-    largest displacement; displacements are in units of this one.
-    """
-
-    q: Array
-    loads: Array
-    rest: Array
-
-    @classmethod
-    def of(cls, paths: list["_Samples"]) -> "_Samples":
-        return cls(*(np.concatenate([getattr(one, name) for one in paths])
-                     for name in ("q", "loads", "rest")))
-
-
-class _Statics:
-    """Paths of equilibria under loads in proportion to the inertia of modes."""
-
-    def __init__(
-        self, body: ElasticBody, system: FreeSystem, w: Array, shapes: Array, size: float
-    ) -> None:
-        self.model, self.shapes, self.size = FiniteStrainModel(body), shapes, size
-        self.inertia = np.asarray(system.mass @ shapes)
-        moved = np.asarray(body.expansion @ shapes).reshape(-1, body.dimension, len(w))
-        # Displacements of equal energy, that of the first mode ``size``.
-        self.unit = size / np.linalg.norm(moved[..., 0], axis=1).max() * w[0] / w
-        self.force = w**2 * self.unit
-
-    def path(self, load: Array, step: float) -> _Samples:
-        """States up to the largest displacement under a load (1, d) and its multiples."""
-        (direction,) = load / np.abs(load).sum()
-        free = len(self.shapes)
-        forces = np.zeros(self.model.expansion.shape[1])
-        forces[:free] = self.inertia @ (self.force * direction)
-
-        def far(q: Array) -> bool:
-            return bool(np.abs(self.inertia.T @ q[:free] / self.unit).sum() >= 1.0)
-
-        options = DeflectionSteps("arc", first=step, largest=step, most=400)
-        found = follow(self.model, lambda q: (forces, None), options, far)
-        if not found.reached:
-            raise AnalysisError(f"large_deflections: the statics under the loads of the modes do "
-                                f"not reach largest_displacement = {self.size:g} m. "
-                                f"{found.message} Take a smaller one.")
-        u = np.array([one.q[:free] for one in found.points[1:]])
-        q = u @ self.inertia
-        factors = np.array([one.factor for one in found.points[1:]])
-        return _Samples(q / self.unit, factors[:, None] * direction,
-                        (u - q @ self.shapes.T) / self.size)
 
 
 def _powers(d: int, degree: int) -> Integers:
@@ -261,7 +234,7 @@ def _slopes(q: Array) -> Array:
     return np.asarray(np.prod(q[:, None, None] ** lower, axis=3) * powers.T)
 
 
-def _fitted_potential(given: _Samples) -> Array:
+def _fitted_potential(given: Samples) -> Array:
     """Coefficients (k,) of the monomials of degrees three and four of the potential."""
     matrix = _slopes(given.q)
     found, *_ = np.linalg.lstsq(matrix.reshape(-1, matrix.shape[2]),
@@ -269,14 +242,15 @@ def _fitted_potential(given: _Samples) -> Array:
     return np.asarray(found)
 
 
-def _fitted_fields(given: _Samples) -> Array:
-    """Displacements (k, f) of the quadratic monomials, in the largest displacement.
+def _fitted(q: Array, values: Array) -> Array:
+    """Coefficients (k, v) of the monomials of degrees two and three of values (n, v)."""
+    found, *_ = np.linalg.lstsq(_products(q), values, rcond=None)
+    return np.asarray(found)
 
-    Cubic displacements are fitted beside them and left out.
-    """
-    quadratic, cubic = _monomials(given.q, 2), _monomials(given.q, 3)
-    found, *_ = np.linalg.lstsq(np.hstack([quadratic, cubic]), given.rest, rcond=None)
-    return np.asarray(found[: quadratic.shape[1]])
+
+def _products(q: Array) -> Array:
+    """Values (n, k) of the monomials of the degrees two and three."""
+    return np.hstack([_monomials(q, 2), _monomials(q, 3)])
 
 
 def _tensors(potential: Array, d: int, energy: float, unit: Array) -> tuple[Array, Array]:

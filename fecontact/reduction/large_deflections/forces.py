@@ -30,6 +30,7 @@ from fecontact.core.types import Array
 from fecontact.core.units import Summarised
 from fecontact.laws.normal.bilateral import BilateralPolynomial
 from fecontact.reduction.large_deflections.fit import CondensedBody, scaled
+from fecontact.reduction.mode_shapes import NonlinearStress
 from fecontact.reduction.polynomial_stiffness import polynomial_stiffness
 
 GROUP = "large deflections"
@@ -54,11 +55,11 @@ class LargeDeflectionForces(Summarised):
         Rows of the coordinates of the modes with large deflections.
     ranges : (d, 2) array
         Least and largest value of each of them in the states that were fitted.
-    largest_displacement : float
-        Displacement up to which they were fitted [m].
-    force_error, displacement_error : float
-        Largest errors in static states that were not fitted, relative to the load and to the
-        largest displacement.
+    largest_displacement, largest_strain : float
+        Displacement up to which they were fitted [m], and the strain there.
+    force_error, displacement_error, stress_error : float
+        Largest errors in static states that were not fitted, relative to the load, to the
+        largest displacement and to the largest stress.
     states : int
         Number of static solutions that were fitted.
     """
@@ -69,8 +70,10 @@ class LargeDeflectionForces(Summarised):
     coordinates: Array
     ranges: Array
     largest_displacement: float
+    largest_strain: float
     force_error: float
     displacement_error: float
+    stress_error: float
     states: int
 
     def summary(self) -> list[tuple[str, str]]:
@@ -78,8 +81,10 @@ class LargeDeflectionForces(Summarised):
         return [
             ("modes with large deflections", f"{len(self.ranges)}"),
             ("fitted up to", f"{self.largest_displacement:.4g} m, {self.states} static solutions"),
+            ("largest strain there", f"{self.largest_strain:.2g}"),
             ("error of forces", f"{100.0 * self.force_error:.2g} %"),
             ("error of displacements", f"{100.0 * self.displacement_error:.2g} %"),
+            ("error of stresses", f"{100.0 * self.stress_error:.2g} %"),
             ("springs", f"{len(self.quadratic)}"),
         ]
 
@@ -97,6 +102,37 @@ class LargeDeflectionForces(Summarised):
         return float(np.max(np.where(q > 0.0, q / high, q / low), initial=0.0))
 
 
+def static_response(fitted: CondensedBody, projected: Array, w: Array) -> Array:
+    """Static response (m, d, d) of linear coordinates, from ``psi_k^T M theta_ij`` of all.
+
+    Zero for the modes with large deflections themselves, and where it has no energy.
+    """
+    found = np.array(projected)
+    found[fitted.modes] = 0.0
+    reach = np.abs(fitted.ranges).max(axis=1)
+    energy = (w[:, None, None] * found * np.outer(reach, reach)) ** 2
+    found[energy < _NO_PART * energy.sum()] = 0.0
+    return found
+
+
+def nonlinear_stress(fitted: CondensedBody, response: Array, stress: Array) -> NonlinearStress:
+    r"""Stress beside the linear one (N, c, m) of all coordinates.
+
+    .. math:: \sigma = \sum_k \sigma_k x_k + \sigma_2(q) + \sigma_3(q)
+        - \sum_k \sigma_k \hat y_k(q),
+
+    so that the stress of statics, which is fitted, holds for y = y^(q).
+    """
+    m, d = len(response), len(fitted.modes)
+    terms = np.array(fitted.stress)
+    for k, powers in enumerate(fitted.powers):
+        places = np.repeat(np.arange(d), powers)
+        if len(places) == 2:
+            i, j = places
+            terms[..., k] -= stress @ (response[:, i, j] * (0.5 if i == j else 1.0))
+    return NonlinearStress(np.eye(m)[fitted.modes], fitted.powers, terms)
+
+
 def large_deflection_forces(
     fitted: CondensedBody, response: Array, w: Array, largest: Array, size: float
 ) -> tuple[LargeDeflectionForces, Array]:
@@ -107,7 +143,7 @@ def large_deflection_forces(
     fitted : CondensedBody
         Potential of the modes, which are coordinates of the basis too.
     response : (m, d, d) array
-        ``psi_k^T M theta_ij`` of all coordinates; those of the modes themselves do not count.
+        Static response, see :func:`static_response`.
     w : (m,) array
         Angular frequencies [rad/s].
     largest : (d,) array
@@ -116,11 +152,7 @@ def large_deflection_forces(
         Displacement up to which the forces were fitted [m].
     """
     modes, d, m = fitted.modes, len(fitted.modes), len(w)
-    response = np.array(response)
-    response[modes] = 0.0
     reach = np.abs(fitted.ranges).max(axis=1)
-    energy = (w[:, None, None] * response * np.outer(reach, reach)) ** 2
-    response[energy < _NO_PART * energy.sum()] = 0.0
     stiff = w[:, None, None] ** 2 * response
     quartic = fitted.quartic + 4.0 * _symmetric(
         0.125 * np.einsum("kij,kln->ijln", response, stiff))
@@ -145,8 +177,8 @@ def large_deflection_forces(
             if size_of > _NO_SPRING * max(reached)]
     found = LargeDeflectionForces(
         GROUP, np.array([one[1] for one in kept]), np.array([one[2] for one in kept]),
-        np.eye(m)[modes], fitted.ranges, size, fitted.force_error, fitted.displacement_error,
-        fitted.states)
+        np.eye(m)[modes], fitted.ranges, size, fitted.largest_strain, fitted.force_error,
+        fitted.displacement_error, fitted.stress_error, fitted.states)
     return found, np.array([one[0] for one in kept])
 
 

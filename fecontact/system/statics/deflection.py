@@ -12,7 +12,8 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.finite_strain import FiniteStrainModel
+from fecontact.fem.fields import BodyFields, body_elements
+from fecontact.fem.finite_strain import LARGE_STRAIN, FiniteStrainModel
 from fecontact.fem.follower_pressure import follower_pressure
 from fecontact.fem.load_steps import DeflectionSteps, follow
 from fecontact.fem.points import Place, place_rows
@@ -21,9 +22,8 @@ from fecontact.laws.signals.base import Signal
 from fecontact.reduction.eigenmodes import rigid_modes
 from fecontact.system.statics.static_solution import nodal_forces
 
-# Strain up to which St. Venant and Kirchhoff's material stands for metals, and rotation [rad] up to
-# which hinges and couplings are linear.
-LARGE_STRAIN, SMALL_ANGLE = 0.01, 0.1
+# Rotation up to which hinges and couplings are linear [rad].
+SMALL_ANGLE = 0.1
 
 
 @read_only_arrays
@@ -39,6 +39,8 @@ class DeflectionPath(Summarised):
         Parts of the load; 1 is the whole load.
     displacements : (s, N, d) array
         Displacements of the nodes [m].
+    unknowns : (s, f) array
+        Displacements of the free unknowns, of bricks with their incompatible modes.
     energies : (s,) array
         Strain energy [J].
     strains : (s,) array
@@ -54,6 +56,7 @@ class DeflectionPath(Summarised):
     body: ElasticBody
     load_factors: Array
     displacements: Array
+    unknowns: Array
     energies: Array
     strains: Array
     unstable: Integers
@@ -77,6 +80,20 @@ class DeflectionPath(Summarised):
         d = self.body.dimension
         rows = place_rows(self.body, place, "displacement").matrix[:d]
         return np.asarray((rows @ self.displacements.reshape(len(self.load_factors), -1).T).T)
+
+    def fields(self, state: int = -1) -> BodyFields:
+        """Displacement and stress over the body in one state, the last by default.
+
+        The stress is the second one of Piola and Kirchhoff; ``cauchy_stress`` of the fields is the
+        true one. InputError for a state that does not exist.
+        """
+        count = len(self.load_factors)
+        if type(state) is not int or not -count <= state < count:
+            raise InputError(f"fields: state = {state!r} must be a whole number from {-count} to "
+                             f"{count - 1}.")
+        stress = FiniteStrainModel(self.body).stress(self.unknowns[state][:, None])
+        return BodyFields(self.body.nodes, body_elements(self.body), self.displacements[state],
+                          stress[..., 0])
 
 
 def deflection_path(
@@ -145,6 +162,7 @@ def deflection_path(
     result = DeflectionPath(
         body, np.array([one.factor for one in found]),
         np.array([model.displacement(one.q) for one in found]),
+        np.array([one.q for one in found]),
         np.array([one.state.energy for one in found]),
         np.array([one.state.strain for one in found]),
         np.array([one.unstable for one in found]), path.reached, path.message)

@@ -98,7 +98,7 @@ async function build(host, data, told) {
   const phases = Float64Array.from({ length: samples }, (_, k) => k / (samples - 1));
   const clock = new Clock(phases, told);
   const part = ({ values, columns }, number) => values.slice(number * samples * columns, (number + 1) * samples * columns);
-  if (data.bodies) data.coordinates = { columns: data.bodies.modes.length, values: [] };
+  if (data.bodies) data.coordinates = { columns: orbits.coordinates.columns, values: [] };
   const line = (name) => ({ name: "", colour: data.branches[0].colour, [name]: phases });
   const history = new Chart(clock, { title: data.observed, unit: orbits.units[0], xLabel: "", lines: [line("y")] });
   const phase = new Chart(clock, { title: `velocity [${orbits.units[1]}] over displacement [${orbits.units[0]}]`,

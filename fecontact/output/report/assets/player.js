@@ -60,7 +60,9 @@ class Player {
     this.d = bodies.dimension;
     this.count = bodies.points.rows;
     this.scale = data.scale;
-    this.q = new Float64Array(bodies.modes.length);
+    // Coordinates of the modes, and behind them the products of nonlinear stress.
+    this.q = new Float64Array(data.coordinates?.columns ?? bodies.modes.length);
+    this.modal = this.q.subarray(0, bodies.modes.length);
     this.moved = new Float32Array(this.count * this.d);
     this.stress = new Float32Array(this.count * bodies.components.length);
     this.places = new Float32Array(3 * this.count);
@@ -232,7 +234,7 @@ class Player {
   }
 
   #evaluate() {
-    const { bodies, ground } = this.data, { d, count, q } = this;
+    const { bodies, ground } = this.data, { d, count, q, modal } = this;
     let scale = this.scale, drift = [0, 0];
     if (this.mode >= 0) {
       q.fill(0);
@@ -241,9 +243,9 @@ class Player {
     } else {
       this.#now(this.data.coordinates, q);
       // In space along x, then along y.
-      if (ground?.wavy) ground.drift.forEach((row, k) => { drift[k < q.length ? 0 : 1] += (1 - scale) * row * q[k % q.length]; });
+      if (ground?.wavy) ground.drift.forEach((row, k) => { drift[k < modal.length ? 0 : 1] += (1 - scale) * row * modal[k % modal.length]; });
     }
-    times(bodies.shapes, count * d, q, this.moved);
+    times(bodies.shapes, count * d, modal, this.moved);
     const { places, moved } = this, points = bodies.points.values;
     for (let p = 0; p < count; p++) {
       for (let k = 0; k < d; k++) places[3 * p + k] = points[p * d + k] + scale * moved[p * d + k];
@@ -256,7 +258,7 @@ class Player {
 
   // Factor of a mode alone: its largest displacement is a part of the view.
   #shake() {
-    const { values } = this.data.bodies.shapes, m = this.q.length, { mode } = this;
+    const { values } = this.data.bodies.shapes, m = this.modal.length, { mode } = this;
     this.#reaches ??= [];
     let largest = this.#reaches[mode] ?? 0;
     for (let at = mode; !(mode in this.#reaches) && at < values.length; at += m) largest = max(largest, abs(values[at]));
@@ -452,7 +454,7 @@ class Player {
   #drawContact(c, contact) {
     const { d, turn } = this, { scale, drift } = this.#drawn, { index } = this.clock, { state, forces, feet } = contact;
     const n = state.columns, size = contact.places.rows, axes = contact.axes.values;
-    const moved = times(contact.rows, size * d, this.q, this.#feet ??= new Float64Array(size * d));
+    const moved = times(contact.rows, size * d, this.modal, this.#feet ??= new Float64Array(size * d));
     const node = (k) => k < n ? k : feet[k - n], faint = [], shown = [];
     for (let k = 0; k < size; k++) {
       const p = [0, 0, 0];
