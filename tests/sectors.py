@@ -72,3 +72,40 @@ def whole_wheel(mesh, symmetry):
     return Mesh(nodes[kept], all_of(mesh.cells), {
         name: all_of(facets) for name, facets in mesh.boundaries.items()
         if name not in (symmetry.low, symmetry.high)})
+
+
+def shrouded_sector(sectors, columns=4, *, split=1e-4):
+    """A piece of a ring with a blade and a shroud on it: low, high, root; left, right (shroud).
+
+    Sides of the shroud are ``split`` rad within the sector, so that neighbours do not touch. Cells
+    of the blade are the group 'blade', its tip is the point 'tip'.
+    """
+    alpha = 2.0 * np.pi / sectors
+    angles = np.linspace(-0.5 * alpha, 0.5 * alpha, columns + 1)
+    narrow = np.linspace(-0.5 * alpha + split, 0.5 * alpha - split, columns + 1)
+    radii = np.array([0.2, 0.24, 0.3, 0.36, 0.39])
+    number, nodes, middle = {}, [], columns // 2
+    for i, r in enumerate(radii):
+        for j in range(columns + 1):
+            if i < 2 or i > 2 or abs(j - middle) <= 1:
+                number[i, j] = len(nodes)
+                at = (angles if i < 2 else narrow)[j]
+                nodes.append((r * np.cos(at), r * np.sin(at)))
+    cells, blade = [], []
+    for i in range(len(radii) - 1):
+        for j in range(columns):
+            corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
+            if i in (1, 2) and j not in (middle - 1, middle):
+                continue
+            if i in (1, 2):
+                blade.append(len(cells))
+            cells.append([number[at] for at in corners])
+
+    def side(j, rows):
+        return [(number[i, j], number[i + 1, j]) for i in rows]
+
+    return Mesh(np.array(nodes), cells, {
+        "low": side(0, [0]), "high": side(columns, [0]), "left": side(0, [3]),
+        "right": side(columns, [3]), "root": [(number[0, j], number[0, j + 1])
+                                             for j in range(columns)]},
+        {"tip": number[4, middle]}, cell_groups={"blade": blade})

@@ -23,9 +23,17 @@ from .equilibria.equilibrium import Equilibrium, find_equilibrium
 from .equilibria.stability_map import StabilityMap, stability_map
 from .fields import VectorField, vector_field
 from .fields.contact_field import ContactField, contact_field
+from .harmonic.engine_order import EngineOrder, WaveField
 from .harmonic.method import HarmonicBalance
 from .harmonic.repeats import Repeats
 from .harmonic.response import FrequencyResponse, frequency_response
+from .harmonic.wheel_orbits import (
+    WheelMotion,
+    WheelStability,
+    wheel_motion,
+    wheel_stability,
+    wheel_system,
+)
 from .nonlinear_modes.controlled_response import controlled_response
 from .nonlinear_modes.mode_response import ModeResponse, Resonance, mode_response
 from .nonlinear_modes.nonlinear_mode import NonlinearMode, nonlinear_mode
@@ -58,6 +66,7 @@ __all__ = [
     "CrossingPoint",
     "DiscontinuityPoint",
     "DoubleHopfPoint",
+    "EngineOrder",
     "Equilibrium",
     "Floquet",
     "FoldPoint",
@@ -79,6 +88,9 @@ __all__ = [
     "StabilityMap",
     "UnresolvedPoint",
     "VectorField",
+    "WaveField",
+    "WheelMotion",
+    "WheelStability",
     "ZeroHopfPoint",
     "amplitude",
     "basins",
@@ -102,5 +114,8 @@ __all__ = [
     "resonance_curve",
     "stability_map",
     "vector_field",
+    "wheel_motion",
+    "wheel_stability",
+    "wheel_system",
     "with_normal_form",
 ]

@@ -8,7 +8,8 @@ repeat from sector to sector with the phase k alpha,
 for the nodes L and H of the faces that meet the neighbours: H of one is L of the next.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -22,6 +23,8 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.equations import facets_of_boundary
 from fecontact.fem.rotation import cross_matrix
 
+# Names of bodies of the next sector begin so.
+NEXT = "next_"
 # Distance of nodes that match, and of a node on the axis, relative to that of neighbours.
 _MATCH, _ON_AXIS = 1e-3, 1e-6
 # Distance of tied faces, relative to the mean size of facets.
@@ -105,6 +108,26 @@ class CyclicSymmetry:
         angle = sectors * self.angle
         R = np.eye(3) + np.sin(angle) * S + (1.0 - np.cos(angle)) * (S @ S)
         return R[:dimension, :dimension]
+
+    def next_sector(self, bodies: Mapping[str, ElasticBody]) -> dict[str, ElasticBody]:
+        """Bodies of the next sector, turned by alpha and named ``next_NAME``, without supports.
+
+        Pair faces with them by :func:`~fecontact.fem.pair_faces` where a body touches the next
+        sector; see :func:`fecontact.reduction.cyclic_basis`.
+        """
+        require_kind("next_sector", Mapping, bodies=bodies)
+        found = {}
+        for name, body in bodies.items():
+            require_kind(f"next_sector: body '{name}'", ElasticBody, body=body)
+            R = self.rotation(body.dimension)
+            centre = np.array([*self.centre, 0.0][: body.dimension])
+            from scipy.spatial.transform import Rotation as Turn
+
+            angles = (360.0 / self.sectors if body.dimension == 2 else
+                      Turn.from_matrix(R).as_euler("xyz", degrees=True))
+            mesh = body.mesh.placed(centre - R @ centre, angles)
+            found[f"{NEXT}{name}"] = replace(body, mesh=mesh, fixed={})
+        return found
 
     def radii(self, places: Array) -> Array:
         """Distances (n,) of places (n, d) from the axis [m]."""

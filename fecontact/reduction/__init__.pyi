@@ -11,6 +11,8 @@ from .assembly.nonlinear_springs import (
 from .assembly.point_pairing import PointPairing
 from .assembly.tightened import TightenedBolts, tightened
 from .convergence import ModeConvergence, mode_convergence
+from .cyclic.cyclic_basis import CyclicBasis, DiameterModes, cyclic_basis
+from .cyclic.whole_wheel import WholeWheel
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import Normalisation, normalisation
 from .large_deflections.forces import LargeDeflectionForces
@@ -30,6 +32,8 @@ __all__ = [
     "BodiesConvergence",
     "BodyPart",
     "Bushing",
+    "CyclicBasis",
+    "DiameterModes",
     "FaceWeld",
     "Hinge",
     "InterfaceCompliance",
@@ -52,8 +56,10 @@ __all__ = [
     "TightenedBolts",
     "Weld",
     "WheelShape",
+    "WholeWheel",
     "assembled_basis",
     "bodies_convergence",
+    "cyclic_basis",
     "eigenfrequencies_hz",
     "interface_compliance",
     "linked",

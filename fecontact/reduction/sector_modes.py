@@ -28,6 +28,9 @@ from fecontact.reduction.solid_motions import rigid_motions
 # Singular values of motions below which they keep the symmetry and the supports: faces of files in
 # single precision match no better.
 _KEPT = 1e-4
+# Size of residual vectors, relative to the static response, that is rounding, and squares of their
+# directions that are.
+_REST, _SPANNED = 1e-6, 1e-10
 
 
 @read_only_arrays
@@ -179,52 +182,113 @@ def sector_modes(
     """
     require_kind("sector_modes", ElasticBody, body=body)
     nodes = sector_nodes(body, symmetry)
-    chosen = _chosen(symmetry, diameters)
-    found = [_modes_of(body, symmetry, nodes, k, modes) for k in chosen]
+    chosen = chosen_diameters(symmetry, diameters)
+    found = [modes_of_diameter(body, symmetry, nodes, k, modes) for k in chosen]
     frequencies, shapes = (np.array(one) for one in zip(*found, strict=True))
     turning = None
     if rotation is not None:
-        B, inverse = cyclic_expansion(body, symmetry, nodes, 0)
-        rigid = _rigid(body, B, inverse, B.T @ body.mass @ B)
-        turning = sector_rotation(body, symmetry, rotation, frequencies**2, shapes, (B, rigid))
+        turning = sector_rotation(body, symmetry, rotation, frequencies**2, shapes,
+                                  alike(body, symmetry, nodes))
     return SectorModes(
         symmetry, tuple(chosen), frequencies / (2.0 * np.pi), shapes, body.nodes,
         body_elements(body), _open_outline(body, symmetry), nodes, turning)
 
 
-def _chosen(symmetry: CyclicSymmetry, diameters: Iterable[int] | str) -> list[int]:
+def chosen_diameters(
+    symmetry: CyclicSymmetry, diameters: Iterable[int] | str, owner: str = "sector_modes"
+) -> list[int]:
+    """Nodal diameters, ascending; InputError for those out of range."""
     if isinstance(diameters, str):
         if diameters != "all":
-            raise InputError(f"sector_modes: diameters = {diameters!r} must be 'all' or a list of "
+            raise InputError(f"{owner}: diameters = {diameters!r} must be 'all' or a list of "
                              f"whole numbers.")
         return list(symmetry.diameters)
-    chosen = np.unique(as_integers(diameters, "sector_modes: diameters"))
+    chosen = np.unique(as_integers(diameters, f"{owner}: diameters"))
     if not chosen.size or chosen[0] < 0 or chosen[-1] > symmetry.sectors // 2:
-        raise InputError(f"sector_modes: diameters = {shown(diameters)} must be from 0 to N / 2 = "
+        raise InputError(f"{owner}: diameters = {shown(diameters)} must be from 0 to N / 2 = "
                          f"{symmetry.sectors // 2}, at least one.")
     return [int(one) for one in chosen]
 
 
-def _modes_of(
-    body: ElasticBody, symmetry: CyclicSymmetry, nodes: SectorNodes, diameter: int, count: int
+def alike(
+    body: ElasticBody, symmetry: CyclicSymmetry, nodes: SectorNodes
+) -> tuple[Any, FreeSystem]:
+    """Motions B, sparse (d N, n), in which all sectors move alike, with their stiffness and mass.
+
+    These are those of the nodal diameter 0, to which loads that are the same for all belong.
+    """
+    B, inverse = cyclic_expansion(body, symmetry, nodes, 0)
+    K, M = ((B.T @ one @ B).tocsc() for one in (body.stiffness, body.mass))
+    return B, FreeSystem(K, M, _rigid(body, B, inverse, M))
+
+
+def modes_of_diameter(
+    body: ElasticBody, symmetry: CyclicSymmetry, nodes: SectorNodes, diameter: int, count: int,
+    rows: Any = None,
 ) -> tuple[Array, ComplexArray]:
-    """Angular frequencies (m,) and shapes (N, d, m) of a nodal diameter."""
+    """Angular frequencies (m,) and shapes (N, d, m) of a nodal diameter.
+
+    With ``rows``, sparse (p, d N), residual vectors follow the modes: with them the static response
+    to forces along these displacements is exact, and more modes than there are unknowns are all
+    of them. The response is that of all sectors, to forces with the phase of the diameter.
+    """
     B, inverse = cyclic_expansion(body, symmetry, nodes, diameter)
     K, M = (B.conj().T @ one @ B for one in (body.stiffness, body.mass))
     rigid = _rigid(body, B, inverse, M)
+    if rows is not None:
+        count = min(count, K.shape[0])
+    found: Any
+    deflections: Any
     if symmetry.is_real(diameter):
-        _, found = free_modes(FreeSystem(K.tocsc(), M.tocsc(), rigid), count)
-        shapes = np.asarray(B @ found, dtype=complex)
+        system = FreeSystem(K.tocsc(), M.tocsc(), rigid)
+        _, found = free_modes(system, count)
     else:
         system = FreeSystem(_as_real(K), _as_real(M), _real_pairs(rigid))
         _, pairs = free_modes(system, 2 * count)
-        half = len(pairs) // 2
-        shapes = np.asarray(B @ _one_of_each(pairs[:half] + 1j * pairs[half:], K, M, count))
+        found = _one_of_each(_from_halves(pairs), K, M, count)
+    if rows is not None and rows.shape[0]:
+        forces = (B.conj().T @ rows.T.conj()).toarray()
+        if symmetry.is_real(diameter):
+            deflections = system.deflection(np.ascontiguousarray(forces.real))
+        else:
+            deflections = _from_halves(system.deflection(np.vstack([forces.real, forces.imag])))
+        found = np.hstack([found, completing(found, deflections, K, M)])
+    shapes = np.asarray(B @ found, dtype=complex)
     # Rayleigh quotients of strains do not carry the rounding of K.
     w = np.sqrt(frequencies_of(body, shapes.real) ** 2 + frequencies_of(body, shapes.imag) ** 2)
     w[: rigid.shape[1]] = 0.0
-    largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(count)]
-    return w, (shapes * (np.abs(largest) / largest)).reshape(-1, body.dimension, count)
+    largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
+    return w, (shapes * (np.abs(largest) / largest)).reshape(-1, body.dimension, shapes.shape[1])
+
+
+def _from_halves(pairs: Array) -> ComplexArray:
+    """Complex vectors (n, k) of real ones (2 n, k), real parts above imaginary ones."""
+    half = len(pairs) // 2
+    return np.asarray(pairs[:half] + 1j * pairs[half:])
+
+
+def completing(modes: Any, vectors: Any, K: Any, M: Any) -> Any:
+    """Mass-normalised vectors (n, r) that span vectors (n, p) beside the modes (n, m)."""
+    from scipy.linalg import eigh
+
+    whole = np.sqrt(np.maximum((vectors.conj() * (K @ vectors)).sum(axis=0).real, 0.0))
+    for _ in range(2):
+        vectors = vectors - modes @ (modes.conj().T @ (M @ vectors))
+    stiffness, mass = (vectors.conj().T @ (one @ vectors) for one in (K, M))
+    sizes = np.sqrt(np.maximum(np.diag(stiffness).real, 0.0))
+    kept = sizes > _REST * whole
+    if not kept.any():
+        return vectors[:, :0]
+    vectors, scale = vectors[:, kept], 1.0 / sizes[kept]
+    stiffness, mass = (one[np.ix_(kept, kept)] * np.outer(scale, scale)
+                       for one in (stiffness, mass))
+    values, turn = np.linalg.eigh(0.5 * (stiffness + stiffness.conj().T))
+    turn = turn[:, values > _SPANNED * values[-1]]
+    small = [turn.conj().T @ (one @ turn) for one in (stiffness, mass)]
+    _, found = eigh(*(0.5 * (one + one.conj().T) for one in small))
+    found = vectors @ (scale[:, None] * (turn @ found))
+    gram = found.conj().T @ (M @ found)
+    return found @ np.linalg.inv(np.linalg.cholesky(0.5 * (gram + gram.conj().T)).conj().T)
 
 
 def _rigid(body: ElasticBody, B: Any, inverse: Any, M: Any) -> Any:

@@ -66,39 +66,58 @@ class SectorRotation:
         return forward / (2.0 * np.pi), backward / (2.0 * np.pi)
 
 
+def require_common_axis(
+    body: ElasticBody, symmetry: CyclicSymmetry, rotation: Rotation, owner: str
+) -> None:
+    """Raise InputError for a rotation about another axis than that of the symmetry."""
+    require_kind(owner, Rotation, rotation=rotation)
+    apart = np.cross(np.subtract((*rotation.centre, 0.0)[:3], (*symmetry.centre, 0.0)[:3]),
+                     symmetry.axis)
+    aside = np.cross(rotation.axis, symmetry.axis)
+    if max(np.abs(apart).max(), np.abs(aside).max()) > 1e-9 * (1.0 + body.mesh.extent):
+        raise InputError(f"{owner}: rotation is about the axis of the symmetry; give both the "
+                         f"same axis and centre.")
+
+
+def stiffening_matrix(
+    body: ElasticBody, rotation: Rotation, motions: Any, system: FreeSystem
+) -> Any:
+    """Stiffness, sparse (d N, d N), of spin softening and centrifugal stress at unit speed.
+
+    The stress is that of the static response in ``motions``, sparse (d N, n), whose stiffness and
+    mass are those of the system.
+    """
+    extra = -softening_matrix(body, rotation) if rotation.spin_softening else 0.0 * body.mass
+    if rotation.stress_stiffening:
+        force = motions.T @ centrifugal_force(body, rotation)
+        extra = extra + stress_stiffness(body, motions @ system.deflection(force))
+    return extra
+
+
 def sector_rotation(
     body: ElasticBody, symmetry: CyclicSymmetry, rotation: Rotation, squares: Array,
-    shapes: ComplexArray, alike: tuple[Any, Any],
+    shapes: ComplexArray, alike: tuple[Any, FreeSystem],
 ) -> SectorRotation:
     """Terms of a rotation in the shapes (K, N, d, m) of nodal diameters.
 
-    ``alike`` are B of the diameter 0, in which the centrifugal load acts, and its rigid motions.
+    ``alike`` are the motions of the diameter 0, in which the centrifugal load acts.
 
     Raises
     ------
     InputError
         For another axis than that of the symmetry.
     """
-    require_kind("sector_modes", Rotation, rotation=rotation)
-    apart = np.cross(np.subtract((*rotation.centre, 0.0)[:3], (*symmetry.centre, 0.0)[:3]),
-                     symmetry.axis)
-    aside = np.cross(rotation.axis, symmetry.axis)
-    if max(np.abs(apart).max(), np.abs(aside).max()) > 1e-9 * (1.0 + body.mesh.extent):
-        raise InputError("sector_modes: rotation is about the axis of the symmetry; give both the "
-                         "same axis and centre.")
-    extra = -softening_matrix(body, rotation) if rotation.spin_softening else 0.0 * body.mass
-    if rotation.stress_stiffening:
-        B, rigid = alike
-        K0, M0 = ((B.T @ one @ B).tocsc() for one in (body.stiffness, body.mass))
-        system = FreeSystem(K0, M0, rigid)
-        stretched = B @ system.deflection(B.T @ centrifugal_force(body, rotation))
-        extra = extra + stress_stiffness(body, stretched)
+    require_common_axis(body, symmetry, rotation, "sector_modes")
+    extra = stiffening_matrix(body, rotation, *alike)
     turning = coriolis_matrix(body, rotation) if rotation.coriolis else 0.0 * body.mass
     K, m = squares.shape
     coriolis, stiffening = np.zeros((2, K, m, m), dtype=complex)
     for row, shape in enumerate(shapes.reshape(K, body.unknowns, m)):
-        found = shape.conj().T @ (turning @ shape)
-        coriolis[row] = 0.5 * (found - found.conj().T)
-        found = shape.conj().T @ (extra @ shape)
-        stiffening[row] = 0.5 * (found + found.conj().T)
+        coriolis[row], stiffening[row] = in_shapes(shape, turning, extra)
     return SectorRotation(squares, coriolis, stiffening)
+
+
+def in_shapes(shape: Any, turning: Any, extra: Any) -> tuple[Any, Any]:
+    """Skew-Hermitian and Hermitian matrix (m, m) of two matrices in shapes (d N, m)."""
+    first, second = (shape.conj().T @ (one @ shape) for one in (turning, extra))
+    return 0.5 * (first - first.conj().T), 0.5 * (second + second.conj().T)

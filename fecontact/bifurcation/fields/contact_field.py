@@ -1,7 +1,7 @@
 """A contact system as a vector field of some of its parameters."""
 
 from collections import OrderedDict
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -185,6 +185,13 @@ def affine_arrays(field: ContactField, values: Array, index: int) -> AffineArray
 def made_values(field: ContactField, values: Array, index: int) -> list[float]:
     """Further values of one parameter for which a field has systems already."""
     return [value for value in field._family.made_for(values, index) if value != values[index]]
+
+
+def family_on(
+    field: ContactField, make: Callable[[ContactSystem], ContactSystem]
+) -> ParametrisedSystem:
+    """The parameters of a field for another system, made from its own."""
+    return field._family.on(make(field._family.base))
 
 
 def contact_field(

@@ -66,6 +66,7 @@ class ParametrisedSystem:
         given = (parameters if isinstance(parameters, Mapping)
                  else dict.fromkeys([parameters] if isinstance(parameters, str) else parameters))
         self.base = system
+        self._asked = given, ranges
         self.parameters: dict[str, float] = {}
         self.setters: list[Setter] = []
         for name, value in given.items():
@@ -91,6 +92,10 @@ class ParametrisedSystem:
             self.system(values)
             self._first = self._between(ranges or {}) or self._box((0,) * len(values))
         self._fixed = self.system(values).arrays if not len(values) else None
+
+    def on(self, system: ContactSystem) -> "ParametrisedSystem":
+        """The same parameters of another system, which has them too."""
+        return ParametrisedSystem(system, *self._asked)
 
     def _between(self, ranges: Mapping[str, tuple[float, float]]) -> Corners | None:
         """A box of ranges that are given; None where some are not, or none is affine over it."""

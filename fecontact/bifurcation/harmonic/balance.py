@@ -9,6 +9,7 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks, kink_onsets
+from fecontact.bifurcation.harmonic.engine_order import Waves
 from fecontact.bifurcation.harmonic.few_contacts import Factors, FewContacts, contact_directions
 from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
@@ -72,8 +73,9 @@ class Balance:
         Makes compiled equations.
     orders : tuple of int, optional
         Harmonics of the series where some of 0 to H are left out: these are zero.
-    ties : Ties, optional
-        Modes of bodies that repeat the motion of another one.
+    ties : Ties or Waves, optional
+        Modes of bodies that repeat the motion of another one, or equations of one sector of a
+        wheel.
     """
 
     field: VectorField
@@ -90,7 +92,7 @@ class Balance:
     kept: Kept = _NOTHING_KEPT
     compiled: CompiledBalance | None = None
     orders: tuple[int, ...] | None = None
-    ties: Ties | None = None
+    ties: Ties | Waves | None = None
 
     def equations(self, value: float) -> Equations | None:
         """Compiled equations about a value of the parameter; None where there are none."""
@@ -117,11 +119,19 @@ class Balance:
         """Rows of the coefficients (2 H + 1, b) whose harmonics are not left out."""
         return rows_of(self.orders, self.harmonics)
 
+    @property
+    def harmonics_kept(self) -> Integers:
+        """Harmonics of the series, ascending."""
+        return np.unique((self.rows_kept + 1) // 2)
+
     @cached_property
     def left_out(self) -> Integers:
         """Indices of the coefficients that are zero because their harmonics are left out."""
         places = np.arange(self.size).reshape(self.reference.shape)
-        return np.delete(places, self.rows_kept, axis=0).reshape(-1)
+        left = np.delete(places, self.rows_kept, axis=0).reshape(-1)
+        if self.ties is not None:
+            left = np.union1d(left, self.ties.left_out(self.reference.shape))
+        return left
 
     @cached_property
     def common(self) -> int:
@@ -300,10 +310,20 @@ class Linearised:
     def residual(self) -> Array:
         """Residual (n + 1,), without the last entry for forced systems."""
         problem = self.problem
-        found = self._balance(self.u, self.period, self.rates)
+        turned = self.free_balance.copy()
+        if problem.ties is not None:
+            problem.ties.residual(problem.coefficients(self.u), turned, self.period,
+                                  problem.harmonics_kept)
+        found = turned.reshape(-1)
+        found[problem.left_out] = self.u[problem.left_out]
         if not problem.autonomous:
             return found
         return np.append(found, problem.phase_row @ self.u[: problem.size])
+
+    @cached_property
+    def free_balance(self) -> Array:
+        """Balance (2 H + 1, b) of the harmonics, without the equations of ties."""
+        return self._balance(self.u, self.period, self.rates)
 
     def _balance(self, u: Array, period: float, rates: Array) -> Array:
         problem, layout = self.problem, self.problem.layout
@@ -312,11 +332,7 @@ class Linearised:
         if m:
             turned[:, :m] = differentiated(turned[:, :m]) / period
         turned -= problem.series.projection @ rates[:, m : layout.states - layout.memory]
-        if problem.ties is not None:
-            problem.ties.residual(problem.coefficients(u), turned)
-        found = turned.reshape(-1)
-        found[problem.left_out] = u[problem.left_out]
-        return found
+        return turned
 
     @cached_property
     def _common(self) -> Array:
@@ -338,7 +354,7 @@ class Linearised:
         sides = [self._balance(end, period, problem.rates(
             problem.times(period), problem.states(end, period, self.memory),
             problem.parameters(end), period)) for end, period, _ in ends]
-        return ((sides[0] - sides[1]) / (2.0 * ends[0][2]))[:, None]
+        return ((sides[0] - sides[1]) / (2.0 * ends[0][2])).reshape(-1, 1)
 
     def _slowed(self, J: Array, x: Array) -> Array:
         """Derivatives (N, rows) of rates to T, through velocities q' / T, from J (N, rows, d)."""
@@ -357,6 +373,14 @@ class Linearised:
             end[-1] += sign * h
             found.append((end, self.problem.period(end), h))
         return None if found[0][1] == self.period == found[1][1] else found
+
+    @property
+    def _by_common(self) -> Array:
+        """Derivatives (e,) of the period to the period, if it is unknown, and the parameter."""
+        if self.problem.autonomous:
+            return np.array([1.0, 0.0])
+        ends = self._beside()
+        return np.array([0.0 if ends is None else (ends[0][1] - ends[1][1]) / (2.0 * ends[0][2])])
 
     def _by_rates(self, change: Array) -> Array:
         """Change (n,) of the balance with a change (N, d) of the rates."""
@@ -445,7 +469,8 @@ class Linearised:
         if problem.autonomous:
             found[n, :n], found[n, n:] = problem.phase_row, 0.0
         if problem.ties is not None:
-            problem.ties.derivatives(found[:n], problem.harmonics)
+            problem.ties.derivatives(found[:n], problem.coefficients(self.u), self.free_balance,
+                                     self.period, self._by_common, problem.harmonics_kept)
         return zero_left_out(found, problem.left_out)
 
     def solve(self, row: Array, rhs: Array) -> Array:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fecontact.bifurcation.harmonic.engine_order import EngineOrder
 from fecontact.bifurcation.harmonic.repeats import Repeats
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_positive
@@ -54,9 +55,9 @@ class HarmonicBalance:
         projection of Bayer and Leine with 2 H harmonics, which suits smooth systems of few states.
         None for none: folds alone are found then, but points take a fraction of the time. Branches
         whose folds show that multipliers are wrong have none either, and say so.
-    repeats : Repeats, optional
+    repeats : Repeats or EngineOrder, optional
         Bodies that move as another one does at another time: the neighbours of one sector of a
-        wheel under engine order. With ``stability = None`` alone.
+        wheel under engine order; or the wave of an elastic wheel. With ``stability = None`` alone.
 
     Raises
     ------
@@ -70,7 +71,7 @@ class HarmonicBalance:
     most_harmonics: int = 100
     stability: str | None = "transitions"
     sampling_tolerance: float | None = None
-    repeats: Repeats | None = None
+    repeats: Repeats | EngineOrder | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.harmonics, Sequence | np.ndarray) and not isinstance(
@@ -92,10 +93,9 @@ class HarmonicBalance:
         if self.stability not in _STABILITY:
             raise InputError(f"HarmonicBalance: stability = {self.stability!r} must be "
                              f"'transitions' or 'Koopman-Hill', or None.")
-        require_kind("HarmonicBalance", (Repeats, type(None)), repeats=self.repeats)
-        if self.repeats is not None and self.stability is not None:
-            raise InputError("HarmonicBalance: with repeats there are no multipliers of the whole "
-                             "wheel; give stability = None.")
+        require_kind("HarmonicBalance", (Repeats, EngineOrder, type(None)), repeats=self.repeats)
+        if self.repeats is not None:
+            require_wave(self)
 
     def _checked_list(self, given: list[int]) -> tuple[int, ...]:
         whole = all(isinstance(k, int | np.integer) and not isinstance(k, bool)
@@ -137,6 +137,13 @@ class HarmonicBalance:
     def count(self) -> int:
         """Number N of samples."""
         return int(self.samples or max(_LEAST, _PER_HARMONIC * self.highest))
+
+
+def require_wave(method: HarmonicBalance) -> None:
+    """Raise InputError for options that do not suit one sector of a wheel."""
+    if method.stability is not None:
+        raise InputError("HarmonicBalance: with repeats there are no multipliers of the whole "
+                         "wheel; give stability = None.")
 
 
 def _require_count(name: str, value: object) -> None:

@@ -34,6 +34,7 @@ from fecontact.bifurcation.harmonic.compiled.orbit import (
     evaluate,
 )
 from fecontact.bifurcation.harmonic.compiled.strides import Strides
+from fecontact.bifurcation.harmonic.engine_order import Waves
 from fecontact.bifurcation.harmonic.series import differentiated, shifted
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions
 from fecontact.bifurcation.harmonic.stored import StoredOrbits, StoredValues
@@ -265,6 +266,13 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
             periods = self.periods * self.turn / u[:, -1]
         else:
             periods = np.array([self.period(each) for each in u])
+        if isinstance(self.ties, Waves):
+            errors = [self.ties.neglected(self.coefficients(one), accelerations, T, size,
+                                          self.harmonics_kept)
+                      for one, accelerations, T, size in zip(
+                          u, forces, periods, np.broadcast_to(sizes, (count, sizes.shape[-1])),
+                          strict=True)]
+            known = {**known, "truncation_error": errors, "residual": [np.nan] * count}
         orbits = StoredOrbits(layout, u[:, : self.size].reshape(count, -1, layout.harmonic), z,
                               periods, forces, mean, sizes, self.row, known, self.orders)
         return [StoredValues(orbits, k) for k in range(count)]

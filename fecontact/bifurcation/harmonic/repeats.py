@@ -82,14 +82,23 @@ class Ties:
     others: tuple[tuple[Integers, float], ...]
     repeats: Repeats
 
-    def residual(self, coefficients: Array, found: Array) -> None:
+    def left_out(self, shape: tuple[int, int]) -> Integers:
+        """Indices of the coefficients (2 H + 1, b) that are zero: none."""
+        return np.zeros(0, dtype=np.int64)
+
+    def residual(
+        self, coefficients: Array, found: Array, period: float, kept: Integers
+    ) -> None:
         """Put what the others differ by into the rows of their modes of found (2 H + 1, b)."""
         for modes, shift in self.others:
             found[:, modes] = coefficients[:, modes] - shifted(coefficients[:, self.own], -shift)
 
-    def derivatives(self, matrix: Array, harmonics: int) -> None:
+    def derivatives(
+        self, matrix: Array, coefficients: Array, balance: Array, period: float,
+        by_common: Array, kept: Integers,
+    ) -> None:
         """Put the derivatives of :meth:`residual` into a matrix ((2 H + 1) b, columns)."""
-        L = 2 * harmonics + 1
+        L = len(coefficients)
         turns = np.eye(L)
         for modes, shift in self.others:
             by_own = shifted(turns, -shift)

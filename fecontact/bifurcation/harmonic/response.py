@@ -30,6 +30,7 @@ from fecontact.bifurcation.fields.contact_field import (
 from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.compiled.arrays import RESTS
+from fecontact.bifurcation.harmonic.engine_order import EngineOrder, WaveField
 from fecontact.bifurcation.harmonic.estimates import peaks
 from fecontact.bifurcation.harmonic.layout import Layout, layout_from, layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
@@ -264,6 +265,10 @@ def frequency_response(
         field: VectorField = field_between(system, tuple(ranges.items()))
     else:
         field, name = system, system.parameter_or_only(parameter)
+    if isinstance(method, HarmonicBalance) and isinstance(method.repeats, EngineOrder):
+        field = method.repeats.field(field)
+    if isinstance(field, WaveField) and held is not None:
+        held = field.waves.state(field, held)
     row, observed = observed_row(field, observe)
     low, high = chosen.bounds
     first = inside(low if start is None else float(start), chosen)
@@ -366,7 +371,8 @@ def _started(
         if level_name is not None:
             attempts.append(lambda values=values: _raised(  # type: ignore[misc]
                 field, values, free, field.index(level_name), method, options, held))
-        if isinstance(field, ContactField) and method.repeats is None:
+        if isinstance(field, ContactField) and not isinstance(
+                field, WaveField) and method.repeats is None:
             attempts.append(lambda values=values: _settled(  # type: ignore[misc]
                 field, values, free, method, options, held))
         for attempt in attempts:
@@ -495,6 +501,8 @@ def _rests_at_zero(problem: HarmonicProblem, field: ContactField, u: Array) -> b
 def rest_state(field: ContactField, values: Array) -> Array:
     """State (d,) of rest under the loads' means, of the normal problem alone."""
     state = np.zeros(field.dimension)
+    if isinstance(field, WaveField):
+        return field.waves.rest(field, values)
     try:
         q = equilibrium_coordinates(field.system(values), "rest", 0.0, standing=True)
     except FecontactError:

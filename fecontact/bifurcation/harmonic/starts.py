@@ -12,11 +12,12 @@ import numpy as np
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
+from fecontact.bifurcation.harmonic.engine_order import EngineOrder, WaveField, Waves
 from fecontact.bifurcation.harmonic.layout import element_rows, layout_of, memory_blocks
 from fecontact.bifurcation.harmonic.memory import Kept
-from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.harmonic.method import HarmonicBalance, require_wave
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
-from fecontact.bifurcation.harmonic.repeats import Repeats, ties_of
+from fecontact.bifurcation.harmonic.repeats import Repeats, Ties, ties_of
 from fecontact.bifurcation.harmonic.series import with_harmonics
 from fecontact.bifurcation.harmonic.timing import timing_of
 from fecontact.bifurcation.orbits import starts as orbit_starts
@@ -52,11 +53,32 @@ def problem_for(
         field, values.copy(), free, method.highest, method.count,
         np.zeros((2 * method.highest + 1, layout.harmonic)), scales, layout, periods,
         *timing_of(field, values, free), kept, orders=method.orders, stability=method.stability,
-        limits=limits, ties=None if method.repeats is None else ties_of(method.repeats, field))
+        limits=limits, ties=_ties_of(field, method))
     if found.ties is None:
         # The problem is new: nobody has it yet.
         object.__setattr__(found, "compiled", CompiledBalance.of(found))
     return found
+
+
+def _ties_of(field: VectorField, method: HarmonicBalance) -> Ties | Waves | None:
+    """Equations of sectors of a wheel.
+
+    Raises
+    ------
+    InputError
+        For the field of one sector with another engine order, multipliers or tolerance.
+    """
+    if isinstance(field, WaveField):
+        given = method.repeats or field.waves
+        if given is not field.waves:
+            raise InputError("HarmonicBalance: repeats are another wave than that of the field; "
+                             "leave them out.")
+        require_wave(method)
+        return Waves(field.waves)
+    if isinstance(method.repeats, EngineOrder):
+        raise InputError("HarmonicBalance: repeats=EngineOrder(...) needs the field of its wave; "
+                         "make it by its method field.")
+    return None if method.repeats is None else ties_of(method.repeats, field)
 
 
 def _require_even(method: HarmonicBalance) -> None:
@@ -119,6 +141,10 @@ def restored(field: VectorField, point: BranchPoint) -> Start:
         If the point is not such an orbit, or belongs to another field.
     """
     known = point.branch.attributes
+    if "engine_order" in known and not isinstance(field, WaveField):
+        order = known["engine_order"]
+        raise InputError(f"{point.place} is a wave of a wheel under engine order {order}; give the "
+                         f"field EngineOrder(wheel, {order}).field(...).")
     if not point.by_harmonics:
         raise InputError(f"{point.place} is no periodic orbit by harmonic balance.")
     values, free = point.parameter_values(field), field.index(point.branch.parameter_name)

@@ -58,19 +58,24 @@ class _Contact:
 
         In space (6 n, 6 n), to t, t2, n and rotations about these.
         """
-        import scipy.sparse as sp
+        return node_frames(self.normals, spring=self.spring)
 
-        if self.normals.shape[1] == 3:
-            axes = frames_of(self.normals)
-            whole = np.zeros((len(axes), 6, 6))
-            whole[:, :3, :3] = axes * ([[0.0], [0.0], [1.0]] if self.spring else 1.0)
-            whole[:, 3:, 3:] = axes * (0.0 if self.spring else 1.0)
-            return sp.csr_array(sp.block_diag(list(map(sp.csr_array, whole)), format="csr"))
-        x, y = self.normals.T
-        zero, one = np.zeros_like(x), np.full_like(x, 0.0 if self.spring else 1.0)
-        frames = np.array([[y * one, -x * one, zero], [x, y, zero],
-                           [zero, zero, one]]).transpose(2, 0, 1)
-        return sp.csr_array(sp.block_diag(list(map(sp.csr_array, frames)), format="csr"))
+
+def node_frames(normals: Array, *, spring: bool = False) -> Any:
+    """Frames of contact nodes with normals (n, d): see ``_Contact.frames``."""
+    import scipy.sparse as sp
+
+    if normals.shape[1] == 3:
+        axes = frames_of(normals)
+        whole = np.zeros((len(axes), 6, 6))
+        whole[:, :3, :3] = axes * ([[0.0], [0.0], [1.0]] if spring else 1.0)
+        whole[:, 3:, 3:] = axes * (0.0 if spring else 1.0)
+        return sp.csr_array(sp.block_diag(list(map(sp.csr_array, whole)), format="csr"))
+    x, y = normals.T
+    zero, one = np.zeros_like(x), np.full_like(x, 0.0 if spring else 1.0)
+    frames = np.array([[y * one, -x * one, zero], [x, y, zero],
+                       [zero, zero, one]]).transpose(2, 0, 1)
+    return sp.csr_array(sp.block_diag(list(map(sp.csr_array, frames)), format="csr"))
 
 
 def assembled_basis(

@@ -1,0 +1,208 @@
+"""One meshed sector under engine order against the whole wheel of finite elements."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from sectors import shrouded_sector, whole_wheel
+
+from fecontact import (
+    ContactSystem,
+    ElasticBody,
+    InputError,
+    Load,
+    PointLoad,
+    Rayleigh,
+    basis_from_matrices,
+)
+from fecontact.bifurcation import (
+    ContinuationOptions,
+    EngineOrder,
+    HarmonicBalance,
+    contact_field,
+    frequency_response,
+    orbit_branch,
+    wheel_motion,
+    wheel_stability,
+    wheel_system,
+)
+from fecontact.fem import CyclicSymmetry, pair_faces
+from fecontact.fem.points import place_rows
+from fecontact.laws import Harmonic, JenkinsFriction, PrescribedForce
+from fecontact.reduction import WholeWheel, cyclic_basis
+from fecontact.reduction.assembly.assembled_basis import node_frames
+
+N = 4
+SYMMETRY = CyclicSymmetry("low", "high", N)
+NAME = "load.forces.0.signal.frequency_hz"
+NORMAL, FRICTION, FORCE = 20.0, JenkinsFriction(2e7, 0.3), 200.0
+DAMPING = Rayleigh(20.0, 1e-7)
+
+
+def shroud(body):
+    return pair_faces({"s": body, **SYMMETRY.next_sector({"s": body})}, "s.right", "next_s.left")
+
+
+@pytest.fixture(scope="module")
+def sector():
+    return ElasticBody(shrouded_sector(N), thickness=0.02, degree=1, fixed={"root": "xy"})
+
+
+@pytest.fixture(scope="module")
+def wheel(sector):
+    """With all modes of the mesh."""
+    return cyclic_basis({"s": sector}, SYMMETRY, {"shroud": shroud(sector)}, modes=1000,
+                        points={"s.tip": "tip"}, damping=DAMPING)
+
+
+def system_of(wheel, hertz, normal=NORMAL):
+    return ContactSystem(
+        wheel.basis, normal=PrescribedForce(normal), friction=FRICTION, gap=wheel.gaps,
+        load=Load(forces=(PointLoad("s.tip", "y", signal=Harmonic(FORCE, hertz)),)))
+
+
+def first_hz(wheel, order):
+    return float(np.sqrt(np.linalg.eigvalsh(wheel.of(order).stiffness)[0])) / (2.0 * np.pi)
+
+
+def response(system, bounds, points=1, observe=("s.tip", "y"), harmonics=(0, 1, 3), **options):
+    return frequency_response(
+        system, bounds, NAME,
+        observe=observe, options=ContinuationOptions(points=points, largest_step=0.1),
+        method=HarmonicBalance(list(harmonics), 48, stability=None, **options))
+
+
+def every_sector(sector, order, hertz):
+    """The wheel of finite elements with its contact rows, independent of the modes of a sector."""
+    body = ElasticBody(whole_wheel(sector.mesh, SYMMETRY), thickness=0.02, degree=1,
+                       fixed={"root": "xy"})
+    pairing, E = shroud(sector), body.expansion
+    frames, count = node_frames(pairing.normals), len(sector.nodes)
+
+    def rows(matrix, s):
+        """Rows over a sector in its own directions, over the wheel."""
+        turned = matrix @ sp.kron(sp.eye_array(count), SYMMETRY.rotation(2, s).T)
+        places = SYMMETRY.turned(sector.nodes, s)
+        nodes = np.linalg.norm(places[:, None] - body.nodes[None], axis=2).argmin(axis=1)
+        found = np.zeros((matrix.shape[0], body.unknowns))
+        found[:, (2 * nodes[:, None] + np.arange(2)).ravel()] = turned.toarray()
+        return found @ E
+
+    tip = place_rows(sector, "tip", "tip").matrix
+    feet = pairing.feet @ sp.kron(sp.eye_array(count), SYMMETRY.rotation(2))
+    contact = np.concatenate([
+        rows(frames @ pairing.nodes, s) - rows(frames @ feet, (s + 1) % N) for s in range(N)])
+    basis = basis_from_matrices(
+        (E.T @ body.mass @ E).toarray(), (E.T @ body.stiffness @ E).toarray(),
+        {"contact": contact.reshape(-1, 3, E.shape[1]), **{
+            f"tip{s}": rows(tip, s) for s in range(N)}},
+        damping=DAMPING, tributary=np.tile(pairing.tributary, N))
+    return ContactSystem(
+        basis, normal=PrescribedForce(N * NORMAL), friction=JenkinsFriction(
+            N * FRICTION.stiffness, FRICTION.friction_coefficient),
+        load=Load(forces=tuple(PointLoad(f"tip{s}", "y", signal=Harmonic(
+            FORCE, hertz, -2.0 * np.pi * order * s / N)) for s in range(N))))
+
+
+def excited(system, hertz):
+    return system.with_({f"load.forces.{k}.signal.frequency_hz": hertz for k in range(N)})
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_one_sector_is_the_whole_wheel_of_finite_elements(sector, wheel, order):
+    """To 1e-9, slipping: double, single, backward waves, and all alike; 34 unknowns a sector."""
+    hertz = (0.9 if order == N else 1.012) * first_hz(wheel, order)
+    bounds = hertz, 1.01 * hertz
+    one = response(system_of(wheel, hertz), bounds, repeats=EngineOrder(wheel, order))
+    field = contact_field(every_sector(sector, order, hertz), {"w": (hertz, excited)})
+    every = frequency_response(field, bounds, "w", observe=("tip0", "y"),
+                               options=ContinuationOptions(points=1),
+                               method=HarmonicBalance([0, 1, 3], 48, stability=None))
+    assert one.harmonic(1)[0] == pytest.approx(every.harmonic(1)[0], rel=1e-9)
+    sticking = response(system_of(wheel, hertz, 1e6), bounds, repeats=EngineOrder(wheel, order))
+    # Neighbours in antiphase do not move along each other.
+    if order != 2:
+        assert abs(one.amplitude()[0] / sticking.amplitude()[0] - 1.0) > 1e-3
+    assert one.branches[0].attributes["engine_order"] == order
+
+
+def test_few_modes_suffice(sector, wheel):
+    """Six modes of each diameter, and residual vectors of contact nodes and tip."""
+    few = cyclic_basis({"s": sector}, SYMMETRY, {"shroud": shroud(sector)}, modes=6,
+                       points={"s.tip": "tip"}, damping=DAMPING, diameters=[1])
+    assert len(few.of(1).stiffness) < 20
+    hertz = 1.012 * first_hz(wheel, 1)
+    found = [response(system_of(one, hertz), (hertz, 1.01 * hertz), harmonics=(0, 1, 3),
+                      repeats=EngineOrder(one, 1)).amplitude()[0] for one in (few, wheel)]
+    assert found[0] == pytest.approx(found[1], rel=1e-4)
+
+
+def test_wave_over_the_wheel_and_its_stability(sector):
+    """The motion of the sector, and multipliers of the whole wheel near the same orbit."""
+    few = cyclic_basis({"s": sector}, SYMMETRY, {"shroud": shroud(sector)}, modes=2,
+                       points={"s.tip": "tip"}, damping=DAMPING)
+    hertz = first_hz(few, 1)
+    system, wave = system_of(few, hertz), EngineOrder(few, 1)
+    found = response(system, (0.99 * hertz, 1.04 * hertz), points=12, repeats=wave)
+    field, point = wave.field(contact_field(system, [NAME])), found.peak()
+    motion = wheel_motion(field, point)
+    tip, times = sector.mesh.points["tip"], np.linspace(0.0, motion.period, 200)
+    seen = np.array([motion.displacement("s", t)[tip, 1] for t in times]).ravel()
+    assert 0.5 * np.ptp(seen) == pytest.approx(found.amplitude().max(), rel=1e-3)
+    later = motion.displacement("s", 0.1 * motion.period, sector=1)
+    assert later == pytest.approx(motion.displacement("s", -0.15 * motion.period), abs=1e-15)
+    stability = wheel_stability(field, point)
+    assert stability.stable
+    assert stability.difference < 1e-8
+    assert np.abs(stability.multipliers).max() < 1.0
+    again = orbit_branch(field, point, options=ContinuationOptions(points=2, step=0.01))
+    assert again.points[0].parameter == pytest.approx(point.parameter)
+
+
+def test_whole_wheel_has_the_frequencies_of_finite_elements(sector, wheel):
+    body = ElasticBody(whole_wheel(sector.mesh, SYMMETRY), thickness=0.02, degree=1,
+                       fixed={"root": "xy"})
+    E = body.expansion
+    from scipy.linalg import eigh
+
+    expected = eigh(*((E.T @ one @ E).toarray() for one in (body.stiffness, body.mass)),
+                    eigvals_only=True)
+    assert np.linalg.eigvalsh(WholeWheel(wheel).stiffness) == pytest.approx(expected, rel=1e-9)
+
+
+def test_bad_wheels_are_refused(sector, wheel):
+    pairing = shroud(sector)
+    with pytest.raises(InputError, match=r"order = 5 must be .* acts as order 1"):
+        EngineOrder(wheel, 5)
+    few = cyclic_basis({"s": sector}, SYMMETRY, {"shroud": pairing}, modes=2,
+                       points={"s.tip": "tip"}, diameters=[1])
+    hertz = first_hz(few, 1)
+    with pytest.raises(InputError, match=r"no modes of the nodal diameter 2; it has 0, 1"):
+        response(system_of(few, hertz), (hertz, 1.1 * hertz), repeats=EngineOrder(few, 2))
+    with pytest.raises(InputError, match=r"must be that of the basis of its wheel"):
+        response(system_of(wheel, hertz), (hertz, 1.1 * hertz), repeats=EngineOrder(few, 1))
+    with pytest.raises(InputError, match="lacks the nodal diameters 2;"):
+        WholeWheel(few)
+    with pytest.raises(InputError, match="stability = None"):
+        HarmonicBalance(3, repeats=EngineOrder(few, 1))
+    with pytest.raises(InputError, match=r"no group of cells 'blad'.*'blade'"):
+        WholeWheel(wheel, np.zeros(N), "s.blad")
+    with pytest.raises(InputError, match="must be 4 numbers above -1"):
+        WholeWheel(wheel, np.zeros(3), "s.blade")
+    with pytest.raises(InputError, match="give deviations and group together"):
+        WholeWheel(wheel, np.zeros(N))
+    for arguments, message in (
+            ({"rigid": ["s"]}, "goes on into its neighbours"),
+            ({"separate": ["b"]}, r"separate names the body 'b'"),
+            ({"points": {"tip": "tip"}}, r"points names 'tip'.*such as 's\.tip'"),
+            ({"modes": {}}, "modes lacks the body 's'"),
+            ({"diameters": [3]}, r"cyclic_basis: diameters = \[3\] must be from 0 to N / 2 = 2")):
+        with pytest.raises(InputError, match=message):
+            cyclic_basis({"s": sector}, SYMMETRY, {"shroud": pairing}, **arguments)
+    other = pair_faces({"a": sector, **SYMMETRY.next_sector({"a": sector})}, "a.right",
+                       "next_a.left")
+    with pytest.raises(InputError, match="which is no body of the sector"):
+        cyclic_basis({"s": sector}, SYMMETRY, {"shroud": other})
+    with pytest.raises(InputError, match="must have no dot and not begin with 'next_'"):
+        cyclic_basis({"next_s": sector}, SYMMETRY)
+    moving = wheel_system(system_of(wheel, hertz), WholeWheel(wheel), 1)
+    assert len(moving.load.forces) == N
