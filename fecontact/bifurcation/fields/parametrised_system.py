@@ -94,7 +94,7 @@ class ParametrisedSystem:
         self._fixed = self.system(values).arrays if not len(values) else None
 
     def on(self, system: ContactSystem) -> "ParametrisedSystem":
-        """The same parameters of another system, which has them too."""
+        """Return the family of another system over these parameters."""
         return ParametrisedSystem(system, *self._asked)
 
     def _between(self, ranges: Mapping[str, tuple[float, float]]) -> Corners | None:
