@@ -59,6 +59,9 @@ EXAMPLES = {
                       {f"out/{name}.png" for name in ("squeal_of_disc", "contact_of_pad",
                                                       "disc_and_pad")}),
     # A stuck blade with the springs of both contacts, in closed form.
+    "platform_damper": (("out",), [(r"^ 1000.0 N: peak \S+ um at (\S+) Hz", 702.29, 0.3),
+                                   (r"stuck: \S+ um at (\S+) Hz", 702.29, 0.02)],
+                        {"out/platform_damper.png"}),
     "bladed_wheel": (("out",), [(r"^1000.0 N: peak \S+ um at (\S+) Hz", 504.39, 0.02),
                                 (r"stuck (\S+) Hz", 504.39, 0.01),
                                 (r"^diameter 4 at .* (\S+) Hz backwards", 785.9, 0.5)],

@@ -21,7 +21,8 @@ GROUPS = {
         "contact_convergence"),
     "Joints and dampers": ("lap_joint", "bolted_plate", "bolted_panel", "clamped_layers",
                            "friction_damper",
-                           "frequency_response", "blade_pair", "bladed_wheel", "nonlinear_modes"),
+                           "frequency_response", "blade_pair", "bladed_wheel",
+                           "platform_damper", "nonlinear_modes"),
     "Solids": ("sliding_box", "thrown_block", "dithered_friction", "tipping_pad"),
     "Own laws, other programs, many computers": (
         "own_law", "from_other_programs", "sweep_on_dask"),

@@ -154,7 +154,8 @@ def responses(folder: Path) -> dict[str, Path]:
 def blades(folder: Path) -> dict[str, Path]:
     """Responses of two blades with a damper between them."""
     example(folder, "blade_pair", ".")
-    return {"blade_pair": folder / "blade_pair.png"}
+    example(folder, "platform_damper", ".")
+    return {name: folder / f"{name}.png" for name in ("blade_pair", "platform_damper")}
 
 
 def many_runs(folder: Path) -> dict[str, Path]:

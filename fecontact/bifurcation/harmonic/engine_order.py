@@ -23,7 +23,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ComplexArray, Integers
 from fecontact.laws.excitation import BOUNDARY_STRESSES
-from fecontact.laws.signals.harmonic import Constant, Signal
+from fecontact.laws.signals.harmonic import Constant, Harmonic, Signal
 from fecontact.reduction.cyclic.cyclic_basis import CyclicBasis
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
@@ -141,6 +141,18 @@ class EngineOrder:
             raise InputError("EngineOrder: only contact systems have sectors.")
         return WaveField(family_on(field, self.system), self)
 
+    def excited(self, field: ContactField, values: Array) -> "WaveField":
+        """The field of the part of the harmonic forces that acts, its only parameter."""
+        system = field.system(values)
+        own = {f"load.forces.{number}.signal.amplitude": force.signal.amplitude
+               for number, force in enumerate(system.load.forces)
+               if isinstance(force.signal, Harmonic)}
+
+        def scaled(system: ContactSystem, part: float) -> ContactSystem:
+            return system.with_({name: part * value for name, value in own.items()})
+
+        return WaveField(ParametrisedSystem(system, {"part": (1.0, scaled)}), self)
+
     def at_rest(self, system: ContactSystem) -> ContactSystem:
         """The system of the diameter 0 from one with the coordinates of waves."""
         return replace(system, basis=self.wheel.basis)
@@ -186,6 +198,13 @@ class Waves:
     def means(self) -> int:
         """Number of modes of the diameter 0."""
         return self.repeats.wheel.basis.modes
+
+    @cached_property
+    def softness(self) -> Array:
+        """Factors (m,) of the equations of the mean, which make displacements of forces [s^2]."""
+        stiff = np.diag(self.repeats.wheel.basis.stiffness_matrix)
+        least = stiff[stiff > 0.0].min(initial=stiff.max(initial=1.0)) or 1.0
+        return np.asarray(1.0 / np.maximum(stiff, least))
 
     def left_out(self, shape: tuple[int, int]) -> Integers:
         """Indices of the coefficients (2 H + 1, b) that are zero."""
@@ -237,6 +256,7 @@ class Waves:
         It holds the balance of free masses.
         """
         w, first = 2.0 * np.pi / period, self.means
+        found[0, :first] *= self.softness
         for h in kept[kept > 0].tolist():
             c, s = 2 * h - 1, 2 * h
             q = coefficients[c, first:] - 1j * coefficients[s, first:]
@@ -255,6 +275,7 @@ class Waves:
         """
         w, (L, b), first = 2.0 * np.pi / period, coefficients.shape, self.means
         turning = -w / period * by_common
+        matrix[:first] *= self.softness[:, None]
         for h in kept[kept > 0].tolist():
             c, s = 2 * h - 1, 2 * h
             cosines, sines = (np.arange(row * b + first, row * b + b) for row in (c, s))

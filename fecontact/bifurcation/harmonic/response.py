@@ -371,8 +371,10 @@ def _started(
         if level_name is not None:
             attempts.append(lambda values=values: _raised(  # type: ignore[misc]
                 field, values, free, field.index(level_name), method, options, held))
-        if isinstance(field, ContactField) and not isinstance(
-                field, WaveField) and method.repeats is None:
+        if isinstance(field, WaveField):
+            attempts.append(lambda values=values: _excited_further(  # type: ignore[misc]
+                field, values, free, method, options, held))
+        elif isinstance(field, ContactField) and method.repeats is None:
             attempts.append(lambda values=values: _settled(  # type: ignore[misc]
                 field, values, free, method, options, held))
         for attempt in attempts:
@@ -527,12 +529,30 @@ def _scaled(problem: HarmonicProblem, u: Array) -> tuple[HarmonicProblem, Array]
     return (scaled, u) if scaled.equations(float(u[-1])) else starts.corrected(scaled, u)
 
 
+def _excited_further(
+    field: WaveField, values: Array, free: int, method: HarmonicBalance,
+    options: ContinuationOptions, held: Array | None,
+) -> tuple[HarmonicProblem, Array]:
+    """The wave at full excitation, along a branch from a thousandth of it."""
+    part = field.waves.excited(field, values)
+    return _taken(field, values, free, method, options, _up_to(
+        part, part.values, 0, 1.0, method, options, held), held)
+
+
 def _raised(
     field: VectorField, values: Array, free: int, level: int, method: HarmonicBalance,
     options: ContinuationOptions, held: Array | None,
 ) -> tuple[HarmonicProblem, Array]:
     """The orbit at a level, along a branch from a thousandth of it."""
-    wanted = float(values[level])
+    return _taken(field, values, free, method, options, _up_to(
+        field, values, level, float(values[level]), method, options, held), held)
+
+
+def _up_to(
+    field: VectorField, values: Array, level: int, wanted: float, method: HarmonicBalance,
+    options: ContinuationOptions, held: Array | None,
+) -> Array:
+    """States (k, d) over the period of the orbit at a level, along a branch to it."""
     low = values.copy()
     low[level] = 1e-3 * wanted
     bounds = (min(low[level], wanted), max(low[level], wanted))
@@ -546,7 +566,7 @@ def _raised(
     if last.parameter != wanted:
         raise AnalysisError(f"No orbit was found at the level {wanted:g}: raised from a thousandth "
                             f"of it, the branch ends at {last.parameter:.4g}.")
-    return _taken(field, values, free, method, options, last.orbit(samples=501).states, held)
+    return np.asarray(last.orbit(samples=501).states)
 
 
 def _settled(
