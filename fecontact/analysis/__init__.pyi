@@ -6,6 +6,7 @@ from .deflections import DeflectionPath, DeflectionSteps, deflection_path
 from .histories import History, history
 from .impacts import Impacts, Rest, find_impacts, find_rests
 from .key_numbers import KeyNumbers, key_numbers
+from .mistuning import amplification, mistuned_response, whitehead_bound
 from .periodicity import (
     Periodicity,
     Steadiness,
@@ -44,6 +45,7 @@ __all__ = [
     "Spectrum",
     "Steadiness",
     "Strobe",
+    "amplification",
     "amplitude_spectrum",
     "buckling_loads",
     "campbell",
@@ -55,6 +57,7 @@ __all__ = [
     "find_rests",
     "history",
     "key_numbers",
+    "mistuned_response",
     "periodicity",
     "power_spectral_density",
     "prestressed_modes",
@@ -63,4 +66,5 @@ __all__ = [
     "spectrogram",
     "steadiness",
     "strobed_states",
+    "whitehead_bound",
 ]
