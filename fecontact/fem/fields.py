@@ -46,12 +46,15 @@ class BodyFields(Summarised):
         Stresses xx, yy, zz, xy (, yz, xz), means over the adjacent elements [Pa]. After large
         deflections these are the second ones of Piola and Kirchhoff, in axes that turn with the
         material; see :attr:`cauchy_stress`.
+    temperature : (N,) array or None
+        Change of temperature at the nodes, whose expansion makes no stress [K].
     """
 
     nodes: Array
     elements: Integers
     displacement: Array
     stress: Array
+    temperature: Array | None = None
 
     def summary(self) -> list[tuple[str, str]]:
         """Size of the model and the largest values."""

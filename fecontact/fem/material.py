@@ -40,6 +40,8 @@ class Material:
         rho, positive [kg/m^3].
     loss_factor : float
         Share of the elastic energy that a cycle dissipates, over 2 pi; zero or above.
+    thermal_expansion : float
+        Coefficient alpha, the strain of free expansion per kelvin [1/K].
 
     Raises
     ------
@@ -51,11 +53,13 @@ class Material:
     poisson_ratio: float = 0.3
     density: float = 7850.0
     loss_factor: float = 0.0
+    thermal_expansion: float = 0.0
 
     def __post_init__(self) -> None:
         require_positive("Material", youngs_modulus=self.youngs_modulus, density=self.density)
         require_not_negative("Material", loss_factor=self.loss_factor)
-        require_finite("Material", poisson_ratio=self.poisson_ratio)
+        require_finite("Material", poisson_ratio=self.poisson_ratio,
+                       thermal_expansion=self.thermal_expansion)
         if not -1.0 < self.poisson_ratio < 0.5:
             raise InputError(f"Material: poisson_ratio = {self.poisson_ratio!r} must be above -1 "
                              f"and below 0.5.")
@@ -69,7 +73,7 @@ class Material:
                              f"{nearest(str(name), _MATERIALS)}; named materials are "
                              f"{choices(_MATERIALS)}, or give youngs_modulus, poisson_ratio and "
                              f"density.")
-        return cls(*_MATERIALS[name])
+        return cls(*_MATERIALS[name][:3], thermal_expansion=_MATERIALS[name][3])
 
     @property
     def youngs_moduli(self) -> tuple[float, ...]:
@@ -101,7 +105,7 @@ class Material:
                 f"{self.density:.4g} kg/m³{_lossy(self.loss_factor)}")
 
 
-_MATERIALS = {"steel": (2.1e11, 0.3, 7850.0), "aluminium": (7.0e10, 0.33, 2700.0)}
+_MATERIALS = {"steel": (2.1e11, 0.3, 7850.0, 1.2e-5), "aluminium": (7.0e10, 0.33, 2700.0, 2.3e-5)}
 
 
 @dataclass(frozen=True)

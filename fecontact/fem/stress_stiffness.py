@@ -20,16 +20,20 @@ from fecontact.fem.assembly import pattern
 from fecontact.fem.cell_gradients import PAIRS, cell_gradients
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.incompatible_modes import in_parts, mode_gradients
+from fecontact.fem.thermal import thermal_stress
 
 # Numbers of the components of a strain among xx, yy, zz, xy, yz, xz, by dimension.
 USED = {2: [0, 1, 3], 3: [0, 1, 2, 3, 4, 5]}
 
 
-def stress_stiffness(body: ElasticBody, displacement: Array) -> Any:
+def stress_stiffness(
+    body: ElasticBody, displacement: Array, temperatures: Array | None = None
+) -> Any:
     """Geometric stiffness, sparse (d N, d N), of the stress under displacements (d N,) [N/m].
 
     Symmetric, without supports. The stress is that of the linear strain at the points of
-    quadrature, of bricks with incompatible modes with these; they themselves get none.
+    quadrature, of bricks with incompatible modes with these; they themselves get none. The strain
+    of free expansion under changes of temperature (N,) makes no stress.
     """
     import scipy.sparse as sp
 
@@ -39,6 +43,9 @@ def stress_stiffness(body: ElasticBody, displacement: Array) -> Any:
     for cells in in_parts(np.arange(len(members))):
         gradients, volumes = cell_gradients(body, cells)
         stress = cell_stress(body, displacement, cells, gradients)
+        if temperatures is not None:
+            held = thermal_stress(body, temperatures, cells)
+            stress = stress - held[..., None, None] * np.eye(body.dimension)
         _add(gradients, volumes * body.thickness, stress, slots[cells], entries)
     one = sp.csr_array((entries, indices, indptr), shape=(len(body.nodes),) * 2)
     return sp.csc_array(sp.kron(one, sp.eye_array(body.dimension)))

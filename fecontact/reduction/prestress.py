@@ -37,7 +37,7 @@ def geometric_stiffness(body: ElasticBody, prestress: BodyFields) -> Any:
     if body.hinges:
         raise InputError("prestress is that of bodies without hinges, whose nodes would run on "
                          "circles; leave it out, or the hinges.")
-    return stress_stiffness(body, prestress.displacement.ravel())
+    return stress_stiffness(body, prestress.displacement.ravel(), prestress.temperature)
 
 
 def refuse_circles(body: ElasticBody, what: str) -> None:

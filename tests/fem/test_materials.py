@@ -24,7 +24,7 @@ from fecontact import (
 from fecontact.reduction import eigenfrequencies_hz
 from fecontact.reduction.eigenmodes import strain_energies
 
-STEEL, ALUMINIUM = Material.named("steel"), Material.named("aluminium")
+STEEL, ALUMINIUM = Material(2.1e11, 0.3, 7850.0), Material(7.0e10, 0.33, 2700.0)
 SIZE = (0.1, 0.04, 0.03)
 
 

@@ -14,6 +14,7 @@ from fecontact.core.units import Summarised
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import BodyFields
 from fecontact.fem.points import Place
+from fecontact.fem.thermal import Temperature
 from fecontact.laws.excitation import Load
 from fecontact.reduction.eigenmodes import FreeSystem, fixed_signs
 from fecontact.reduction.prestress import geometric_stiffness
@@ -60,6 +61,7 @@ def buckling_loads(
     *,
     points: Mapping[str, Place] | None = None,
     time: float = 0.0,
+    temperature: Temperature | None = None,
 ) -> BucklingLoads:
     r"""Lowest load factors of linear buckling, of a body that supports hold.
 
@@ -76,8 +78,8 @@ def buckling_loads(
         As of :func:`~fecontact.static_solution`.
     count : int
         Number k of load factors, if there are so many.
-    points, time : mapping, float
-        As of :func:`~fecontact.static_solution`.
+    points, time, temperature : mapping, float, float or array or function
+        As of :func:`~fecontact.static_solution`. The factors multiply loads and temperature.
 
     Raises
     ------
@@ -90,7 +92,7 @@ def buckling_loads(
     require_kind("buckling_loads", int, count=count)
     if count < 1:
         raise InputError(f"buckling_loads: count = {count!r} must be at least 1.")
-    state = static_solution(body, load, points=points, time=time)
+    state = static_solution(body, load, points=points, time=time, temperature=temperature)
     system = FreeSystem.of(body, "direct")
     if system.rigid.shape[1]:
         raise InputError("buckling_loads is for bodies that supports hold against all rigid "

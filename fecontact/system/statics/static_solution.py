@@ -12,6 +12,12 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import BodyFields, StressAxes, body_elements, stress_of
 from fecontact.fem.points import Place, place_rows
 from fecontact.fem.rotation import Rotation, centrifugal_force
+from fecontact.fem.thermal import (
+    Temperature,
+    nodal_temperatures,
+    nodal_thermal_stress,
+    thermal_forces,
+)
 from fecontact.laws.excitation import BOUNDARY_STRESSES, Load
 from fecontact.laws.signals.base import Signal
 from fecontact.reduction.eigenmodes import FreeSystem
@@ -28,6 +34,7 @@ def static_solution(
     time: float = 0.0,
     rotation: Rotation | None = None,
     stress_axes: StressAxes = "global",
+    temperature: Temperature | None = None,
 ) -> BodyFields:
     """Displacement and stress of a body at rest under loads, ``K u = f`` with its supports.
 
@@ -50,6 +57,9 @@ def static_solution(
         Adds the centrifugal load of the undeformed body at this speed; loads turn with the body.
     stress_axes : 'global' or 'material'
         Axes of the stresses in anisotropic materials: x, y, z or those of the material.
+    temperature : float, (N,) array or function of the coordinates, optional
+        Change from the state without stress [K], of the body or at its displacement nodes; see
+        :mod:`fecontact.fem.thermal`.
 
     Raises
     ------
@@ -67,10 +77,18 @@ def static_solution(
     force = nodal_forces(body, load, points or {}, time)
     if rotation is not None:
         force += rotation.speed**2 * centrifugal_force(body, rotation)
+    warm = None if temperature is None else nodal_temperatures(body, temperature)
+    if warm is not None:
+        force = force + thermal_forces(body, warm)
     _require_balance(body, body.expansion @ system.rigid, force)
     u = np.asarray(body.expansion @ system.deflection(body.expansion.T @ force))
-    return BodyFields(body.nodes, body_elements(body), u.reshape(-1, body.mesh.dimension),
-                      stress_of(body, u[:, None], stress_axes)[:, :, 0])
+    stress = stress_of(body, u[:, None], stress_axes)[:, :, 0]
+    if warm is not None:
+        normal = 2 if body.dimension == 2 and body.plane == "stress" else 3
+        stress = stress.copy()
+        stress[:, :normal] -= nodal_thermal_stress(body, warm)[:, None]
+    return BodyFields(body.nodes, body_elements(body), u.reshape(-1, body.mesh.dimension), stress,
+                      warm)
 
 
 def nodal_forces(

@@ -1,0 +1,101 @@
+r"""Thermal strain: nodal forces and stress of a change of temperature.
+
+Free expansion is the strain :math:`\alpha \Delta T` in all directions; the stress is that of the
+rest of the strain,
+
+.. math:: \sigma = D (\epsilon - \alpha \Delta T\, 1), \qquad
+    f = \int B^T D\, \alpha \Delta T\, 1\, dV
+
+so that supports and neighbours press on a body that grows warm.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from fecontact.core.checks import as_floats
+from fecontact.core.errors import InputError
+from fecontact.core.types import Array, ArrayLike, Integers
+from fecontact.fem.cell_gradients import cell_gradients
+from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.elements.cell_kinds import shape_functions
+from fecontact.fem.incompatible_modes import in_parts
+from fecontact.fem.material import Material
+
+Temperature = float | ArrayLike | Callable[..., Any]
+
+
+def nodal_temperatures(body: ElasticBody, temperature: Temperature) -> Array:
+    """Change of temperature (N,) at the displacement nodes [K].
+
+    Parameters
+    ----------
+    body : ElasticBody
+        Of isotropic materials with a thermal expansion.
+    temperature : float, (N,) array or function of the coordinates
+        The change from the state without stress [K]; ``lambda x, y: 100.0 * y``, of solids of x, y
+        and z.
+
+    Raises
+    ------
+    InputError
+        For another number of nodes, values that are not finite, anisotropic materials or materials
+        without expansion, bricks with incompatible modes.
+    """
+    if body.has_incompatible_modes:
+        raise InputError("temperature is for bodies without incompatible modes; give bricks = "
+                         "'full', or degree = 2.")
+    if not all(isinstance(one, Material) for one in body.materials):
+        raise InputError("temperature is for isotropic materials; anisotropic ones have no thermal "
+                         "expansion.")
+    if not any(one.thermal_expansion for one in body.materials):  # type: ignore[union-attr]
+        raise InputError("temperature acts through the thermal expansion of the material, which is "
+                         "zero; give Material(..., thermal_expansion=1.2e-5), that of steel.")
+    given = temperature(*body.nodes.T) if callable(temperature) else temperature
+    values = as_floats(given, "temperature")
+    if values.shape not in ((), (len(body.nodes),)) or not np.isfinite(values).all():
+        raise InputError(f"temperature must be one finite number or one for each of the "
+                         f"{len(body.nodes)} displacement nodes, not an array of shape "
+                         f"{values.shape}.")
+    return np.broadcast_to(values, (len(body.nodes),))
+
+
+def thermal_moduli(body: ElasticBody) -> Array:
+    """Stress (M,) of each cell that is held, over the change of temperature [Pa/K]."""
+    direct, lateral, _ = body.elasticity.T
+    across = 1.0 if body.dimension == 2 and body.plane == "stress" else 2.0
+    expansions = np.array([getattr(one, "thermal_expansion", 0.0) for one in body.materials])
+    return np.asarray(expansions[body.cell_materials] * (direct + across * lateral))
+
+
+def _at_points(body: ElasticBody, temperatures: Array, cells: Integers) -> Array:
+    """Temperatures (e, q) at the points of quadrature of cells."""
+    members = body.basis.element_dofs.T[cells]
+    values, _ = shape_functions(body.dimension, members.shape[1],
+                                np.ascontiguousarray(body.basis.X.T))
+    return np.einsum("qk,ek->eq", values, temperatures[members])
+
+
+def thermal_stress(body: ElasticBody, temperatures: Array, cells: Integers) -> Array:
+    """Pressure (e, q) at the points of quadrature of cells that are held [Pa]."""
+    return thermal_moduli(body)[cells][:, None] * _at_points(body, temperatures, cells)
+
+
+def thermal_forces(body: ElasticBody, temperatures: Array) -> Array:
+    """Nodal forces (d N,) of temperatures (N,), in balance with themselves [N]."""
+    members = body.basis.element_dofs.T
+    found = np.zeros((len(body.nodes), body.dimension))
+    for cells in in_parts(np.arange(len(members))):
+        gradients, volumes = cell_gradients(body, cells)
+        pressure = thermal_stress(body, temperatures, cells) * volumes * body.thickness
+        np.add.at(found, members[cells], np.einsum("eq,eqkd->ekd", pressure, gradients))
+    return found.ravel()
+
+
+def nodal_thermal_stress(body: ElasticBody, temperatures: Array) -> Array:
+    """Pressure (N,) at the nodes of a body that is held, mean over the adjacent elements [Pa]."""
+    members, areas = body.basis.element_dofs.T, body.basis.dx.sum(axis=1)
+    size = members.shape[1]
+    moduli = np.bincount(members.ravel(), np.repeat(areas * thermal_moduli(body), size))
+    return np.asarray(moduli / np.bincount(members.ravel(), np.repeat(areas, size))) * temperatures
