@@ -29,6 +29,7 @@ BENCHMARKS = {
     "harmonic": ((), [(r"^Duffing .* peak +(\S+)$", 0.0, 1e-3),
                       (r"^Jenkins .* peak +(\S+)$", 0.0, 3e-3),
                       (r"^harmonic balance .* error (\S+)$", 0.0, 1e-5)]),
+    "wheel": ((), [(r"first points (\S+);", 0.0, 1e-8)]),
     # The frequency of the whole body, and the largest difference of both motions.
     "large_deflections": ((), [(r"^ +0.50 +(\S+) ", 22.927, 0.02),
                                (r"^ +0.50 +\S+ +(\S+) ", 22.927, 0.02),
