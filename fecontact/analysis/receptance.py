@@ -100,10 +100,9 @@ def receptance(
 
     with the stiffness and damping matrices K, D of the basis, the springs c and dashpots b of the
     drive, whose far ends are fixed, and p = 0, 1, 2 for receptance, mobility, accelerance.
-    Linearisation at a state adds the stiffness and damping of
-    the contact by the Jacobian; a sticking node acts as a dashpot with the friction slope dR/dv.
-    The result says if the state is unstable; the response is then that of the linear equations
-    only and cannot be observed.
+    Linearisation at a state adds the stiffness and damping of the contact by the Jacobian; a
+    sticking node acts as a dashpot with the friction slope dR/dv. The result says if the state is
+    unstable; the response is then that of the linear equations only and cannot be observed.
 
     Parameters
     ----------

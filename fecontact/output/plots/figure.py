@@ -172,7 +172,7 @@ def new_figure(
         with np.errstate(over="ignore"):
             figure.savefig(drawn, format=target.suffix[1:].lower())
         with replaced(target) as part:
-            part.write_bytes(drawn.getbuffer())
+            part.write_bytes(drawn.getvalue())
 
 
 def _target(path: str | Path) -> Path:
