@@ -112,7 +112,8 @@ def deflection_path(
 
     with Green and Lagrange's strain E, linear elastic (St. Venant and Kirchhoff's material).
     Displacements and rotations may be large, strains must be small. Supports, ties and constraints
-    are those of the body; hinges and couplings rotate by small angles.
+    are those of the body; hinges and couplings rotate by small angles. There is no contact: for
+    that give a reduced model ``large_deflections``, see :func:`~fecontact.modal_basis`.
 
     Parameters
     ----------
