@@ -130,7 +130,7 @@ class FiniteStrainModel:
     def stress(self, q: Array) -> Array:
         """Second stress of Piola and Kirchhoff (N, 4, k), of solids (N, 6, k), at the nodes [Pa].
 
-        For free unknowns (f, k), in the order of :func:`fecontact.fem.fields.stress_of`.
+        For free unknowns (f, k), in the order of :func:`fecontact.fem.stress_of`.
         """
         u, own = np.asarray(self.expansion @ q), self.body.nodes.size
         return stress_of(self.body, u[:own], finite=True,

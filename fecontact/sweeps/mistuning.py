@@ -60,7 +60,7 @@ class MistuningSweep(Summarised):
 
 @dataclass(frozen=True, eq=False)
 class _Wheels:
-    """Mistuned wheels on a process: excitation, tuned stiffness, and that of each sector's cells."""
+    """Mistuned wheels on a worker: excitation, tuned stiffness, and that of each sector's cells."""
 
     excitation: Excitation
     tuned: Array

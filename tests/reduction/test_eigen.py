@@ -1,5 +1,7 @@
 """Eigenfrequencies and modes of finite-element bodies against closed forms and published values."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from meshes_for_tests import clamped_beam, grid, rectangle, skewed, tapered_membrane
@@ -398,7 +400,9 @@ def test_material_is_checked(values, message):
 
 
 def test_named_materials():
-    assert Material.named("steel") == STEEL
+    named = Material.named("steel")
+    assert replace(named, thermal_expansion=0.0) == STEEL
+    assert named.thermal_expansion == pytest.approx(1.2e-5)
     with pytest.raises(InputError, match=r"'steal'.*did you mean 'steel'.*'aluminium'"):
         Material.named("steal")
 

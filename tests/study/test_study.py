@@ -267,7 +267,7 @@ def test_material_values_replace_those_of_the_named_one(tiny):
     material = tiny.with_(**{"body.density": 3000}).body.elastic_material
     assert (material.density, material.youngs_modulus) == (3000.0, 7.0e10)
     assert Study.from_toml('geometry = { shape = "beam" }\nbody = { thickness = 0.02 }'
-                           ).elastic_body().material == Material()
+                           ).elastic_body().material == Material.named("steel")
 
 
 def test_mesh_file_is_found_beside_the_study(tmp_path):

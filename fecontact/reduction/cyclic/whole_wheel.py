@@ -15,6 +15,7 @@ import numpy as np
 
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import listed
 from fecontact.fem.elastic_body import ElasticBody
@@ -23,6 +24,7 @@ from fecontact.reduction.cyclic.cyclic_basis import CyclicBasis
 from fecontact.reduction.modal_basis import ModalBasis
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class WholeWheel:
     """All sectors of a wheel in the modes of all nodal diameters, tuned or mistuned.
@@ -66,8 +68,6 @@ class WholeWheel:
                 given).all():
             raise InputError(f"WholeWheel: deviations must be {symmetry.sectors} numbers above -1, "
                              f"one of each sector, not {self.deviations!r}.")
-        given = given.copy()
-        given.setflags(write=False)
         object.__setattr__(self, "deviations", given)
         _ = self._deviating
 
