@@ -10,6 +10,8 @@ from fecontact import (
     ElasticBody,
     InputError,
     Load,
+    Material,
+    Mesh,
     PointLoad,
     Rayleigh,
     basis_from_matrices,
@@ -71,10 +73,19 @@ def response(system, bounds, points=1, observe=("s.tip", "y"), harmonics=(0, 1, 
         method=HarmonicBalance(list(harmonics), 48, stability=None, **options))
 
 
-def every_sector(sector, order, hertz):
-    """The wheel of finite elements with its contact rows, independent of the modes of a sector."""
-    body = ElasticBody(whole_wheel(sector.mesh, SYMMETRY), thickness=0.02, degree=1,
-                       fixed={"root": "xy"})
+def every_sector(sector, order, hertz, deviations=(0.0,) * N):
+    """The wheel of finite elements with its contact rows, independent of the modes of a sector.
+
+    The modulus of each blade deviates from that of steel; damping is that of the tuned wheel.
+    """
+    mesh, count = whole_wheel(sector.mesh, SYMMETRY), len(sector.mesh.cells)
+    groups = {f"blade {s}": count * s + sector.mesh.cell_groups["blade"] for s in range(N)}
+    groups["rest"] = np.setdiff1d(np.arange(count * N), np.concatenate(list(groups.values())))
+    moduli = dict(zip(groups, (*deviations, 0.0), strict=True))
+    body, tuned = (ElasticBody(
+        Mesh(mesh.nodes, mesh.cells, mesh.boundaries, cell_groups=groups),
+        {name: Material(2.1e11 * (1.0 + part * moduli[name])) for name in groups},
+        thickness=0.02, degree=1, fixed={"root": "xy"}) for part in (1.0, 0.0))
     pairing, E = shroud(sector), body.expansion
     frames, count = node_frames(pairing.normals), len(sector.nodes)
 
@@ -91,11 +102,14 @@ def every_sector(sector, order, hertz):
     feet = pairing.feet @ sp.kron(sp.eye_array(count), SYMMETRY.rotation(2))
     contact = np.concatenate([
         rows(frames @ pairing.nodes, s) - rows(frames @ feet, (s + 1) % N) for s in range(N)])
+    mass, stiffness, steel = ((E.T @ one @ E).toarray() for one in (
+        body.mass, body.stiffness, tuned.stiffness))
     basis = basis_from_matrices(
-        (E.T @ body.mass @ E).toarray(), (E.T @ body.stiffness @ E).toarray(),
+        mass, stiffness,
         {"contact": contact.reshape(-1, 3, E.shape[1]), **{
             f"tip{s}": rows(tip, s) for s in range(N)}},
-        damping=DAMPING, tributary=np.tile(pairing.tributary, N))
+        damping=DAMPING.mass_factor * mass + DAMPING.stiffness_factor * steel,
+        tributary=np.tile(pairing.tributary, N))
     return ContactSystem(
         basis, normal=PrescribedForce(N * NORMAL), friction=JenkinsFriction(
             N * FRICTION.stiffness, FRICTION.friction_coefficient),
@@ -107,22 +121,46 @@ def excited(system, hertz):
     return system.with_({f"load.forces.{k}.signal.frequency_hz": hertz for k in range(N)})
 
 
+def response_of_all(system, bounds, observe):
+    """First point of the response of all sectors, whose forces have one frequency."""
+    field = contact_field(system, {"w": (bounds[0], excited)})
+    return frequency_response(field, bounds, "w", observe=observe,
+                              options=ContinuationOptions(points=1),
+                              method=HarmonicBalance([0, 1, 3], 48, stability=None))
+
+
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_one_sector_is_the_whole_wheel_of_finite_elements(sector, wheel, order):
     """To 1e-9, slipping: double, single, backward waves, and all alike; 34 unknowns a sector."""
     hertz = (0.9 if order == N else 1.012) * first_hz(wheel, order)
     bounds = hertz, 1.01 * hertz
     one = response(system_of(wheel, hertz), bounds, repeats=EngineOrder(wheel, order))
-    field = contact_field(every_sector(sector, order, hertz), {"w": (hertz, excited)})
-    every = frequency_response(field, bounds, "w", observe=("tip0", "y"),
-                               options=ContinuationOptions(points=1),
-                               method=HarmonicBalance([0, 1, 3], 48, stability=None))
+    every = response_of_all(every_sector(sector, order, hertz), bounds, ("tip0", "y"))
     assert one.harmonic(1)[0] == pytest.approx(every.harmonic(1)[0], rel=1e-9)
     sticking = response(system_of(wheel, hertz, 1e6), bounds, repeats=EngineOrder(wheel, order))
     # Neighbours in antiphase do not move along each other.
     if order != 2:
         assert abs(one.amplitude()[0] / sticking.amplitude()[0] - 1.0) > 1e-3
     assert one.branches[0].attributes["engine_order"] == order
+
+
+def test_a_mistuned_wheel_with_friction_is_that_of_finite_elements(sector, wheel):
+    """To 1e-9, slipping; blades with moduli of their own."""
+    deviations = np.array([0.06, -0.04, 0.02, -0.07])
+    hertz = 1.012 * first_hz(wheel, 1)
+    bounds = hertz, 1.01 * hertz
+    whole = WholeWheel(wheel, deviations, "s.blade")
+    every, tips = every_sector(sector, 1, hertz, deviations), []
+    for s in range(2):
+        one = response_of_all(wheel_system(system_of(wheel, hertz), whole, 1), bounds,
+                              (f"{s}.s.tip", "y")).harmonic(1)[0]
+        other = response_of_all(every, bounds, (f"tip{s}", "y")).harmonic(1)[0]
+        assert one == pytest.approx(other, rel=1e-9)
+        tips.append(abs(one))
+    assert abs(tips[0] / tips[1] - 1.0) > 1e-2
+    sticking = response_of_all(wheel_system(system_of(wheel, hertz, 1e6), whole, 1), bounds,
+                               ("0.s.tip", "y")).amplitude()[0]
+    assert abs(tips[0] / sticking - 1.0) > 1e-3
 
 
 def test_few_modes_suffice(sector, wheel):
