@@ -15,6 +15,7 @@ from fecontact import (
     PointLoad,
     Rayleigh,
     basis_from_matrices,
+    modal_basis,
 )
 from fecontact.bifurcation import (
     ContinuationOptions,
@@ -27,7 +28,7 @@ from fecontact.bifurcation import (
     wheel_stability,
     wheel_system,
 )
-from fecontact.fem import CyclicSymmetry, pair_faces
+from fecontact.fem import CyclicSymmetry, Rotation, pair_faces
 from fecontact.fem.points import place_rows
 from fecontact.laws import Harmonic, JenkinsFriction, PrescribedForce
 from fecontact.reduction import WholeWheel, cyclic_basis
@@ -205,6 +206,30 @@ def test_whole_wheel_has_the_frequencies_of_finite_elements(sector, wheel):
     expected = eigh(*((E.T @ one @ E).toarray() for one in (body.stiffness, body.mass)),
                     eigvals_only=True)
     assert np.linalg.eigvalsh(WholeWheel(wheel).stiffness) == pytest.approx(expected, rel=1e-9)
+
+
+def eigenvalues(stiffness, damping):
+    """Of q'' + C q' + K q = 0."""
+    n = len(stiffness)
+    return np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
+
+
+def test_a_turning_wheel_has_the_frequencies_of_finite_elements(sector):
+    """Coriolis and centrifugal terms of one sector, by diameters, and those of the whole wheel."""
+    rotation = Rotation(2000.0)
+    body = ElasticBody(whole_wheel(sector.mesh, SYMMETRY), thickness=0.02, degree=1,
+                       fixed={"root": "xy"})
+    basis = modal_basis(body, body.expansion.shape[1], contact=(), rotation=rotation)
+    expected = eigenvalues(basis.stiffness, basis.damping)
+    turning = cyclic_basis({"s": sector}, SYMMETRY, {"shroud": shroud(sector)}, modes=1000,
+                           rotation=rotation)
+    found = np.concatenate([
+        turned for one in turning.diameters
+        for values in [eigenvalues(one.stiffness, one.damping)]
+        for turned in ([values] if SYMMETRY.is_real(one.diameter) else [values, values.conj()])])
+    assert np.sort(found.imag) == pytest.approx(np.sort(expected.imag), rel=1e-7, abs=1e-2)
+    still = cyclic_basis({"s": sector}, SYMMETRY, {"shroud": shroud(sector)}, modes=1000)
+    assert abs(first_hz(turning, 1) / first_hz(still, 1) - 1.0) > 1e-3
 
 
 def test_bad_wheels_are_refused(sector, wheel):
