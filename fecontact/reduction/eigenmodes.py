@@ -398,4 +398,4 @@ def fixed_signs(shapes: Array) -> Array:
     """
     size = np.abs(shapes)
     first = np.argmax(size >= 0.99 * size.max(axis=0), axis=0)
-    return np.where(shapes[first, np.arange(shapes.shape[1])] < 0.0, -1.0, 1.0)
+    return np.where(shapes[first, np.arange(shapes.shape[1])].real < 0.0, -1.0, 1.0)

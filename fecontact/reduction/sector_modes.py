@@ -24,13 +24,11 @@ from fecontact.reduction.eigenmodes import FreeSystem, free_modes, frequencies_o
 from fecontact.reduction.reduce_body import first_order
 from fecontact.reduction.sector_rotation import SectorRotation, sector_rotation
 from fecontact.reduction.solid_motions import rigid_motions
+from fecontact.reduction.static_modes.residual_vectors import completing
 
 # Singular values of motions below which they keep the symmetry and the supports: faces of files in
 # single precision match no better.
 _KEPT = 1e-4
-# Size of residual vectors, relative to the static response, that is rounding, and squares of their
-# directions that are.
-_REST, _SPANNED = 1e-6, 1e-10
 
 
 @read_only_arrays
@@ -252,7 +250,7 @@ def modes_of_diameter(
             deflections = system.deflection(np.ascontiguousarray(forces.real))
         else:
             deflections = _from_halves(system.deflection(np.vstack([forces.real, forces.imag])))
-        found = np.hstack([found, completing(found, deflections, K, M)])
+        found = np.hstack([found, completing(FreeSystem(K, M, rigid), found, deflections)])
     shapes = np.asarray(B @ found, dtype=complex)
     # Rayleigh quotients of strains do not carry the rounding of K.
     w = np.sqrt(frequencies_of(body, shapes.real) ** 2 + frequencies_of(body, shapes.imag) ** 2)
@@ -265,30 +263,6 @@ def _from_halves(pairs: Array) -> ComplexArray:
     """Complex vectors (n, k) of real ones (2 n, k), real parts above imaginary ones."""
     half = len(pairs) // 2
     return np.asarray(pairs[:half] + 1j * pairs[half:])
-
-
-def completing(modes: Any, vectors: Any, K: Any, M: Any) -> Any:
-    """Mass-normalised vectors (n, r) that span vectors (n, p) beside the modes (n, m)."""
-    from scipy.linalg import eigh
-
-    whole = np.sqrt(np.maximum((vectors.conj() * (K @ vectors)).sum(axis=0).real, 0.0))
-    for _ in range(2):
-        vectors = vectors - modes @ (modes.conj().T @ (M @ vectors))
-    stiffness, mass = (vectors.conj().T @ (one @ vectors) for one in (K, M))
-    sizes = np.sqrt(np.maximum(np.diag(stiffness).real, 0.0))
-    kept = sizes > _REST * whole
-    if not kept.any():
-        return vectors[:, :0]
-    vectors, scale = vectors[:, kept], 1.0 / sizes[kept]
-    stiffness, mass = (one[np.ix_(kept, kept)] * np.outer(scale, scale)
-                       for one in (stiffness, mass))
-    values, turn = np.linalg.eigh(0.5 * (stiffness + stiffness.conj().T))
-    turn = turn[:, values > _SPANNED * values[-1]]
-    small = [turn.conj().T @ (one @ turn) for one in (stiffness, mass)]
-    _, found = eigh(*(0.5 * (one + one.conj().T) for one in small))
-    found = vectors @ (scale[:, None] * (turn @ found))
-    gram = found.conj().T @ (M @ found)
-    return found @ np.linalg.inv(np.linalg.cholesky(0.5 * (gram + gram.conj().T)).conj().T)
 
 
 def _rigid(body: ElasticBody, B: Any, inverse: Any, M: Any) -> Any:

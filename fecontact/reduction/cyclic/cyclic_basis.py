@@ -39,17 +39,13 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart
 from fecontact.reduction.prestress import geometric_stiffness
 from fecontact.reduction.reduce_body import displacement_rows
-from fecontact.reduction.sector_modes import (
-    alike,
-    chosen_diameters,
-    completing,
-    modes_of_diameter,
-)
+from fecontact.reduction.sector_modes import alike, chosen_diameters, modes_of_diameter
 from fecontact.reduction.sector_rotation import (
     in_shapes,
     require_common_axis,
     stiffening_matrix,
 )
+from fecontact.reduction.static_modes.residual_vectors import completing
 
 _OWNER = "cyclic_basis"
 
@@ -340,8 +336,8 @@ class _Terms:
         extra, turning = 0.0 * body.mass, 0.0 * body.mass
         if rotation is not None:
             require_common_axis(body, symmetry, rotation, _OWNER)
-            motions = (alike(body, symmetry, nodes) if nodes is not None
-                       else (body.expansion, FreeSystem.of(body)))
+            motions = (body.expansion, system) if system is not None else alike(
+                body, symmetry, nodes)
             extra = extra + rotation.speed**2 * stiffening_matrix(body, rotation, *motions)
             if rotation.coriolis:
                 turning = rotation.speed * coriolis_matrix(body, rotation)
@@ -380,8 +376,7 @@ def _separate_modes(
             # Rows of both components of a complex phase: real and imaginary part.
             forces = np.asarray((body.expansion.T @ rows.T.conj()).toarray())
             forces = np.hstack([forces.real, forces.imag])
-            found = np.hstack([found, completing(
-                found, system.deflection(forces), system.stiffness, system.mass)])
+            found = np.hstack([found, completing(system, found, system.deflection(forces))])
     shapes = np.asarray(body.expansion @ found)
     w = frequencies_of(body, shapes)
     w[: system.rigid.shape[1]] = 0.0

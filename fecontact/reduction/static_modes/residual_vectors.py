@@ -29,6 +29,8 @@ from fecontact.reduction.static_modes.iterated_flexibility import (
 # these cost more than iterations for any number of rows.
 _FEW = 64
 _LARGE = 80_000
+# Size of residual vectors, relative to the static response, that is rounding.
+_REST = 1e-6
 # Columns of long vectors that are multiplied at once.
 _COLUMNS = 128
 
@@ -110,13 +112,32 @@ def residual_modes(
     return np.sqrt(squares), found
 
 
+def completing(system: FreeSystem, modes: Array, vectors: Array) -> Array:
+    """Mass-normalised shapes (f, r) that span vectors (f, p) beside modes (f, m).
+
+    What rounding leaves of vectors that the modes span is left out. Complex ones as for
+    :func:`diagonalised`.
+    """
+    K, inertia = system.stiffness, system.mass @ modes
+    sizes = np.sqrt(np.maximum((vectors.conj() * (K @ vectors)).sum(axis=0).real, 0.0))
+    for _ in range(2):
+        vectors = vectors - modes @ (inertia.conj().T @ vectors)
+    left = np.sqrt(np.maximum((vectors.conj() * (K @ vectors)).sum(axis=0).real, 0.0))
+    kept = left > _REST * sizes
+    return diagonalised(system, vectors[:, kept])[1] if kept.any() else vectors[:, :0]
+
+
 def diagonalised(system: FreeSystem, vectors: Array) -> tuple[Array, Array]:
-    """Squared frequencies (p,) and mass-normalised shapes (f, p) of the span of some vectors."""
+    """Squared frequencies (p,) and mass-normalised shapes (f, p) of the span of some vectors.
+
+    Stiffness and mass may be Hermitian, and vectors complex.
+    """
+    left = vectors.conj().T
     squares, turn, loose = _directions(
-        vectors.T @ (system.stiffness @ vectors), vectors.T @ (system.mass @ vectors))
+        left @ (system.stiffness @ vectors), left @ (system.mass @ vectors))
     shapes = vectors @ turn
     if loose:
-        shapes = shapes @ _orthonormal(shapes.T @ (system.mass @ shapes))
+        shapes = shapes @ _orthonormal(shapes.conj().T @ (system.mass @ shapes))
     return squares, shapes * fixed_signs(shapes)
 
 
@@ -175,11 +196,11 @@ class _Gram:
 
 def _directions(stiffness: Array, mass: Array) -> tuple[Array, Array, bool]:
     """Squared frequencies (p,) in a span, coefficients, and whether their mass is loose."""
-    scale = 1.0 / np.sqrt(np.diag(stiffness))
+    scale = 1.0 / np.sqrt(np.diag(stiffness).real)
     values, directions = np.linalg.eigh(stiffness * np.outer(scale, scale))
     kept = values > 1e-11 * values[-1]
     span = scale[:, None] * directions[:, kept] / np.sqrt(values[kept])
-    inverse, turned = np.linalg.eigh(span.T @ mass @ span)
+    inverse, turned = np.linalg.eigh(span.conj().T @ mass @ span)
     inverse, turned = inverse[::-1], turned[:, ::-1]
     loose = inverse[0] * values[-1] > 1e6 * inverse[-1] * values[kept][0]
     return 1.0 / inverse, span @ (turned / np.sqrt(inverse)), bool(loose)
