@@ -145,7 +145,14 @@ def amplification(
 ) -> float:
     """Largest displacement of any sector over a band, over that of the tuned wheel.
 
-    The other parameters are those of :func:`mistuned_response`.
+    Parameters
+    ----------
+    whole : WholeWheel
+        With deviations.
+    order, force, observe : int, (point, component), (point, component)
+        As for :func:`mistuned_response`.
+    band_hz : (float, float)
+        Frequencies over which both are looked for [Hz].
 
     Raises
     ------

@@ -115,14 +115,14 @@ class CyclicSymmetry:
         Pair faces with them by :func:`~fecontact.fem.pair_faces` where a body touches the next
         sector; see :func:`fecontact.reduction.cyclic_basis`.
         """
+        from scipy.spatial.transform import Rotation as Turn
+
         require_kind("next_sector", Mapping, bodies=bodies)
         found = {}
         for name, body in bodies.items():
             require_kind(f"next_sector: body '{name}'", ElasticBody, body=body)
             R = self.rotation(body.dimension)
             centre = np.array([*self.centre, 0.0][: body.dimension])
-            from scipy.spatial.transform import Rotation as Turn
-
             angles = (360.0 / self.sectors if body.dimension == 2 else
                       Turn.from_matrix(R).as_euler("xyz", degrees=True))
             mesh = body.mesh.placed(centre - R @ centre, angles)

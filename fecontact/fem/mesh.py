@@ -191,7 +191,7 @@ class Mesh(Summarised):
         return cls(*structured((x, y) if z is None else (x, y, z)))
 
     def __post_init__(self) -> None:
-        # What is known holds its arrays, so that no others can have their numbers.
+        # Arrays of known meshes are alive, so that no other array has their numbers.
         checked = _CHECKED.get((id(self.nodes), id(self.cells))) or _Checked(
             self.nodes, self.cells)
         object.__setattr__(self, "_checked", checked)

@@ -30,15 +30,14 @@ from fecontact.fem.cyclic_symmetry import NEXT, CyclicSymmetry, sector_nodes
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import BodyFields, body_elements, stress_of
 from fecontact.fem.pairing import Pairing
-from fecontact.fem.points import Place, place_rows
+from fecontact.fem.points import Place
 from fecontact.fem.rotation import Rotation, centrifugal_force, coriolis_matrix
-from fecontact.reduction.assembly.assembled_basis import node_frames
+from fecontact.reduction.cyclic.sector_rows import SectorRows, owned
 from fecontact.reduction.damping import Damping, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, free_modes, frequencies_of
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart
 from fecontact.reduction.prestress import geometric_stiffness
-from fecontact.reduction.reduce_body import displacement_rows
 from fecontact.reduction.sector_modes import alike, chosen_diameters, modes_of_diameter
 from fecontact.reduction.sector_rotation import (
     in_shapes,
@@ -229,7 +228,7 @@ def cyclic_basis(
     if not bodies:
         raise InputError("cyclic_basis: bodies is empty; give at least one.")
     chosen = sorted({0, *chosen_diameters(symmetry, diameters, _OWNER)})
-    nodes = _Nodes.of(bodies, symmetry, pairings, points)
+    nodes = SectorRows.of(bodies, symmetry, pairings, points)
     parts = {}
     for name, body in bodies.items():
         with located(f"Body '{name}':"):
@@ -277,23 +276,13 @@ def _known(what: str, names: Iterable[str], bodies: Mapping[str, Any]) -> tuple[
     return tuple(found)
 
 
-def _owned(what: str, name: str, bodies: Mapping[str, Any]) -> tuple[str, str]:
-    """Body and place of a name ``body.place``."""
-    owner, _, place = name.partition(".")
-    if owner not in bodies or not place:
-        raise InputError(f"cyclic_basis: {what} names '{name}', which must be a body and a name "
-                         f"with a dot between, such as '{next(iter(bodies))}.tip'; the bodies are "
-                         f"{choices(bodies)}.")
-    return owner, place
-
-
 def _loaded(
     bodies: Mapping[str, ElasticBody], loads: Sequence[str]
 ) -> list[tuple[str, Array]]:
     """Owner and nodal forces (d N, d) of each boundary with loads in time."""
     found = []
     for name in as_texts(loads, "cyclic_basis: loads"):
-        owner, boundary = _owned("loads", name, bodies)
+        owner, boundary = owned("loads", name, bodies)
         found.append((owner, boundary_forces(bodies[owner], boundary)))
     return found
 
@@ -336,8 +325,11 @@ class _Terms:
         extra, turning = 0.0 * body.mass, 0.0 * body.mass
         if rotation is not None:
             require_common_axis(body, symmetry, rotation, _OWNER)
-            motions = (body.expansion, system) if system is not None else alike(
-                body, symmetry, nodes)
+            if nodes is not None:
+                motions = alike(body, symmetry, nodes)
+            else:
+                assert system is not None
+                motions = body.expansion, system
             extra = extra + rotation.speed**2 * stiffening_matrix(body, rotation, *motions)
             if rotation.coriolis:
                 turning = rotation.speed * coriolis_matrix(body, rotation)
@@ -383,112 +375,8 @@ def _separate_modes(
     return w, np.asarray(shapes, dtype=complex)
 
 
-@dataclass(frozen=True, eq=False)
-class _Nodes:
-    """Contact nodes and points of a sector, and their rows over the nodes of its bodies.
-
-    ``rows`` are pairs of body and sparse rows, from this sector and from the next one, of each
-    group of places.
-    """
-
-    dimension: int
-    symmetry: CyclicSymmetry
-    positions: Array
-    normals: Array
-    tributary: Array
-    gaps: Array
-    on_ground: Any
-    groups: tuple[tuple[str, int], ...]
-    rows: list[list[tuple[str, bool, Any]]]
-
-    @classmethod
-    def of(
-        cls, bodies: Mapping[str, ElasticBody], symmetry: CyclicSymmetry,
-        pairings: Mapping[str, Pairing], points: Mapping[str, Place],
-    ) -> "_Nodes":
-        import scipy.sparse as sp
-
-        dimensions = {body.dimension for body in bodies.values()}
-        if len(dimensions) > 1:
-            raise InputError("cyclic_basis: bodies must be all in the plane or all in space.")
-        d = dimensions.pop()
-        rows: list[list[tuple[str, bool, Any]]] = []
-        made: list[Pairing] = []
-        for name, one in pairings.items():
-            require_kind(f"cyclic_basis: pairing '{name}'", Pairing, pairing=one)
-            frames = node_frames(one.normals)
-            sides = []
-            for owner, matrix in ((one.body, one.nodes), (one.other, one.feet)):
-                if owner is None:
-                    continue
-                body = owner.removeprefix(NEXT)
-                if body not in bodies or matrix.shape[1] != bodies[body].unknowns:
-                    raise InputError(
-                        f"cyclic_basis: interface '{name}' pairs a face of '{owner}', which is no "
-                        f"body of the sector, {choices(bodies)}, or of the next one, or has "
-                        f"another mesh; pair the faces of the same bodies.")
-                sign = 1.0 if matrix is one.nodes else -1.0
-                sides.append((body, body != owner, sp.csr_array(sign * (frames @ matrix))))
-            rows.append(sides)
-            made.append(one)
-        places = []
-        for name, place in points.items():
-            owner, point = _owned("points", name, bodies)
-            found = place_rows(bodies[owner], place, point)
-            rows.append([(owner, False, sp.csr_array(found.matrix))])
-            places.append(found.position)
-        return cls(
-            d, symmetry,
-            np.concatenate([np.zeros((2, d)), *(one.places for one in made),
-                            np.reshape(places, (-1, d))]),
-            np.concatenate([np.zeros((0, d)), *(one.normals for one in made)]),
-            np.concatenate([np.zeros(0), *(one.tributary for one in made)]),
-            np.concatenate([np.zeros(0), *(one.gaps for one in made)]),
-            np.concatenate([np.zeros(0, bool), *(
-                np.full(len(one.gaps), one.other is None) for one in made)]).astype(bool),
-            tuple((name, len(one.gaps)) for name, one in pairings.items()), rows)
-
-    def in_sector(self, matrix: Any, diameter: int) -> Any:
-        """Rows over the nodes of the next sector as rows over those of this one."""
-        import scipy.sparse as sp
-
-        R = np.exp(1j * diameter * self.symmetry.angle) * self.symmetry.rotation(self.dimension)
-        if self.symmetry.is_real(diameter):
-            R = R.real
-        count = matrix.shape[1] // self.dimension
-        return sp.csr_array(matrix @ sp.kron(sp.eye_array(count), R))
-
-    def loaded(self, body: str, diameter: int) -> Any:
-        """Rows of displacements of a body at which forces act, sparse (p, d N)."""
-        import scipy.sparse as sp
-
-        found = [displacement_rows(self.in_sector(matrix, diameter) if further else matrix,
-                                   self.dimension)
-                 for sides in self.rows for owner, further, matrix in sides if owner == body]
-        if not found:
-            return sp.csr_array((0, 1))
-        return sp.csr_array(sp.vstack(found))
-
-    def T(self, shapes: Mapping[str, ComplexArray], diameter: int) -> ComplexArray:
-        """Rows (P, 3, m) or (P, 6, m) of B and C, which are nowhere, contact nodes and points."""
-        each = 3 * (self.dimension - 1)
-        m = sum(one.shape[1] for one in shapes.values())
-        found = [np.zeros((2 * each, m), dtype=complex)]
-        for sides in self.rows:
-            block = np.zeros((sides[0][2].shape[0], m), dtype=complex)
-            for owner, further, matrix in sides:
-                first = 0
-                for name, one in shapes.items():
-                    if name == owner:
-                        rows = self.in_sector(matrix, diameter) if further else matrix
-                        block[:, first : first + one.shape[1]] += rows @ one
-                    first += one.shape[1]
-            found.append(block)
-        return np.concatenate(found).reshape(-1, each, m)
-
-
 def _diameter(
-    k: int, parts: Mapping[str, _BodyModes], bodies: Mapping[str, ElasticBody], nodes: _Nodes,
+    k: int, parts: Mapping[str, _BodyModes], bodies: Mapping[str, ElasticBody], nodes: SectorRows,
     damping: Damping, loaded: Sequence[tuple[str, Array]],
 ) -> DiameterModes:
     """All bodies of one nodal diameter, one after the other."""

@@ -144,8 +144,7 @@ class WholeWheel:
         gram, sizes = self._gram
         total = sum(sizes)
         # Parts of the shapes by themselves: the real part of a shape is 1, the imaginary one i.
-        unit, first = np.zeros((2 * total, 0)), 0
-        columns = []
+        columns, first = [], 0
         for (k, _, _), m in zip(self.blocks, sizes, strict=True):
             phase = np.exp(1j * k * sector * self.wheel.symmetry.angle)
             size = np.sqrt((1.0 if self.wheel.symmetry.is_real(k) else 2.0) / self.sectors)
@@ -156,7 +155,7 @@ class WholeWheel:
                 block[total + rows, np.arange(m)] = -size * turn.imag
                 columns.append(block)
             first += m
-        moved = np.hstack([unit, *columns])
+        moved = np.hstack(columns)
         return np.asarray(moved.T @ gram @ moved)
 
     @cached_property
