@@ -28,6 +28,7 @@ from fecontact.bifurcation import (
     wheel_stability,
     wheel_system,
 )
+from fecontact.bifurcation.harmonic.starts import problem_for
 from fecontact.fem import CyclicSymmetry, Rotation, pair_faces
 from fecontact.fem.points import place_rows
 from fecontact.laws import Harmonic, JenkinsFriction, PrescribedForce
@@ -206,6 +207,27 @@ def test_whole_wheel_has_the_frequencies_of_finite_elements(sector, wheel):
     expected = eigh(*((E.T @ one @ E).toarray() for one in (body.stiffness, body.mass)),
                     eigvals_only=True)
     assert np.linalg.eigvalsh(WholeWheel(wheel).stiffness) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", [NAME, "load.forces.0.signal.amplitude"])
+def test_derivatives_of_a_wave_are_differences_of_its_equations(sector, name):
+    """To all coefficients and to the parameter, which changes the period or does not."""
+    few = cyclic_basis({"s": sector}, SYMMETRY, {"shroud": shroud(sector)}, modes=3,
+                       points={"s.tip": "tip"}, damping=DAMPING, diameters=[0, 1])
+    hertz = 1.01 * first_hz(few, 1)
+    field = EngineOrder(few, 1).field(contact_field(system_of(few, hertz), [name]))
+    method = HarmonicBalance([0, 1, 3], 48, stability=None)
+    problem = problem_for(field, field.values, 0, method, np.ones(field.dimension + 2))
+    size = 1e-6 * np.random.default_rng(3).normal(size=problem.size)
+    size[problem.left_out] = 0.0
+    u, unit = np.append(size, field.values), np.full(problem.size + 1, 1e-11)
+    unit[-1] = 1e-5 * field.values[0]
+    found, turns = problem.linearise(u).condensed, np.diag(unit)
+    # Coefficients that are left out stay zero.
+    for k in np.delete(np.arange(len(u)), problem.left_out):
+        ends = [problem.linearise(u + sign * turns[k]).residual for sign in (1.0, -1.0)]
+        expected = (ends[0] - ends[1]) / (2.0 * unit[k])
+        assert found[:, k] == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
 
 
 def eigenvalues(stiffness, damping):

@@ -21,6 +21,7 @@ from fecontact.io import report
 from fecontact.output.files.frames import cell_stress, von_mises
 from fecontact.output.files.hdf5 import read_basis, write_basis
 from fecontact.reduction import LargeDeflections, Weld, assembled_basis
+from fecontact.reduction.mode_shapes import NonlinearStress
 
 H = beams.H
 PRESSED = Load(boundaries=(BoundaryLoad("top", pressure=9e3),))
@@ -36,6 +37,20 @@ def exact():
 def two_modes(**options):
     return beams.bent("clamped", 2.5 * H, (0, 2), 9, reduction="residual", loads=("top",),
                       **options)
+
+
+def test_stress_is_a_sum_of_products_of_coordinates():
+    """One node and component, by hand: 2 q_0 + 5 q_0^2 - 3 q_0 (4 q_1)^2."""
+    terms = NonlinearStress(np.diag([1.0, 4.0]), np.array([[2, 0], [1, 2]]),
+                            np.array([[[5.0, -3.0]]]))
+    assert terms.products(np.array([[0.5, 0.2]])) == pytest.approx(
+        np.array([[0.25, 0.5 * 0.64]]), rel=1e-14)
+    basis = two_modes()
+    q = 1e-3 * np.random.default_rng(2).normal(size=(1, basis.modes))
+    shapes = basis.mode_shapes
+    expected = shapes.stress @ q[0] + shapes.nonlinear_stress.stress @ (
+        shapes.nonlinear_stress.products(q)[0])
+    assert basis.fields(q[0]).stress == pytest.approx(expected, rel=1e-12)
 
 
 def test_stress_of_a_clamped_beam_under_pressure():
