@@ -14,12 +14,14 @@ import numpy as np
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.courses import STEEPEST
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
+from fecontact.system.elastic_sliders import deflection_of
 from fecontact.system.kernels import node_gradients
 from fecontact.system.nodes import (
     NodeMotion,
     friction_entry,
     ground_moved,
     in_space,
+    memory_of,
     node_contact,
     slip_entry,
 )
@@ -78,10 +80,11 @@ def set_paths(step, acceleration, s, blocks, stages, v):
 
 
 @helper
-def _reach(direction, j, control, v):
+def _reach(direction, j, y, s, control, v):
     """Distance along a direction that is small against the law's scale, and against the stages.
 
-    Zero where no stage moves the node.
+    Along the deflection of an elastic element it is small against that too, which may be far below
+    its scale. Zero where no stage moves the node.
     """
     motions = v.inside.partial.shape[2]
     reach = 0.0
@@ -92,8 +95,11 @@ def _reach(direction, j, control, v):
     elif motions // 2 <= direction < motions and direction != motions // 2 + 1:
         reach = min(reach, control.slip_scale[j])
     elif direction >= motions:
-        states = v.paths.shape[1] - motions
-        reach = min(reach, control.memory_scale[j * states + direction - motions])
+        states, own = v.paths.shape[1] - motions, direction - motions
+        reach = min(reach, control.memory_scale[j * states + own])
+        if control.slider_counts[j] > 0:
+            element = own // 2 if in_space(s) else own
+            reach = min(reach, deflection_of(memory_of(j, y, s), element, s))
     return _PART * reach if _PART * reach > _SHORTEST else 0.0
 
 
@@ -204,7 +210,7 @@ def set_bends(step, acceleration, problem, progress, room, v):
     for j in range(n):
         motion = dynamics.motion_of(j, w, s)
         for direction in range(v.paths.shape[1]):
-            reach = _reach(direction, j, control, v)
+            reach = _reach(direction, j, progress.state, s, control, v)
             if reach == 0.0 or (even and (direction == 0 or (direction == 2 and motions > 4))):
                 for i in range(tableau.STAGES):
                     v.paths[i, direction, j] = 0.0
