@@ -4,6 +4,8 @@ Each benchmark runs in the other checkout and in this one, one after the other, 
 the times of a row the least one counts. A row is a line of the output without its numbers.
 
 Usage: python benchmarks/beside.py OTHER [BENCHMARK+ARGUMENT... ...] [--rounds 3] [--within 1.1]
+OTHER may be a family of processors, `x86-64-v3`: this checkout by code for all of them, as in the
+package of compiled code, beside the same by code for this very processor.
 BENCHMARK+ARGUMENT is as in the Makefile, `integrator+b+c+--quick` for `integrator.py b c --quick`.
 The exit code is 1 if a time of this checkout is more than `--within` times that of the other.
 """
@@ -15,6 +17,8 @@ import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+
+from fecontact.core.stored_code import FAMILIES, compiled_for
 
 HERE = Path(__file__).resolve().parent.parent
 DEFAULT = ("integrator+a+b+b2+c+--quick", "ensemble+--quick", "many_contacts+--quick",
@@ -40,13 +44,14 @@ def rows(lines: Iterable[str]) -> Rows:
     return found
 
 
-def run(tree: Path, benchmark: str) -> Rows:
-    """Times that a benchmark of a checkout prints."""
+def run(tree: Path, benchmark: str, target: dict[str, str] | None = None) -> Rows:
+    """Times that a benchmark of a checkout prints; compiled for this processor by default."""
     name, *arguments = benchmark.split("+")
     done = subprocess.run(
         [sys.executable, str(tree / "benchmarks" / f"{name}.py"), *arguments], check=True,
         capture_output=True, text=True, cwd=tree / "benchmarks",
-        env={**os.environ, "PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1"})
+        env={**os.environ, "PYTHONPATH": str(tree), "OPENBLAS_NUM_THREADS": "1",
+             **(target or {"FECONTACT_NATIVE": "1"})})
     return rows(done.stdout.splitlines())
 
 
@@ -61,17 +66,18 @@ def least(all_rows: Iterable[Rows]) -> Rows:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("other", type=Path, help="folder of the other checkout")
+    parser.add_argument("other", help="folder of the other checkout, or a family of processors")
     parser.add_argument("benchmarks", nargs="*", default=DEFAULT)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--within", type=float, default=1.1)
     given = parser.parse_args()
-    other, slower = given.other.resolve(), False
+    slower, target = False, compiled_for(given.other) if given.other in FAMILIES else None
+    other = Path(given.other).resolve() if target is None else HERE
     for benchmark in given.benchmarks:
         # What a first run compiles is stored.
-        for tree in (other, HERE):
-            run(tree, benchmark)
-        turns = [(run(other, benchmark), run(HERE, benchmark))
+        run(other, benchmark, target)
+        run(HERE, benchmark)
+        turns = [(run(other, benchmark, target), run(HERE, benchmark))
                  for _ in range(given.rounds)]
         before, after = (least(turn[side] for turn in turns) for side in (0, 1))
         print(f"{benchmark.replace('+', ' ')}")
@@ -79,7 +85,7 @@ def main() -> int:
             for old, new in zip(before[label], after[label], strict=False):
                 mark = " slower" if new > given.within * old else ""
                 slower |= bool(mark)
-                print(f"  {old:10.4g} s  {new:10.4g} s  {new / old:5.2f}{mark}  {label}",
+                print(f"  {old:10.4g} s  {new:10.4g} s  {new / max(old, 1e-12):5.2f}{mark}  {label}",
                       flush=True)
     return int(slower)
 

@@ -21,6 +21,7 @@ from fecontact.core.stored_code import (
     FOLDER,
     MADE_WITH,
     PACKAGE,
+    compiled_for,
     made_with,
     size_on_disk,
 )
@@ -169,7 +170,7 @@ def build_package(folder: Path, families: Sequence[str]) -> Path:
 def _compile_family(folder: Path, family: str) -> None:
     """Compile all kernels for a family of processors into a folder."""
     _run([sys.executable, "-m", "fecontact", "compile", "--all"],
-         _target(family) | {FOLDER: str(folder)})
+         compiled_for(family) | {FOLDER: str(folder)})
     say_made_with(folder, family)
 
 
@@ -177,14 +178,9 @@ def say_made_with(folder: Path, family: str) -> None:
     """Write what the kernels of a family in a folder are made with."""
     code = ("from numba.core.registry import cpu_target; "
             "print(*cpu_target.target_context.codegen().magic_tuple(), sep='|')")
-    target = _run([sys.executable, "-c", code], _target(family)).strip().split("|")
+    target = _run([sys.executable, "-c", code], compiled_for(family)).strip().split("|")
     (folder / MADE_WITH).write_text(json.dumps(made_with() | {"target": target}, indent=1) + "\n",
                                     encoding="utf-8")
-
-
-def _target(family: str) -> dict[str, str]:
-    """Environment variables by which numba compiles for a family alone."""
-    return {"NUMBA_CPU_NAME": family, "NUMBA_CPU_FEATURES": ""}
 
 
 def _run(command: Sequence[str], variables: dict[str, str] | None = None) -> str:

@@ -38,6 +38,11 @@ MADE_WITH = "made-with.json"
 NATIVE, FOLDER = "FECONTACT_NATIVE", "FECONTACT_KERNELS_FOLDER"
 
 
+def compiled_for(family: str) -> dict[str, str]:
+    """Environment variables by which numba compiles for a family alone."""
+    return {"NUMBA_CPU_NAME": family, "NUMBA_CPU_FEATURES": ""}
+
+
 class Prebuilt(NamedTuple):
     """Code of the package that serves this process: its folder, and numba's key of its target."""
 

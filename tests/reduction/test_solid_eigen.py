@@ -1,5 +1,6 @@
 """Modes of solids by factors and by multigrid, against closed forms and each other."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -68,6 +69,16 @@ def test_solvers_agree(body, name):
     last = 16 - int(direct[15] < direct[14] * (1.0 + 1e-6))
     cosines = np.linalg.svd(shapes[:, :last].T @ (M @ others), compute_uv=False)[:last]
     assert cosines == pytest.approx(np.ones(last), abs=1e-9)
+
+
+@pytest.mark.parametrize("eigensolver", ["direct", "iterative"])
+def test_modes_do_without_libraries_that_have_no_wheels_everywhere(cube, monkeypatch, eigensolver):
+    """METIS orders factors, PyAMG has coarse levels: others serve, with more memory."""
+    monkeypatch.setattr("fecontact.reduction.solvers.multigrid._FACTORISED", 0)
+    expected = eigenmodes(cube, 12, eigensolver)[0]
+    for name in ("pymetis", "pyamg"):
+        monkeypatch.setitem(sys.modules, name, None)
+    assert eigenmodes(cube, 12, eigensolver)[0][6:] == pytest.approx(expected[6:], rel=1e-10)
 
 
 def test_against_scipy(cube):

@@ -24,6 +24,8 @@ Start = tuple[CollocationProblem, Array, Array]
 Begun = tuple[CollocationProblem, Array, Array | None]
 
 _CORRECTIONS = 25
+# Samples before the last period through which its spline goes too.
+_BEFORE = 4
 # Times the intervals on which an orbit is found where the number asked for does not lead there.
 _FINER = (2, 4)
 # First amplitudes of orbits at a Hopf point, tried in this order. With a strongly curved friction
@@ -135,10 +137,17 @@ def from_samples(
 
 
 def _at_phases(t: Array, x: Array, period: float, forced: bool, phases: Array) -> Array:
-    """States (k, d) of a motion in its last period; phases of forced systems count from t = 0."""
+    """States (k, d) of a motion in its last period; phases of forced systems count from t = 0.
+
+    By a spline: the mesh follows high derivatives, which lines between samples do not have.
+    """
+    from scipy.interpolate import CubicSpline
+
     offset = 0.0 if forced else t[-1] / period
     place = t[-1] - period * np.mod(t[-1] / period - offset - phases, 1.0)
-    return np.stack([np.interp(place, t, column) for column in x.T], axis=1)
+    first = max(int(np.searchsorted(t, t[-1] - period)) - _BEFORE, 0)
+    times, kept = np.unique(t[first:], return_index=True)
+    return np.asarray(CubicSpline(times, x[first:][kept])(place))
 
 
 def along(problem: CollocationProblem, u: Array, ahead: PeriodicMotion, distance: float) -> Array:

@@ -10,6 +10,7 @@ import numpy as np
 
 from fecontact.core.compiled import kernel
 from fecontact.core.errors import AnalysisError
+from fecontact.core.extras import installed
 from fecontact.core.records import FlagVector, Matrix, ShortVector, Vector
 from fecontact.core.types import Array, Integers
 
@@ -81,8 +82,9 @@ def factorised(
     """Factors of a sparse symmetric positive definite matrix (n, n).
 
     ``nodes`` (n,) are the nodes of the rows of a solid, for which nested dissection of the graph of
-    its nodes needs several times less memory than minimum degree does. ``trouble`` is the message
-    of the error; other than the default one it makes SuperLU refuse indefinite matrices too.
+    its nodes needs several times less memory than minimum degree does, which serves where METIS is
+    not installed: there are no wheels of it for some systems. ``trouble`` is the message of the
+    error; other than the default one it makes SuperLU refuse indefinite matrices too.
 
     Raises
     ------
@@ -98,7 +100,7 @@ def factorised(
 
         # Positive definite matrices need no pivoting, which keeps the fill of the ordering.
         try:
-            if nodes is not None:
+            if nodes is not None and installed("pymetis"):
                 order = nested_dissection(matrix, nodes)
                 found = SuperLUFactors(
                     splu(matrix.tocsr()[order][:, order].tocsc(), permc_spec="NATURAL",

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.core.extras import installed
 from fecontact.core.types import Array
 from fecontact.reduction.solvers.block_rows import BlockRows, diagonal_product
 from fecontact.reduction.solvers.factorisation import factorised
@@ -112,7 +113,8 @@ def multigrid(fine: Any, coarse: Any, interpolation: Any, rigid: Array) -> Multi
     levels = []
     if interpolation is not None:
         levels.append(_nodal_level(fine, interpolation))
-    if coarse.shape[0] <= _FACTORISED:
+    # There are no wheels of PyAMG for some systems: factors of more memory serve there.
+    if coarse.shape[0] <= _FACTORISED or not installed("pyamg"):
         factors = factorised(coarse.tocsc(), np.arange(coarse.shape[0]) // 3)
         return Multigrid(levels, lambda right: factors.solve(
             right.astype(np.float64)).astype(np.float32))
