@@ -85,8 +85,8 @@ def main() -> int:
             for old, new in zip(before[label], after[label], strict=False):
                 mark = " slower" if new > given.within * old else ""
                 slower |= bool(mark)
-                print(f"  {old:10.4g} s  {new:10.4g} s  {new / max(old, 1e-12):5.2f}{mark}  {label}",
-                      flush=True)
+                ratio = new / max(old, 1e-12)
+                print(f"  {old:10.4g} s  {new:10.4g} s  {ratio:5.2f}{mark}  {label}", flush=True)
     return int(slower)
 
 

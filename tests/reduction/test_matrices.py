@@ -298,9 +298,10 @@ def test_files_of_another_kind(tmp_path, suffix):
 
 
 def test_other_files():
-    with pytest.raises(InputError, match=r"K\.op4: matrices are not read .* suffixes that are: "
-                                         r"\.dmig, \.mat, \.mm, \.mtx, \.npy, \.npz, \.pch"):
-        read_matrix("K.op4")
+    with pytest.raises(InputError, match=r"K\.op3: matrices are not read .* suffixes that are: "
+                                         r"\.dmig, \.full, \.mat, \.mm, \.mtx, \.npy, \.npz, "
+                                         r"\.op2, \.op4, \.pch"):
+        read_matrix("K.op3")
     with pytest.raises(InputError, match=r"K\.mtx: there is no such file"):
         read_matrix("K.mtx")
 

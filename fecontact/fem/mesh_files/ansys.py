@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError, MeshError, MissingLibraryError, ModelWarning, choices
+from fecontact.core.errors import InputError, MeshError, ModelWarning, choices
+from fecontact.core.extras import optional
 from fecontact.core.types import Array, Integers
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
 from fecontact.fem.mesh_files.raw import RawMesh
@@ -72,11 +73,7 @@ def read_cdb(path: Path) -> RawMesh:
     ModelWarning
         Of loads and supports, which the study gives, and of materials that are not read.
     """
-    try:
-        import mapdl_archive
-    except ImportError:
-        raise MissingLibraryError("Ansys archives are read by mapdl-archive, which is not "
-                                  "installed: pip install 'fecontact[ansys]'.") from None
+    mapdl_archive = optional("mapdl_archive", "Reading Ansys archives")
     text = path.read_text(encoding="utf-8", errors="replace")
     commands = _counted(text)
     refused = [f"{commands[name]} {what}" for name, what in _REFUSED.items() if commands[name]]

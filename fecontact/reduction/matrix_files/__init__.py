@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.checks import as_path, require_regular_file
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, MissingLibraryError
 from fecontact.core.files.hdf5_check import open_hdf5
 from fecontact.core.files.stored import array, npy_array, npz_arrays, reading, sound_sparse, values
 from fecontact.core.read_only import read_only_arrays
 from fecontact.reduction.matrix_files.abaqus import read_abaqus_matrix
+from fecontact.reduction.matrix_files.ansys import read_full
 from fecontact.reduction.matrix_files.names import chosen_name
-from fecontact.reduction.matrix_files.nastran import read_dmig
+from fecontact.reduction.matrix_files.nastran import read_dmig, read_op2, read_op4
 from fecontact.reduction.matrix_files.substructure import HEADING, read_substructure
 
 _BANNER = b"%%MatrixMarket"
@@ -69,23 +70,30 @@ def read_matrix(path: str | Path, name: str | None = None) -> AssembledMatrix:
     the text files of Abaqus' ``*MATRIX OUTPUT`` (.mtx) in the formats COORDINATE and MATRIX
     INPUT and of ``*SUBSTRUCTURE MATRIX OUTPUT`` (named STIFFNESS, MASS), and DMIG of Nastran's
     punch files (.pch, .dmig); the format of a .mtx file is found from its content. One triangle of
-    a symmetric matrix suffices.
+    a symmetric matrix suffices. By pyYeti (``fecontact[nastran]``) OUTPUT4 and OUTPUT2 of Nastran
+    (.op4, .op2): an external superelement (EXTSEOUT) has KXX and MXX in its OUTPUT4, and labels
+    if the punch file of the same name, .pch or .asm, lies beside it. By PyMAPDL's reader
+    (``fecontact[ansys]``) the equations of Ansys (.full; named STIFFNESS, MASS), without the
+    degrees of freedom that are held.
 
     Parameters
     ----------
     path : str or Path
         The file.
     name : str, optional
-        Name of the matrix in a file with several (.mat, .npz, MATRIX INPUT, DMIG, substructures).
+        Name of the matrix in a file with several.
 
     Raises
     ------
     InputError
         If the file or matrix does not exist, or the file is damaged or of another kind.
+    MissingLibraryError
+        If the library that reads such files is not installed.
     """
     path = as_path(path, "a matrix")
     readers = {".mtx": _read_mtx, ".mm": _read_mtx, ".mat": _read_mat, ".npz": _read_npz,
-               ".npy": _read_npy, ".pch": read_dmig, ".dmig": read_dmig}
+               ".npy": _read_npy, ".pch": read_dmig, ".dmig": read_dmig, ".op4": read_op4,
+               ".op2": read_op2, ".full": read_full}
     if path.suffix.lower() not in readers:
         raise InputError(f"{path}: matrices are not read from files of this kind; the suffixes "
                          f"that are: {', '.join(sorted(readers))}.")
@@ -96,7 +104,7 @@ def read_matrix(path: str | Path, name: str | None = None) -> AssembledMatrix:
         matrix, labels = readers[path.suffix.lower()](path, name)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    except MemoryError:
+    except (MemoryError, MissingLibraryError):
         raise
     except Exception as error:
         # Damaged files make readers raise anything.

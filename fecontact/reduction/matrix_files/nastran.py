@@ -1,9 +1,13 @@
-"""Matrices of Nastran as text: DMIG in bulk data and punch files (.pch, .dmig, .bdf).
+"""Matrices of Nastran: DMIG in bulk data and punch files (.pch, .dmig, .bdf), OUTPUT4 and OUTPUT2.
 
 A heading ``DMIG, NAME, 0, IFO, TIN`` says by IFO whether the matrix is square (1) or symmetric
 (6), of which one triangle is given. Each column ``DMIG, NAME, GJ, CJ, , G1, C1, A1, B1, G2, ...``
 holds the values A of rows (grid point G, component C); components of scalar points are 0. Fields
 are 8 or, after ``*``, 16 characters wide, or parted by commas.
+
+Files of OUTPUT4 (.op4) and OUTPUT2 (.op2) are read by pyYeti. They do not name the degrees of
+freedom; those of an external superelement are named by the card EXTRN of the file that Nastran
+punches beside it: points, each with digits of its components, 0 for scalar points.
 """
 
 from collections.abc import Iterator
@@ -13,11 +17,14 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.errors import InputError
+from fecontact.core.extras import optional
 from fecontact.core.types import Integers
 from fecontact.reduction.matrix_files.names import chosen_name
 
 _SYMMETRIC, _SQUARE = "6", "1"
 _COMPLEX = ("3", "4")
+# Suffixes of files that Nastran punches beside an external superelement.
+_PUNCHED = (".pch", ".asm")
 
 
 def read_dmig(path: Path, name: str | None) -> tuple[Any, Integers]:
@@ -35,7 +42,7 @@ def read_dmig(path: Path, name: str | None) -> tuple[Any, Integers]:
 
     headings: dict[str, list[str]] = {}
     entries: dict[str, list[tuple[int, int, int, int, float]]] = {}
-    for line, fields in _cards(path.read_text(encoding="utf-8", errors="replace")):
+    for line, fields in _cards(path, "DMIG"):
         own, rest = fields[0].upper(), fields[1:]
         if rest[0] == "0":
             headings[own] = rest
@@ -67,6 +74,48 @@ def read_dmig(path: Path, name: str | None) -> tuple[Any, Integers]:
     return sp.csc_array((values, (row, column)), shape=(size, size)), labels
 
 
+def read_op4(path: Path, name: str | None) -> tuple[Any, Integers | None]:
+    """Sparse matrix, and the labels (d, 2) of its degrees of freedom if a file beside has them.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, or a card EXTRN that cannot be read.
+    MissingLibraryError
+        If pyYeti is not installed.
+    """
+    op4 = optional("pyyeti.nastran.op4", "Reading OUTPUT4 of Nastran")
+    found = {key.upper(): matrix for key, matrix in op4.read(str(path), sparse=True).items()}
+    matrix = found[chosen_name(found, None if name is None else name.upper())]
+    for suffix in _PUNCHED:
+        beside = path.with_suffix(suffix)
+        labels = _external(beside) if beside.is_file() else None
+        if labels is not None and matrix.shape == (len(labels), len(labels)):
+            return matrix, labels
+    return matrix, None
+
+
+def read_op2(path: Path, name: str | None) -> tuple[Any, None]:
+    """Matrix of a file of OUTPUT2, without labels; errors as :func:`read_op4`."""
+    op2 = optional("pyyeti.nastran.op2", "Reading OUTPUT2 of Nastran")
+    with op2.OP2(str(path)) as file:
+        found = file.rdop2mats()
+    return found[chosen_name(found, None if name is None else name.upper())], None
+
+
+def _external(path: Path) -> Integers | None:
+    """Points and components (d, 2) of an external superelement; None without a card EXTRN."""
+    for line, fields in _cards(path, "EXTRN"):
+        words = [word for word in fields if word]
+        if len(words) % 2:
+            raise InputError(f"Card EXTRN of line {line} of {path} ends after a point.")
+        points = [_whole(line, word) for word in words[::2]]
+        return np.array([(point, int(digit)) for point, digits in zip(points, words[1::2],
+                                                                     strict=True)
+                         for digit in digits], np.int64)
+    return None
+
+
 def _column(line: int, fields: list[str]) -> Iterator[tuple[int, int, int, int, float]]:
     """Point and component of a column, then of a row, and the value, of one card."""
     point, component = (_whole(line, word) for word in fields[:2])
@@ -82,10 +131,11 @@ def _column(line: int, fields: list[str]) -> Iterator[tuple[int, int, int, int, 
             line, group[2])
 
 
-def _cards(text: str) -> Iterator[tuple[int, list[str]]]:
-    """Fields after the word DMIG of each card, with continuations, and the line of its begin."""
+def _cards(path: Path, name: str) -> Iterator[tuple[int, list[str]]]:
+    """Fields of each card of a name, with continuations, and the line of its begin."""
     card: list[str] | None = None
     begin = 0
+    text = path.read_text(encoding="utf-8", errors="replace")
     for number, raw in enumerate(text.splitlines(), start=1):
         line = raw.partition("$")[0].rstrip()
         if not line.strip():
@@ -96,7 +146,7 @@ def _cards(text: str) -> Iterator[tuple[int, list[str]]]:
             continue
         if card is not None:
             yield begin, card
-        card, begin = (fields if head.rstrip("*").upper() == "DMIG" else None), number
+        card, begin = (fields if head.rstrip("*").upper() == name else None), number
     if card is not None:
         yield begin, card
 
@@ -116,8 +166,8 @@ def _whole(line: int, word: str) -> int:
     try:
         return int(word)
     except ValueError:
-        raise InputError(f"Card of line {line}: {word[:40]!r} is no number of a point or component "
-                         f"of a DMIG.") from None
+        raise InputError(f"Card of line {line}: {word[:40]!r} is no number of a point or "
+                         f"component.") from None
 
 
 def _real(line: int, word: str) -> float:
