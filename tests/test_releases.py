@@ -39,8 +39,10 @@ def test_the_recipe_requires_what_the_wheel_requires(project, recipe):
     lines = recipe.partition("  run:\n")[2].partition("\n\n")[0].splitlines()
     required = [line.removeprefix("    - ").replace(" ", "") for line in lines]
     assert required[0] == f"python{project['requires-python']}"
+    # There are packages of conda for systems for which there are no wheels.
+    everywhere = {entry.partition(";")[0] for entry in project["dependencies"]}
     assert {re.sub(r"^[\w-]+", lambda name: CONDA.get(name[0], name[0]), entry)
-            for entry in required[1:]} == {entry.partition(";")[0] for entry in project["dependencies"]}
+            for entry in required[1:]} == everywhere
 
 
 @pytest.mark.parametrize("home", ["", "https://example.org/fecontact/"])

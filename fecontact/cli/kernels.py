@@ -17,12 +17,12 @@ from typing import Any
 from fecontact.core.errors import FecontactError, InputError, choices
 from fecontact.core.progress import counting_bar
 from fecontact.core.stored_code import (
-    FAMILIES,
     FOLDER,
     MADE_WITH,
     PACKAGE,
     compiled_for,
     made_with,
+    own_families,
     size_on_disk,
 )
 
@@ -141,13 +141,13 @@ def build_package(folder: Path, families: Sequence[str]) -> Path:
     Raises
     ------
     InputError
-        For a family that is not known.
+        For a family that is not known, or of another kind of processor.
     FecontactError
         If the kernels cannot be compiled or the wheel cannot be built.
     """
     for family in families:
-        if family not in FAMILIES:
-            raise InputError(f"{family!r} must be one of {choices(FAMILIES)}.")
+        if family not in own_families():
+            raise InputError(f"{family!r} must be one of {choices(own_families())}.")
     with tempfile.TemporaryDirectory() as place:
         package = Path(place, PACKAGE)
         for family in families:

@@ -9,6 +9,7 @@ import hashlib
 import inspect
 import json
 import os
+import platform
 import re
 import warnings
 from collections.abc import Iterable
@@ -25,11 +26,12 @@ from numba.core.caching import IndexDataCacheFile
 
 from fecontact.core.errors import ModelWarning
 
-# Families of processors, the newest first, and the features that tell them from the one before.
+# Families of processors, the newest first, and the features that tell them from older ones.
 _V2 = ("cx16", "popcnt", "sahf", "sse3", "ssse3", "sse4.1", "sse4.2")
 FAMILIES = {
     "x86-64-v3": (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"),
     "x86-64-v2": _V2,
+    "arm64": (),
 }
 PACKAGE = "fecontact_kernels"
 # Name of the file that says what code of a family was compiled with.
@@ -38,9 +40,21 @@ MADE_WITH = "made-with.json"
 NATIVE, FOLDER = "FECONTACT_NATIVE", "FECONTACT_KERNELS_FOLDER"
 
 
+def own_families() -> list[str]:
+    """Families of processors of the kind of this one, for which code can be compiled here."""
+    arm = platform.machine().lower() in ("arm64", "aarch64")
+    return [family for family in FAMILIES if (family == "arm64") == arm]
+
+
+def serves(family: str) -> bool:
+    """Whether this processor belongs to a family."""
+    features = get_host_cpu_features()
+    return family in own_families() and all(features.get(name) for name in FAMILIES[family])
+
+
 def compiled_for(family: str) -> dict[str, str]:
     """Environment variables by which numba compiles for a family alone."""
-    return {"NUMBA_CPU_NAME": family, "NUMBA_CPU_FEATURES": ""}
+    return {"NUMBA_CPU_NAME": "generic" if family == "arm64" else family, "NUMBA_CPU_FEATURES": ""}
 
 
 class Prebuilt(NamedTuple):
@@ -69,11 +83,10 @@ def prebuilt() -> Prebuilt | None:
     found = find_spec(PACKAGE)
     if found is None:
         return None
-    features = get_host_cpu_features()
     for place in found.submodule_search_locations or ():
-        for family, needed in FAMILIES.items():
+        for family in filter(serves, FAMILIES):
             file = Path(place, family, MADE_WITH)
-            if not file.is_file() or not all(features.get(name) for name in needed):
+            if not file.is_file():
                 continue
             versions = json.loads(file.read_text(encoding="utf-8"))
             target = tuple(versions.pop("target"))

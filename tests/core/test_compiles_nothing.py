@@ -27,7 +27,7 @@ def package(tmp_path_factory):
     subprocess.run([sys.executable, "-m", "fecontact", "compile", "--all"], check=True,
                    capture_output=True)
     folder = tmp_path_factory.mktemp("package")
-    family = folder / stored_code.PACKAGE / "x86-64-v2"
+    family = folder / stored_code.PACKAGE / stored_code.own_families()[-1]
     for file in SOURCES.rglob("__pycache__/*.nb?"):
         place = family / file.parent.parent.relative_to(SOURCES) / file.name.partition(".")[0]
         place.mkdir(parents=True, exist_ok=True)

@@ -2,22 +2,17 @@
 
 import json
 import os
-import platform
 import subprocess
 import sys
 
 import pytest
-from llvmlite.binding import get_host_cpu_features
 
 from fecontact.cli import kernels
 from fecontact.core import stored_code
 
-FAMILY = "x86-64-v2"
+FAMILY = stored_code.own_families()[-1]
 
-pytestmark = pytest.mark.skipif(
-    platform.machine().lower() not in ("x86_64", "amd64")
-    or not all(get_host_cpu_features().get(name) for name in stored_code.FAMILIES[FAMILY]),
-    reason="for processors of a family")
+pytestmark = pytest.mark.skipif(not stored_code.serves(FAMILY), reason="for processors of a family")
 
 CODE = """
 import numpy as np
@@ -47,7 +42,7 @@ def package(tmp_path_factory):
     """A folder with a package of one kernel, compiled for another processor than this one."""
     folder = tmp_path_factory.mktemp("package")
     family = folder / stored_code.PACKAGE / FAMILY
-    found = ready(NUMBA_CPU_NAME=FAMILY, NUMBA_CPU_FEATURES="", FECONTACT_KERNELS_FOLDER=family)
+    found = ready(**stored_code.compiled_for(FAMILY), FECONTACT_KERNELS_FOLDER=family)
     assert found == (0, 1, "None")
     assert list(family.rglob("kernels.normal_values.*.nbc"))
     kernels.say_made_with(family, FAMILY)
@@ -65,7 +60,7 @@ def test_kernels_of_the_package_are_not_compiled(package, tmp_path):
 
 
 @pytest.mark.parametrize("variables", [{"FECONTACT_NATIVE": "1"},
-                                       {"NUMBA_CPU_NAME": FAMILY, "NUMBA_CPU_FEATURES": ""}])
+                                       stored_code.compiled_for(FAMILY)])
 def test_native_code_is_compiled_on_request(package, tmp_path, variables):
     assert with_package(package, tmp_path, **variables) == (0, 1, "None")
     # Once; then it is there.

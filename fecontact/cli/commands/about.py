@@ -71,7 +71,8 @@ def compile_(
     wheel: Annotated[Path | None, Parameter(help=(
         "Folder for a package of all kernels instead, which other machines install."))] = None,
     cpu: Annotated[list[str] | None, Parameter(negative=(), help=(
-        "Processors of that package: x86-64-v3, x86-64-v2, or both, by default."))] = None,
+        "Processors of that package: x86-64-v3, x86-64-v2, arm64; all of this kind, by default."
+    ))] = None,
 ) -> int:
     """Compile ahead what runs need, once on this machine; a first run then begins at once.
 
@@ -80,9 +81,9 @@ def compile_(
     from fecontact.cli.kernels import build_package, compile_kernels
 
     if wheel is not None:
-        from fecontact.core.stored_code import FAMILIES
+        from fecontact.core.stored_code import own_families
 
-        echo(str(build_package(wheel, cpu or list(FAMILIES))))
+        echo(str(build_package(wheel, cpu or own_families())))
         return 0
     if cpu:
         raise InputError("--cpu is for a package of kernels; give --wheel FOLDER too.")
