@@ -41,6 +41,8 @@ BENCHMARKS = {
     "nonsmooth": ((), [(r"^b event-driven +rtol 1.0e-07 .* error (\S+)$", 0.0, 1e-5),
                        (r"^b smoothed +rtol 1.0e-07 .* error (\S+)$", 0.0, 1e-4),
                        (r"^c event-driven +rtol 1.0e-07 .* error (\S+)$", 0.0, 1e-4)]),
+    # The root of a^2 (1 + .075 a^2) = (.18 / .05)^2, and what higher harmonics add.
+    "nlvib": ((), [(r"^1 duffing .* (\S+)  bound$", 2.841, 0.05)]),
     "output": ((), [(r"^(\d+) nodes", 205.0, 50.0)]),
     "random_systems": ((), [(r"^all +10 +(\S+)", 1e-5, 1e-5),
                             (r"^finished (\d+) of 10", 10.0, 0.0)]),

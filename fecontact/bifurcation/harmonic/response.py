@@ -164,7 +164,8 @@ class FrequencyResponse(Summarised):
         row, observed = observed_row(field, observe)
         _require_observable(layout_of(field), row)
         return replace(self, observed=observed, branches=tuple(
-            _with_values(branch, _observed_along(branch, field, row), {"observed": observed})
+            _with_values(branch, _observed_along(branch, field, row),
+                         {"observed": observed, "observed_row": row})
             for branch in self.branches))
 
     def peak(self, level: int = 0) -> BranchPoint:
@@ -276,7 +277,7 @@ def frequency_response(
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
         try:
-            further = _told(field, observed, level_name, float(value))
+            further = _told(field, observed, row, level_name, float(value))
             both = low < first < high
             if method is None or isinstance(method, HarmonicBalance):
                 branch = branch_of_response(
@@ -611,12 +612,12 @@ def _require_observable(layout: Layout, row: Array) -> None:
 
 
 def _told(
-    field: VectorField, observed: str, level_name: str | None, level: float
+    field: VectorField, observed: str, row: Array, level_name: str | None, level: float
 ) -> dict[str, Any]:
     """Attributes of a branch of responses."""
     label = field.parameter_label(level_name) if level_name else ""
-    return {"observed": observed, "level": level, "level_name": level_name or "",
-            "level_label": label}
+    return {"observed": observed, "observed_row": row, "level": level,
+            "level_name": level_name or "", "level_label": label}
 
 
 def response_of(branches_by_name: Mapping[str, Branch]) -> FrequencyResponse:

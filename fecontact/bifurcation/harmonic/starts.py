@@ -155,7 +155,8 @@ def restored(field: VectorField, point: BranchPoint) -> Start:
         raise InputError(f"{point.place} has {len(point.u)} unknowns, which are not those of this "
                          f"field.")
     return (replace(problem, reference=problem.coefficients(point.u).copy(),
-                    limits=known.get("limits")), point.u, point.tangent)
+                    limits=known.get("limits"), row=known.get("observed_row")), point.u,
+            point.tangent)
 
 
 def method_of(attributes: Mapping[str, Any]) -> HarmonicBalance:
