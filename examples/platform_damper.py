@@ -117,7 +117,7 @@ def wheel(modes: int = 8, damper: str = "rigid") -> CyclicBasis:
              "next": pair_faces(every, "damper.right", "next_blade.under_left", nodes=2,
                                 nodes_on="face")}
     return cyclic_basis(
-        bodies, symmetry, faces, modes={"blade": modes, "damper": 3}, separate=["damper"],
+        bodies, symmetry, faces, modes={"blade": modes, "damper": 3},
         rigid=["damper"] if damper == "rigid" else (), damping=RATIO,
         points={"blade.tip": "tip", "damper.middle": "middle"},
         diameters=sorted({min(h * ORDER % N, -h * ORDER % N) for h in (0, 1, 3)}))

@@ -12,6 +12,7 @@ from fecontact import (
     Load,
     Material,
     Mesh,
+    ModelWarning,
     PointLoad,
     Rayleigh,
     basis_from_matrices,
@@ -254,6 +255,36 @@ def test_a_turning_wheel_has_the_frequencies_of_finite_elements(sector):
     assert abs(first_hz(turning, 1) / first_hz(still, 1) - 1.0) > 1e-3
 
 
+def test_stress_of_a_static_state_stiffens_as_that_of_the_rotation(sector):
+    """The state under the centrifugal force, in modes at rest, is the one that rotation takes."""
+    def made(**given):
+        return cyclic_basis({"s": sector}, SYMMETRY, {"shroud": shroud(sector)}, modes=1000,
+                            **given)
+
+    rest, plain = made(), Rotation(2000.0, stress_stiffening=False)
+    load = made(rotation=plain).basis.link_load
+    q = load / rest.basis.angular_frequencies**2
+    stressed = made(rotation=plain, prestress={"s": rest.fields(q, "s")})
+    turning, softer = made(rotation=Rotation(2000.0)), made(rotation=plain)
+    for k in range(3):
+        one, other, without = (np.linalg.eigvalsh(each.of(k).stiffness)[:5]
+                               for each in (stressed, turning, softer))
+        assert one == pytest.approx(other, rel=1e-8)
+        assert (other > without * 1.0001).any()
+
+
+@pytest.mark.parametrize("stiffening", [True, False])
+def test_speeds_beyond_divergence_are_said(sector, stiffening):
+    with pytest.warns(ModelWarning, match=r"Body 's': at the nodal diameters 0, 1, 2 the stiff"):
+        cyclic_basis({"s": sector}, SYMMETRY, {"shroud": shroud(sector)}, modes=6,
+                     rotation=Rotation(2e4, stress_stiffening=stiffening))
+
+
+def test_boundaries_that_no_body_has_are_named(sector):
+    with pytest.raises(InputError, match=r"no body has the boundaries 'l' and 'h'"):
+        cyclic_basis({"s": sector}, CyclicSymmetry("l", "h", N))
+
+
 def test_bad_wheels_are_refused(sector, wheel):
     pairing = shroud(sector)
     with pytest.raises(InputError, match=r"order = 5 must be .* acts as order 1"):
@@ -277,7 +308,7 @@ def test_bad_wheels_are_refused(sector, wheel):
         WholeWheel(wheel, np.zeros(N))
     for arguments, message in (
             ({"rigid": ["s"]}, "goes on into its neighbours"),
-            ({"separate": ["b"]}, r"separate names the body 'b'"),
+            ({"rigid": ["b"]}, r"rigid names the body 'b'"),
             ({"points": {"tip": "tip"}}, r"points names 'tip'.*such as 's\.tip'"),
             ({"modes": {}}, "modes lacks the body 's'"),
             ({"diameters": [3]}, r"cyclic_basis: diameters = \[3\] must be from 0 to N / 2 = 2")):

@@ -13,6 +13,7 @@ with rows W_a and W_b of node and foot and the rotation R by alpha. All sectors 
 such interface each, so that forces f at its nodes load the motion y with the conjugate rows.
 """
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.checks import as_texts, require_kind
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError, ModelWarning, choices, nearest
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.tables import located
 from fecontact.core.types import Array, ComplexArray
@@ -47,6 +48,8 @@ from fecontact.reduction.sector_rotation import (
 from fecontact.reduction.static_modes.residual_vectors import completing
 
 _OWNER = "cyclic_basis"
+# Eigenvalues of a stiffness are negative beyond this part of the largest.
+_NEGATIVE = 1e-9
 
 
 @read_only_arrays
@@ -161,7 +164,6 @@ def cyclic_basis(
     pairings: Mapping[str, Pairing] | None = None,
     *,
     modes: int | Mapping[str, int] = 20,
-    separate: Sequence[str] = (),
     rigid: Sequence[str] = (),
     points: Mapping[str, Place] | None = None,
     loads: Sequence[str] = (),
@@ -178,15 +180,16 @@ def cyclic_basis(
     Parameters
     ----------
     bodies : mapping of name to ElasticBody
-        Those of one sector, such as a blade with its part of the disc, and a damper.
+        Those of one sector, such as a blade with its part of the disc, and a damper. Bodies that
+        have neither of the boundaries of the symmetry do not go on into the next sector.
     symmetry : CyclicSymmetry
         N, the axis, and the boundaries at which bodies go on into the neighbours.
     pairings : mapping of interface to Pairing
         Where they may touch each other, or ``next_NAME``, see :meth:`CyclicSymmetry.next_sector`.
     modes : int or mapping of body to int
         Vibration modes of each nodal diameter, rigid ones included, at most all.
-    separate, rigid : sequence of str
-        Bodies without boundaries ``low`` and ``high``, such as dampers; which of them are rigid.
+    rigid : sequence of str
+        Which of the bodies without these boundaries are rigid.
     points : mapping of 'body.name' to place
         Points for loads and results.
     loads : sequence of 'body.boundary'
@@ -206,16 +209,16 @@ def cyclic_basis(
     InputError, MeshError
         For unknown names, faces that do not match, pairings of other meshes, and as
         :func:`~fecontact.reduction.sector_modes`.
+
+    Warns
+    -----
+    ModelWarning
+        Of a speed or stress beyond divergence or buckling: a body's stiffness is not positive.
     """
     require_kind(_OWNER, Mapping, bodies=bodies)
     require_kind(_OWNER, CyclicSymmetry, symmetry=symmetry)
     pairings, points, prestress = dict(pairings or {}), dict(points or {}), dict(prestress or {})
-    separate = _known("separate", separate, bodies)
     rigid = _known("rigid", rigid, bodies)
-    for name in rigid:
-        if name not in separate:
-            raise InputError(f"cyclic_basis: body '{name}' is rigid, but goes on into its "
-                             f"neighbours; name it among separate.")
     _known("prestress", prestress, bodies)
     counts = modes if isinstance(modes, Mapping) else dict.fromkeys(bodies, modes)
     for name, body in bodies.items():
@@ -227,6 +230,12 @@ def cyclic_basis(
             raise InputError(f"cyclic_basis: modes lacks the body '{name}'.")
     if not bodies:
         raise InputError("cyclic_basis: bodies is empty; give at least one.")
+    separate = _without_boundaries(bodies, symmetry)
+    for name in rigid:
+        if name not in separate:
+            raise InputError(f"cyclic_basis: body '{name}' is rigid, but goes on into its "
+                             f"neighbours; a rigid one has no boundaries '{symmetry.low}', "
+                             f"'{symmetry.high}'.")
     chosen = sorted({0, *chosen_diameters(symmetry, diameters, _OWNER)})
     nodes = SectorRows.of(bodies, symmetry, pairings, points)
     parts = {}
@@ -237,6 +246,8 @@ def cyclic_basis(
             parts[name] = {k: _modes_of_body(
                 body, symmetry, given, k, counts[name], nodes.loaded(name, k),
                 name in separate, name in rigid) for k in chosen}
+        if name not in separate:
+            _warn_beyond_divergence(name, parts[name])
     loaded = _loaded(bodies, loads)
     found = tuple(_diameter(k, {name: one[k] for name, one in parts.items()}, bodies, nodes,
                             damping, loaded) for k in chosen)
@@ -264,6 +275,29 @@ def cyclic_basis(
         contact_normals=nodes.normals, on_ground=nodes.on_ground,
         link_load=load if load.any() else None, parts=_parts(parts))
     return CyclicBasis(symmetry, dict(bodies), found, basis, nodes.gaps, tuple(loads))
+
+
+def _without_boundaries(
+    bodies: Mapping[str, ElasticBody], symmetry: CyclicSymmetry
+) -> tuple[str, ...]:
+    """Bodies that have none of the boundaries; InputError if it is none that has both."""
+    names = {symmetry.low, symmetry.high}
+    found = tuple(name for name, body in bodies.items() if not names & set(body.mesh.boundaries))
+    if len(found) == len(bodies):
+        known = sorted({one for body in bodies.values() for one in body.mesh.boundaries})
+        raise InputError(f"cyclic_basis: no body has the boundaries '{symmetry.low}' and "
+                         f"'{symmetry.high}' at which sectors meet; there are {choices(known)}.")
+    return found
+
+
+def _warn_beyond_divergence(name: str, modes: Mapping[int, "_BodyModes"]) -> None:
+    """Warn of diameters at which a body's stiffness, with rotation and stress, is not positive."""
+    beyond = [str(k) for k, one in modes.items()
+              if (squares := np.linalg.eigvalsh(one.stiffness))[0] < -_NEGATIVE * squares[-1]]
+    if beyond:
+        warnings.warn(f"Body '{name}': at the nodal diameters {listed(beyond)} the stiffness with "
+                      f"rotation and stress is not positive, as beyond divergence or buckling; "
+                      f"lower the speed or the load.", ModelWarning, stacklevel=3)
 
 
 def _known(what: str, names: Iterable[str], bodies: Mapping[str, Any]) -> tuple[str, ...]:
