@@ -57,13 +57,14 @@ class Structure:
         """K - (k w)^2 M + i k w (C - loss M)."""
         return self.K - (k * w)**2 * self.M + 1j * k * w * (self.C - loss * self.M)
 
-    def response(self, load, w, harmonics, samples, *, seen, start=None):
-        """Harmonics (H + 1,) of the displacement ``seen`` under Re(load exp(i w t)), and those
-        (H + 1, e) of the elements, from which the next one can start.
+    def response(self, load, w, harmonics, samples, *, seen, start=None, mean=0.0):
+        """Harmonics (H + 1,) of the displacement ``seen`` under Re(load exp(i w t)) + mean, and
+        those (H + 1, e) of the elements, from which the next one can start.
         """
         G = np.array([np.linalg.inv(self.dynamic(k, w)) for k in range(harmonics + 1)])
         driven = np.zeros((harmonics + 1, len(self.K)), complex)
         driven[1] = G[1] @ load
+        driven[0] = G[0].real @ (np.zeros(len(self.K)) + mean)
 
         def moved(u):
             f = self.forces(u, w, samples) @ self.rows
