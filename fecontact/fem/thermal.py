@@ -93,9 +93,15 @@ def thermal_forces(body: ElasticBody, temperatures: Array) -> Array:
     return found.ravel()
 
 
-def nodal_thermal_stress(body: ElasticBody, temperatures: Array) -> Array:
-    """Pressure (N,) at the nodes of a body that is held, mean over the adjacent elements [Pa]."""
+def held_stress(body: ElasticBody, temperatures: Array) -> Array:
+    """Stress (N, 4), of solids (N, 6), at the nodes of a body that cannot move [Pa].
+
+    The mean over the adjacent elements; what the body's strain adds is not in it.
+    """
     members, areas = body.basis.element_dofs.T, body.basis.dx.sum(axis=1)
     size = members.shape[1]
     moduli = np.bincount(members.ravel(), np.repeat(areas * thermal_moduli(body), size))
-    return np.asarray(moduli / np.bincount(members.ravel(), np.repeat(areas, size))) * temperatures
+    pressure = moduli / np.bincount(members.ravel(), np.repeat(areas, size)) * temperatures
+    found = np.zeros((len(temperatures), 4 if body.dimension == 2 else 6))
+    found[:, : 2 if body.dimension == 2 and body.plane == "stress" else 3] = -pressure[:, None]
+    return found

@@ -90,7 +90,7 @@ class ModalBasis(Summarised):
     parts : tuple of BodyPart
         The bodies, if there are several.
     link_load : (m,) array or None
-        Constant modal forces of preloaded links between bodies.
+        Constant modal forces of preloaded links between bodies, and of a change of temperature.
     springs : tuple of str
         Groups that are no interfaces, but nonlinear springs: one node each, which moves along its
         normal only.
@@ -409,7 +409,8 @@ class ModalBasis(Summarised):
             elements = elements[(elements[:, 0] >= first) & (elements[:, 0] < end)] - first
         return BodyFields(shapes.nodes[first:end], elements, shapes.shapes[first:end] @ values,
                           shapes.stress_terms[first:end]
-                          @ shapes.stress_coordinates(values[None])[0])
+                          @ shapes.stress_coordinates(values[None])[0],
+                          None if shapes.temperature is None else shapes.temperature[first:end])
 
     def with_dashpots(self, dashpots: Mapping[str | int, Sequence[float]]) -> "ModalBasis":
         """A copy with dashpots between points of the body and the inertial frame.

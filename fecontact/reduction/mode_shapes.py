@@ -16,7 +16,10 @@ from fecontact.fem.points import rotating_rows
 @read_only_arrays
 @dataclass(frozen=True, eq=False)
 class NonlinearStress:
-    """Stress of large deflections beside the linear one: a sum of products of coordinates.
+    """Stress beside that linear in the coordinates: a sum of their products.
+
+    Of large deflections these are of the degrees two and three; the stress of a change of
+    temperature in a body that is held has the degree zero.
 
     Term k is ``stress[..., k] prod_i Q_i^powers[k, i]`` with ``Q = coordinates @ q``.
 
@@ -25,9 +28,10 @@ class NonlinearStress:
     coordinates : (d, m) array
         Rows of the coordinates of modes with large deflections.
     powers : (p, d) integer array
-        Their exponents in each of p products, of the degrees two and three.
+        Their exponents in each of p products.
     stress : (N, 4, p), of solids (N, 6, p) array
-        Second stress of Piola and Kirchhoff at the nodes [Pa per unit of each product].
+        Stress at the nodes, of large deflections the second one of Piola and Kirchhoff [Pa per
+        unit of each product].
     """
 
     coordinates: Array
@@ -66,7 +70,9 @@ class ModeShapes:
     outline_nodes : (k,) integer array, optional
         Contact node to whose patch each facet of a solid's outline belongs, -1 for none.
     nonlinear_stress : NonlinearStress, optional
-        Stress of large deflections that is not linear in the coordinates.
+        Stress that is not linear in the coordinates, of large deflections or of temperature.
+    temperature : (N,) array, optional
+        Change of temperature at the nodes, whose expansion makes no stress [K].
     """
 
     nodes: Array
@@ -78,6 +84,7 @@ class ModeShapes:
     elements: Integers | None = None
     outline_nodes: Integers | None = None
     nonlinear_stress: NonlinearStress | None = None
+    temperature: Array | None = None
 
     @cached_property
     def stress_terms(self) -> Array:

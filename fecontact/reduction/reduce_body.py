@@ -28,6 +28,7 @@ from fecontact.fem.fields import BodyFields, body_elements, linear_cells, stress
 from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.fem.points import Place, Rows, place_rows
 from fecontact.fem.rotation import Rotation
+from fecontact.fem.thermal import Temperature, held_stress, nodal_temperatures, thermal_forces
 from fecontact.reduction.assembly.face_weld import FaceWeld
 from fecontact.reduction.assembly.links import Bushing, Link, Links, Weld
 from fecontact.reduction.damping import (
@@ -47,7 +48,7 @@ from fecontact.reduction.large_deflections.fit import condensed_body
 from fecontact.reduction.large_deflections.nodes import with_large_deflections
 from fecontact.reduction.large_deflections.options import LargeDeflections
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.reduction.mode_shapes import ModeShapes, ReductionQuality
+from fecontact.reduction.mode_shapes import ModeShapes, NonlinearStress, ReductionQuality
 from fecontact.reduction.prestress import (
     coupled,
     geometric_stiffness,
@@ -79,6 +80,7 @@ def modal_basis(
     loads: Sequence[Place] = (),
     rotation: Rotation | None = None,
     prestress: BodyFields | None = None,
+    temperature: Temperature | None = None,
     large_deflections: LargeDeflections | None = None,
     rows: Any = (),
     eigensolver: Eigensolver = "auto",
@@ -114,6 +116,8 @@ def modal_basis(
     prestress, large_deflections : BodyFields and LargeDeflections, optional
         Stress that stiffens the body, see :mod:`fecontact.reduction.prestress`; forces of large
         deflections, see :mod:`fecontact.reduction.large_deflections.forces`.
+    temperature : float, (N,) array or function of the coordinates, optional
+        Its change [K], a constant load that completes the modes; see :mod:`fecontact.fem.thermal`.
     rows : sequence of sparse (k, d N) arrays
         Further motions with forces; see :func:`fecontact.reduction.reduce_bodies`.
     eigensolver : 'auto', 'direct' or 'iterative'
@@ -150,11 +154,13 @@ def modal_basis(
         raise InputError("loads complete the modes only with reduction = 'residual' or "
                          "'craig-bampton'; choose one of these, or leave loads out.")
     if large_deflections is not None:
-        _check_large_deflections(large_deflections, reduction, rotation, prestress)
+        _check_large_deflections(large_deflections, reduction, rotation, prestress, temperature)
+    warm = None if temperature is None else _warmed(body, temperature, reduction)
+    expanding = None if warm is None else thermal_forces(body, warm)
     stress = None if prestress is None else geometric_stiffness(body, prestress)
     held = stress is not None and not resists_rotation(body, stress)
     system = FreeSystem.of(body, eigensolver, stress if held else None)
-    completing = loading(body, system, loads, points)
+    completing = loading(body, system, loads, points, expanding)
     # At B, C and the contact nodes there are forces, but no moments.
     at_points = sp.csr_array(displacement_rows(restriction, d))
     require_kind("modal_basis", Sequence, rows=rows)
@@ -206,6 +212,10 @@ def modal_basis(
             restriction=restriction,
             elements=elements,
             outline_nodes=None if d == 2 else _nodes_of_outline(body, face),
+            nonlinear_stress=None if warm is None else NonlinearStress(
+                np.zeros((0, len(w))), np.zeros((1, 0), dtype=np.int64),
+                held_stress(body, warm)[..., None]),
+            temperature=warm,
         ),
         quality=_quality(body, system, flexibility.of_rows(is_point), w, free_shapes, own,
                          forces),
@@ -216,6 +226,7 @@ def modal_basis(
         boundary_rows=rows[1:],
         rotation=None if turning is None else replace(turning, speed=0.0),
         stiffness=None if held or stress is None else coupled(w, shapes, stress),
+        link_load=None if expanding is None else expanding @ shapes,
     )
     if condensed is not None:
         assert large_deflections is not None
@@ -224,9 +235,17 @@ def modal_basis(
     return basis if turning is None else basis.with_rotation_speed(turning.speed)
 
 
+def _warmed(body: ElasticBody, temperature: Temperature, reduction: Reduction) -> Array:
+    """Changes of temperature (N,) at the nodes; InputError for modes without static responses."""
+    if reduction == "vibration":
+        raise InputError("temperature needs the static response to it: choose reduction = "
+                         "'residual' or 'craig-bampton'.")
+    return nodal_temperatures(body, temperature)
+
+
 def _check_large_deflections(
     given: LargeDeflections, reduction: Reduction, rotation: Rotation | None,
-    prestress: BodyFields | None,
+    prestress: BodyFields | None, temperature: Temperature | None,
 ) -> None:
     """Raise InputError for options that do not go with large deflections."""
     require_kind("modal_basis", LargeDeflections, large_deflections=given)
@@ -240,6 +259,9 @@ def _check_large_deflections(
         raise InputError("large_deflections and prestress do not go together; leave prestress out "
                          "and give the load to the system, where the deflection stresses the "
                          "body.")
+    if temperature is not None:
+        raise InputError("large_deflections and temperature do not go together; leave one of them "
+                         "out.")
 
 
 def reduce_bodies(
@@ -437,9 +459,13 @@ def _deforms(system: FreeSystem, forces: Array) -> Array:
 
 
 def loading(
-    body: ElasticBody, system: FreeSystem, loads: Sequence[Place], points: Mapping[str, Place]
+    body: ElasticBody, system: FreeSystem, loads: Sequence[Place], points: Mapping[str, Place],
+    further: Array | None = None,
 ) -> Array:
-    """Forces (f, k) on the free degrees of freedom of named loads, one along each axis."""
+    """Forces (f, k) on the free degrees of freedom of named loads, one along each axis.
+
+    ``further`` are nodal forces (d N,) beside them.
+    """
     require_kind("modal_basis", (list, tuple), loads=loads)
     found = [np.zeros((body.nodes.size, 0))]
     for load in loads:
@@ -453,6 +479,8 @@ def loading(
             if place not in body.references:
                 rows = rows[: body.dimension]  # moments act on reference points alone
             found.append(rows[rows.indptr[1:] > rows.indptr[:-1]].T.toarray())
+    if further is not None:
+        found.append(further[:, None])
     forces = np.asarray(body.expansion.T @ np.hstack(found))
     return forces[:, _deforms(system, forces)] if forces.shape[1] else forces
 

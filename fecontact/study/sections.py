@@ -196,6 +196,9 @@ class BasisSettings:
     prestress : bool
         Whether modes are those about the static state under ``[load]``, whose stress stiffens the
         body, which its supports have to hold.
+    temperature : float, optional
+        Change of temperature of the whole body from the state without stress [K], a constant load;
+        for 'residual' and 'craig-bampton'.
     large_deflections : LargeDeflections, optional
         ``[basis.large_deflections]``: forces of large deflections of some modes.
     """
@@ -216,6 +219,7 @@ class BasisSettings:
     select: tuple[int, ...] | None = None
     eigensolver: Literal["auto", "direct", "iterative"] = "auto"
     prestress: bool = False
+    temperature: Annotated[float | None, Unit("K")] = None
     large_deflections: LargeDeflections | None = None
 
     def __post_init__(self) -> None:
@@ -237,7 +241,7 @@ class BasisSettings:
     def options(self) -> dict[str, Any]:
         """Options of :func:`fecontact.modal_basis` that concern neither contact nor modes."""
         names = ("B", "C", "points", "reduction", "tolerance", "damping", "loads", "eigensolver",
-                 "large_deflections")
+                 "temperature", "large_deflections")
         return {name: getattr(self, name) for name in names}
 
     def modal_basis(

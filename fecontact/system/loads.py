@@ -52,7 +52,8 @@ def acting_loads(basis: ModalBasis, load: Load) -> Iterator[ActingLoad]:
         basis without rows of inertia, and places outside the body or for a basis without shapes.
     """
     if basis.link_load is not None:
-        yield ActingLoad("the preload of links", basis.link_load, 1.0, "they hold")
+        yield ActingLoad("the preload of links or the temperature", basis.link_load, 1.0,
+                         "they hold, or the body is held")
     d = basis.dimension
     components = basis.components
     if load.normal:

@@ -578,3 +578,17 @@ def implausible(study):
     bodies = PlannedBodies({"": study.elastic_body()}, study.contact_faces, system)
     return (*implausible_bodies(bodies),
             *implausible_values(Planned(system, study.t_end, np.zeros(system.size))))
+
+
+def test_a_temperature_is_a_load_of_the_body(tmp_path):
+    """A free beam grows by alpha DT in all directions."""
+    path = tmp_path / "warm.toml"
+    path.write_text(TINY.replace("modes = 5\n", "modes = 5\nreduction = \"residual\"\n"
+                                                "temperature = 80.0\n"))
+    basis = Study.read(path).modal_basis()
+    w, load = basis.angular_frequencies, basis.link_load
+    assert np.abs(load[w == 0.0]).max() < 1e-9 * np.abs(load).max()
+    moved = basis.fields(np.divide(load, w**2, out=np.zeros_like(w), where=w > 0.0))
+    assert moved.temperature == pytest.approx(80.0)
+    strain = np.ptp(moved.displacement[:, 0]) / 0.1
+    assert strain == pytest.approx(Material.named("aluminium").thermal_expansion * 80.0, rel=1e-6)

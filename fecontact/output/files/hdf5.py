@@ -192,7 +192,7 @@ def store_basis(group: Any, basis: ModalBasis) -> None:
     shapes = group.create_group("mode_shapes")
     for name in _MODE_SHAPES:
         store_compressed(shapes, name, getattr(basis.mode_shapes, name))
-    for name in ("elements", "outline_nodes"):
+    for name in ("elements", "outline_nodes", "temperature"):
         if getattr(basis.mode_shapes, name) is not None:
             store_compressed(shapes, name, getattr(basis.mode_shapes, name))
     if basis.mode_shapes.nonlinear_stress is not None:
@@ -319,7 +319,8 @@ def _read_mode_shapes(group: Any, modes: int, T: Array) -> ModeShapes:
             given, "stress", (N, components, len(powers)), 1e100))
     return ModeShapes(nodes, cells, outline, bounded(group, "shapes", (N, d, modes)),
                       bounded(group, "stress", (N, components, modes), 1e100),
-                      sound_sparse(restriction), _elements(group, N, d), nodes_of, nonlinear)
+                      sound_sparse(restriction), _elements(group, N, d), nodes_of, nonlinear,
+                      bounded(group, "temperature", (N,)) if "temperature" in group else None)
 
 
 def _elements(group: Any, nodes: int, dimension: int) -> Any:

@@ -174,12 +174,21 @@ def assembled_basis(
         springs=tuple(springs),
         first_passes=tuple(halves),
         rotation=_rotation(bases, places),
+        link_load=_constant_loads(bases),
     )
     for name, basis in bases.items():
         whole = _with_large_deflections(whole, name, basis, places.columns(name))
     joints = [link for link in (links.values() if isinstance(links, Mapping) else links)
               if not isinstance(link, NonlinearSpring)]
     return linked(whole, joints) if joints else whole
+
+
+def _constant_loads(bases: Mapping[str, ModalBasis]) -> Array | None:
+    """The constant modal forces (m,) of all bodies; None if there are none."""
+    if all(one.link_load is None for one in bases.values()):
+        return None
+    return np.concatenate([np.zeros(one.modes) if one.link_load is None else one.link_load
+                           for one in bases.values()])
 
 
 def _with_large_deflections(
@@ -277,6 +286,11 @@ class _Places:
             stress[nodes, :, self.columns(part.name)] = one.stress
         bent = [(part, one.nonlinear_stress) for part, one in given
                 if one.nonlinear_stress is not None]
+        temperature = None
+        if any(one.temperature is not None for _, one in given):
+            temperature = np.concatenate([
+                np.zeros(len(one.nodes)) if one.temperature is None else one.temperature
+                for _, one in given])
         elements = [one.cells if one.elements is None else one.elements for _, one in given]
         alike = len({array.shape[1] for array in elements}) == 1
         cells = [one.cells for _, one in given]
@@ -297,7 +311,8 @@ class _Places:
             outline=together(outlines), shapes=moved, stress=stress,
             restriction=sp.csr_array(sp.vstack(list(restriction))),
             elements=together(elements) if alike else None,
-            nonlinear_stress=self._joined_stress(bent) if bent else None)
+            nonlinear_stress=self._joined_stress(bent) if bent else None,
+            temperature=temperature)
 
     def _joined_stress(self, given: Sequence[tuple[BodyPart, NonlinearStress]]) -> NonlinearStress:
         """Nonlinear stress of all bodies, each of its own coordinates and nodes."""

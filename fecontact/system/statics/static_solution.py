@@ -14,8 +14,8 @@ from fecontact.fem.points import Place, place_rows
 from fecontact.fem.rotation import Rotation, centrifugal_force
 from fecontact.fem.thermal import (
     Temperature,
+    held_stress,
     nodal_temperatures,
-    nodal_thermal_stress,
     thermal_forces,
 )
 from fecontact.laws.excitation import BOUNDARY_STRESSES, Load
@@ -84,9 +84,7 @@ def static_solution(
     u = np.asarray(body.expansion @ system.deflection(body.expansion.T @ force))
     stress = stress_of(body, u[:, None], stress_axes)[:, :, 0]
     if warm is not None:
-        normal = 2 if body.dimension == 2 and body.plane == "stress" else 3
-        stress = stress.copy()
-        stress[:, :normal] -= nodal_thermal_stress(body, warm)[:, None]
+        stress = stress + held_stress(body, warm)
     return BodyFields(body.nodes, body_elements(body), u.reshape(-1, body.mesh.dimension), stress,
                       warm)
 
