@@ -105,8 +105,7 @@ def modal_basis(
     damping : float, (m,) sequence, Rayleigh, LossFactor, 'materials' or (m, m) array
         See :mod:`fecontact.reduction.damping`; the last ratio holds; 'materials': loss factors.
     reduction : 'vibration', 'residual' or 'craig-bampton'
-        Vibration modes alone; with residual vectors of forces at B, C and contact nodes, for exact
-        static deflections there; or fixed-interface and constraint modes.
+        Modes; with residual vectors for exact static deflections at points; or constraint modes.
     tolerance : float
         For 'residual': largest part missing of the static compliance there; zero keeps all vectors.
     loads : sequence of 'gravity' or place
