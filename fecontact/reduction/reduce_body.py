@@ -80,7 +80,7 @@ def modal_basis(
     loads: Sequence[Place] = (),
     rotation: Rotation | None = None,
     prestress: BodyFields | None = None,
-    temperature: Temperature | None = None,
+    temperature: "Temperature | None" = None,
     large_deflections: LargeDeflections | None = None,
     rows: Any = (),
     eigensolver: Eigensolver = "auto",
@@ -113,8 +113,7 @@ def modal_basis(
     rotation : Rotation, optional
         Displacements are those in the frame that rotates with the body, modes those at rest.
     prestress, large_deflections : BodyFields and LargeDeflections, optional
-        Stress that stiffens the body, see :mod:`fecontact.reduction.prestress`; forces of large
-        deflections, see :mod:`fecontact.reduction.large_deflections.forces`.
+        Stress that stiffens the body; forces of large deflections, see its own documentation.
     temperature : float, (N,) array or function of the coordinates, optional
         Its change [K], a constant load that completes the modes; see :mod:`fecontact.fem.thermal`.
     rows : sequence of sparse (k, d N) arrays
