@@ -174,8 +174,7 @@ def cyclic_basis(
 ) -> CyclicBasis:
     """Modes of one sector by nodal diameters, with its contact to itself and to the next sector.
 
-    Each body has residual vectors beside its modes: its static response to forces at contact nodes
-    and points is exact, in every diameter.
+    Residual vectors make static responses to forces at contact nodes and points exact.
 
     Parameters
     ----------
