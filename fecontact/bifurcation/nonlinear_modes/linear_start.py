@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fecontact.bifurcation.equilibria.equilibrium import steady_sliding
+from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium, steady_sliding
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.harmonic.response import rest_state
 from fecontact.core.errors import AnalysisError, InputError
@@ -16,6 +16,7 @@ from fecontact.laws.signals.base import Signal
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.system.complex_modes import ComplexModes
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.vector_field import VectorField
 
 XI = "xi"
 # Part of the largest eigenvalue up to which eigenvalues count as zero, those of rigid modes.
@@ -27,6 +28,8 @@ _ITERATIONS = 60
 _BELOW_LIMIT = 1e-6
 # Relative change of xi at which the search for the undamped motion ends.
 _SETTLED = 1e-13
+# Rates at the equilibrium, relative to the size of the equations, that are rounding.
+_AT_REST = 1e-9
 
 _Part = TypeVar("_Part", BoundaryLoad, Drive, Load)
 
@@ -37,8 +40,12 @@ class LinearStart:
 
     Attributes
     ----------
-    field : ContactField
+    field : VectorField
         The system without excitation, over xi.
+    values : (k,) array
+        Its parameters, with xi.
+    free : int
+        Index of xi among them.
     state : (d,) array
         Rest, or steady sliding.
     shape : (d,) complex array
@@ -49,12 +56,20 @@ class LinearStart:
         Orthonormal directions in which no stiffness holds the displacements.
     """
 
-    field: ContactField
+    field: VectorField
+    values: Array
+    free: int
     state: Array
     shape: ComplexArray
     angular_frequency: float
     xi: float
     loose: Array
+
+    @property
+    def displacements(self) -> int:
+        """Number m of displacements, the first states; all d states of a user's field."""
+        found = self.field
+        return found.system().basis.modes if isinstance(found, ContactField) else found.dimension
 
 
 def unforced(system: ContactSystem) -> ContactSystem:
@@ -120,6 +135,52 @@ def linear_start(
              else _stuck(preloaded, free.basis.modes))
     state = _sliding_where_open(free, state)
     A = field.derivatives(np.zeros(1), state[None], field.values)[1][0]
+    m = free.basis.modes
+    slope = np.zeros_like(A)
+    slope[m : 2 * m, m : 2 * m] = np.eye(m)
+    value, shape, xi = _undamped(A, slope, _eigenvalue(A, number))
+    _, sizes, rows = np.linalg.svd(A[m : 2 * m, :m])
+    loose = rows[sizes <= _LOOSE * m * sizes[0]]
+    # The parameter's own scale is that of the mode.
+    field = contact_field(free, {XI: (xi, with_mass_damping)})
+    return LinearStart(field, field.values, 0, state, shape, value, xi, loose)
+
+
+def linear_start_of_field(
+    field: VectorField, unfolding: str | None, number: int
+) -> LinearStart:
+    """The linear mode ``number``, from 1, of a user's field about its equilibrium.
+
+    The rates are linear in the unfolding parameter xi, which leaves the equilibrium where it is;
+    modes are counted at xi = 0.
+
+    Raises
+    ------
+    InputError
+        If there is no such mode, xi moves the equilibrium, or the field depends on time.
+    """
+    name = field.parameter_or_only(unfolding)
+    free = field.index(name)
+    if field.forcing_period(field.values) is not None:
+        raise InputError("nonlinear_mode: the field depends on time; leave out what excites it.")
+    rest = find_equilibrium(field, {name: 0.0})
+    beside = rest.values.copy()
+    beside[free] = 1.0
+    rates, A, _ = field.derivatives(np.zeros(1), rest.state[None], beside)
+    if np.abs(rates).max() > _AT_REST * float(np.linalg.norm(A[0])) * (
+            1.0 + float(np.linalg.norm(rest.state))):
+        raise InputError(f"nonlinear_mode: {name!r} moves the equilibrium of the field; unfolding "
+                         f"must name a damping, such as xi in x'' + f(x, x') - xi x' = 0.")
+    value, shape, xi = _undamped(rest.jacobian, A[0] - rest.jacobian,
+                                 _eigenvalue(rest.jacobian, number))
+    values = rest.values.copy()
+    values[free] = xi
+    return LinearStart(field, values, free, rest.state, shape, value, xi,
+                       np.zeros((0, field.dimension)))
+
+
+def _eigenvalue(A: Array, number: int) -> complex:
+    """Eigenvalue of the mode ``number``, from 1; InputError if there is none."""
     modes = ComplexModes.of(A, zero=_ZERO)
     count = len(modes.eigenvalues)
     if not (isinstance(number, int | np.integer) and not isinstance(number, bool)
@@ -127,13 +188,7 @@ def linear_start(
         found = listed_frequencies(modes) if count else "none"
         raise InputError(f"mode = {number!r} must be the number of an oscillating mode, from 1 to "
                          f"{count}; the frequencies at rest are: {found}.")
-    m = free.basis.modes
-    value, shape, xi = _undamped(A, m, complex(modes.eigenvalues[number - 1]))
-    _, sizes, rows = np.linalg.svd(A[m : 2 * m, :m])
-    loose = rows[sizes <= _LOOSE * m * sizes[0]]
-    # The parameter's own scale is that of the mode.
-    field = contact_field(free, {XI: (xi, with_mass_damping)})
-    return LinearStart(field, state, shape, value, xi, loose)
+    return complex(modes.eigenvalues[number - 1])
 
 
 def _stuck(state: Array, modes: int) -> Array:
@@ -162,24 +217,23 @@ def listed_frequencies(modes: ComplexModes) -> str:
     return ", ".join(shown) + (" ..." if len(modes.frequencies_hz) > 8 else "") + " Hz"
 
 
-def _undamped(A: Array, m: int, value: complex) -> tuple[float, ComplexArray, float]:
+def _undamped(A: Array, E: Array, value: complex) -> tuple[float, ComplexArray, float]:
     """Frequency, shape and xi for which the eigenvalue followed from ``value`` is i w.
 
-    With the state [q, q', z] the matrix is A + xi E, E = diag(0, I, 0); Newton's method for the
-    real part, with the slope ``s^T E r / s^T r`` of left and right eigenvectors.
+    The matrix is A + xi E, of the state [q, q', z] of a contact system with E = diag(0, I, 0);
+    Newton's method for the real part, with the slope ``s^T E r / s^T r`` of left and right
+    eigenvectors.
     """
     from scipy.linalg import eig
 
-    E = np.zeros(len(A))
-    E[m : 2 * m] = 1.0
     xi = 0.0
     for _ in range(_ITERATIONS):
-        eigenvalues, left, right = eig(A + xi * np.diag(E), left=True)
+        eigenvalues, left, right = eig(A + xi * E, left=True)
         at = int(np.argmin(np.abs(eigenvalues - value)))
         value, s, r = complex(eigenvalues[at]), left[:, at].conj(), right[:, at]
         if not value.imag > 0.0:
             break
-        slope = complex((s * E) @ r / (s @ r))
+        slope = complex(s @ E @ r / (s @ r))
         change = -value.real / slope.real
         xi, value = xi + change, value + change * slope
         if abs(change) <= _SETTLED * abs(value):

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.observed import observed_values
 from fecontact.bifurcation.harmonic.problem import HarmonicLinearisation, HarmonicProblem
 from fecontact.core.errors import AnalysisError
@@ -116,24 +117,17 @@ class ModeProblem(HarmonicProblem):
 
     def _grown(self, u: Array) -> Array:
         """Scales enlarged with the motion; those of period and xi follow the frequency."""
-        found, ratio = super()._grown(u), PERIOD_SCALE * self.period(u) / self.scales[-2]
-        if 1.0 / _FOLLOWED < ratio < _FOLLOWED:
-            return found
-        return np.append(found[:-2], [found[-2] * ratio, found[-1] / ratio])
+        return with_frequency(super()._grown(u), self.period(u))
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, velocities, truncation errors, and what is observed."""
         T, X = self.period(u), self.coefficients(u)
         error, residual = linearisation.neglected
-        k = np.repeat(np.arange(1, self.harmonics + 1), 2)[:, None]
-        m = self.layout.displacements
-        # Of mass-normalised modes: twice the mean kinetic energy.
-        square = 0.5 * float(((2.0 * np.pi / T * k * X[1:, :m]) ** 2).sum())
-        found = {"period": T, "mean_square_velocity": square, "truncation_error": error,
-                 "residual": residual, **observed_values(self.layout, X, T, self.row)}
+        found = {**motion_values(self.layout, X, T, self.row), "truncation_error": error,
+                 "residual": residual}
         if self.conservative and self.stability is not None:
             floquet = linearisation.floquet
-            found |= {"multipliers": floquet.multipliers, "stable": _none_grows(
+            found |= {"multipliers": floquet.multipliers, "stable": none_grows(
                 floquet.multipliers, 1 + len(self.loose)), "trivial_error": floquet.trivial_error}
         if self.layout.memory:
             found["memory"] = linearisation.memory
@@ -167,7 +161,28 @@ class ModeProblem(HarmonicProblem):
         return {}
 
 
-def _none_grows(multipliers: ComplexArray, pairs: int) -> bool:
+def motion_values(layout: Layout, X: Array, period: float, row: Array) -> dict[str, Any]:
+    """Values to store of a motion with coefficients X (2 H + 1, b).
+
+    'period', 'mean_square_velocity' of the displacements (NaN without any), and what is observed.
+    """
+    m = layout.displacements
+    k = np.repeat(np.arange(1, len(X) // 2 + 1), 2)[:, None]
+    # Of mass-normalised modes: twice the mean kinetic energy.
+    square = 0.5 * float(((2.0 * np.pi / period * k * X[1:, :m]) ** 2).sum()) if m else np.nan
+    return {"period": period, "mean_square_velocity": square,
+            **observed_values(layout, X, period, row)}
+
+
+def with_frequency(scales: Array, period: float) -> Array:
+    """Scales whose last two, of period and xi, follow the frequency of the motion."""
+    ratio = PERIOD_SCALE * period / scales[-2]
+    if 1.0 / _FOLLOWED < ratio < _FOLLOWED:
+        return scales
+    return np.append(scales[:-2], [scales[-2] * ratio, scales[-1] / ratio])
+
+
+def none_grows(multipliers: ComplexArray, pairs: int) -> bool:
     """Whether no multiplier (d,) lies outside the unit circle, but for double ones at one.
 
     They belong to phase and amplitude, and to rigid motions; rounding parts them.

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -14,30 +15,38 @@ from fecontact.bifurcation.continuation.problem import (
     ContinuationOptions,
     options_of,
 )
-from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.stalled import stall_reason
+from fecontact.bifurcation.nonlinear_modes.by_shooting import (
+    ShootingMode,
+    followed_by_shooting,
+    leaving_by_shooting,
+)
 from fecontact.bifurcation.nonlinear_modes.linear_start import (
     XI,
     LinearStart,
     linear_start,
+    linear_start_of_field,
     unforced,
     with_mass_damping,
 )
 from fecontact.bifurcation.nonlinear_modes.mode_problem import PERIOD_SCALE, ModeProblem
+from fecontact.bifurcation.orbit_methods import Shooting
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
-from fecontact.core.types import Array, ComplexArray
+from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.initial_state import initial_state
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 
@@ -65,9 +74,9 @@ class NonlinearMode(Summarised):
 
     The points of its branch run over xi; they store 'period', 'mean_square_velocity',
     'observed_amplitude' and 'observed_harmonics' as those of a
-    :class:`~fecontact.bifurcation.FrequencyResponse`, 'truncation_error' and 'residual', and if
-    nothing is lost 'multipliers' and 'stable'. A point of kind 'branch point' is where a mode meets
-    another one.
+    :class:`~fecontact.bifurcation.FrequencyResponse`, 'truncation_error' and 'residual' (by
+    harmonic balance), and if nothing is lost 'multipliers' and 'stable'. A point of kind 'branch
+    point', by harmonic balance, is where a mode meets another one.
 
     Attributes
     ----------
@@ -123,11 +132,11 @@ class NonlinearMode(Summarised):
 
     @property
     def energy(self) -> Array | None:
-        """Energy (N,) of the motion above that of rest [J]; None unless conservative.
+        """Energy (N,) of the motion above that of rest [J]; None with losses, and of fields.
 
         The integral of Omega dJ along the mode over its action ``J = int q'^T q' dt / (2 pi)``.
         """
-        if not self.conservative:
+        if not self.conservative or np.isnan(self._square).any():
             return None
         w = self.angular_frequency
         return _integral(w, np.asarray(self._square / w))
@@ -147,15 +156,17 @@ class NonlinearMode(Summarised):
         return np.asarray(self.branch.column("observed_harmonics")[:, k])
 
     def coordinates(self, k: int = 1) -> ComplexArray:
-        """Complex harmonic (N, m) of the modal coordinates q: the shape of the mode.
+        """Complex harmonic (N, m) of the modal coordinates q, or of all states of a field.
 
         Raises
         ------
         InputError
-            If the motion has fewer harmonics.
+            If the motion has fewer harmonics, or was found by shooting.
         """
         known = self.branch.attributes
-        H, m, b = int(known["harmonics"]), int(known["displacements"]), layout_from(known).harmonic
+        _require_harmonics(self.branch, "coordinates")
+        layout = layout_from(known)
+        H, m, b = int(known["harmonics"]), layout.displacements or layout.states, layout.harmonic
         if not (isinstance(k, int | np.integer) and 0 <= k <= H):
             raise InputError(f"coordinates: k = {k!r} must be a whole number from 0 to {H}, the "
                              f"number of harmonics.")
@@ -187,6 +198,10 @@ class NonlinearMode(Summarised):
         InputError
             If the mode has no such amplitude or frequency, or has it several times.
         """
+        _require_harmonics(self.branch, "at")
+        if not int(self.branch.attributes["displacements"]):
+            raise InputError("NonlinearMode.at: is for modes of contact systems; take the points "
+                             "of the mode.")
         if (amplitude is None) == (frequency_hz is None):
             raise InputError("NonlinearMode.at: give either amplitude or frequency_hz.")
         if amplitude is not None:
@@ -227,12 +242,13 @@ class NonlinearMode(Summarised):
 
 @one_blas_thread
 def nonlinear_mode(
-    system: ContactSystem, bounds: tuple[float, float], mode: int = 1, *,
-    observe: tuple[str | int, str] = ("B", "x"), method: HarmonicBalance | None = None,
+    system: ContactSystem | VectorField, bounds: tuple[float, float], mode: int = 1, *,
+    observe: tuple[str | int, str] | ArrayLike = ("B", "x"),
+    method: HarmonicBalance | Shooting | None = None,
     options: ContinuationOptions | None = None,
-    preload: LoadHistory | RestState | Array | None = None,
+    preload: LoadHistory | RestState | Array | None = None, unfolding: str | None = None,
 ) -> NonlinearMode:
-    r"""A nonlinear mode by harmonic balance: frequency, damping and shape over the amplitude.
+    r"""A nonlinear mode: frequency, damping and shape over the amplitude.
 
     Extended periodic motion concept: a negative damping makes the motion periodic,
 
@@ -245,21 +261,25 @@ def nonlinear_mode(
 
     Parameters
     ----------
-    system : ContactSystem
+    system : ContactSystem or VectorField
         With smoothed laws.
     bounds : (float, float)
         Amplitudes at which the mode begins and ends [m, rad for a rotation].
     mode : int
         Number of the linear mode, from 1, in the order of frequencies.
-    observe : (point, component)
-        Displacement, half the range of which is the amplitude.
-    method : HarmonicBalance, optional
-        Harmonics, samples; kinks need many samples.
+    observe : (point, component) or (d,) sequence
+        Displacement, half the range of which is the amplitude; see
+        :func:`fecontact.bifurcation.frequency_response`.
+    method : HarmonicBalance or Shooting, optional
+        Kinks need many samples. Shooting is for contact systems, friction without memory.
     options : ContinuationOptions, optional
         By default up to 2000 points, step 0.02, largest_step 0.06, longer with many modes: changes
         relative to amplitude, a fifth of the frequency, a damping ratio of 0.1. Without bounds.
     preload : LoadHistory, RestState or (d,) array, optional
-        As for :func:`fecontact.bifurcation.frequency_response`.
+        As for responses.
+    unfolding : str, optional
+        Parameter xi of a field, linear in its rates as in ``x'' + f(x, x') - xi x' = 0``, by
+        default its only one; zero is the field itself.
 
     Raises
     ------
@@ -271,29 +291,63 @@ def nonlinear_mode(
     M. Krack, Nonlinear modal analysis of nonconservative systems: extension of the periodic motion
     concept, Computers and Structures 154 (2015).
     """
-    require_kind("nonlinear_mode", ContactSystem, system=system)
-    require_kind("nonlinear_mode", (HarmonicBalance, type(None)), method=method)
+    require_kind("nonlinear_mode", (ContactSystem, VectorField), system=system)
+    require_kind("nonlinear_mode", (HarmonicBalance, Shooting, NoneType), method=method)
+    require_kind("nonlinear_mode", (str, NoneType), unfolding=unfolding)
     low, high = _amplitudes(bounds)
+    start = _begun(system, mode, preload, unfolding)
     # Of proportional coordinates each adds to the length of a step.
-    longer = max(1.0, np.sqrt(0.5 * system.basis.modes))
+    longer = max(1.0, np.sqrt(0.5 * start.displacements))
     given = options_of(options or ContinuationOptions(
         points=_POINTS, step=_STEP * longer, largest_step=_LARGEST * longer), None)
-    start = linear_start(system, mode,
-                         None if preload is None else initial_state(system, preload, 0.0))
     row, observed = observed_row(start.field, observe)
+    ends = _between(given, low, high)
+    further = {"observed": observed, "mode_number": int(mode), "rest": start.state[
+        : start.displacements]}
     chosen = method or HarmonicBalance()
-    problem, u, leaving = _leaving(start, row, observed, low, chosen)
+    begin = (leaving_by_shooting(start, *_first_motion(start, row, observed, low), row,
+                                 _lossless(start), chosen) if isinstance(chosen, Shooting)
+             else _leaving(start, row, observed, low, chosen))
     try:
-        branch = branches.follow(problem, u, leaving, chosen, _between(given, low, high))
+        branch = _followed(start, begin, chosen, ends)
     except FecontactError as error:
         raise AnalysisError(f"No nonlinear mode was followed from the linear one at "
                             f"{start.angular_frequency / (2.0 * np.pi):.5g} Hz and the amplitude "
                             f"{low:g}; begin at a smaller one, where the motion is linear "
                             f"({error})") from None
-    branch = replace(branch, message=stall_reason(start.field, branch))
-    return NonlinearMode(_ended(branch, {
-        "observed": observed, "mode_number": int(mode), "conservative": problem.conservative,
-        "rigid_motions": problem.loose, "rest": problem.home}), mode, observed)
+    return NonlinearMode(_ended(branch, further), mode, observed)
+
+
+def _followed(
+    start: LinearStart, begin: tuple[ModeProblem | ShootingMode, Array, Array],
+    method: HarmonicBalance | Shooting, options: ContinuationOptions,
+) -> Branch:
+    """The branch of a mode from its start by either method."""
+    problem, u, leaving = begin
+    if isinstance(problem, ShootingMode):
+        return followed_by_shooting(problem, u, leaving, options)
+    assert isinstance(method, HarmonicBalance)
+    branch = branches.follow(problem, u, leaving, method, options)
+    return replace(branch, message=stall_reason(start.field, branch), attributes={
+        **branch.attributes, "conservative": problem.conservative, "rigid_motions": problem.loose})
+
+
+def _begun(
+    system: ContactSystem | VectorField, mode: int,
+    preload: LoadHistory | RestState | Array | None, unfolding: str | None,
+) -> LinearStart:
+    """The linear mode of a system or field."""
+    if isinstance(system, ContactSystem):
+        if unfolding is not None:
+            raise InputError("nonlinear_mode: unfolding is for vector fields; the negative damping "
+                             "of a contact system is that of all its masses.")
+        return linear_start(system, mode,
+                            None if preload is None else initial_state(system, preload, 0.0))
+    if isinstance(system, ContactField):
+        raise InputError("nonlinear_mode: give the contact system in place of its field.")
+    if preload is not None:
+        raise InputError("nonlinear_mode: preload is for contact systems.")
+    return linear_start_of_field(system, unfolding, mode)
 
 
 def continued_mode(
@@ -319,6 +373,13 @@ def continued_mode(
     return replace(mode, branch=replace(
         mode.branch, points=(*points, *ended.points[1:]), status=ended.status,
         message=ended.message))
+
+
+def _require_harmonics(branch: Branch, name: str) -> None:
+    """Raise InputError unless a mode was found by harmonic balance."""
+    if "harmonics" not in branch.attributes:
+        raise InputError(f"NonlinearMode.{name}: the mode was found by shooting and has no "
+                         f"harmonics of its coordinates; find it by HarmonicBalance().")
 
 
 def _bracket(name: str, values: Array, wanted: float, unit: str) -> int:
@@ -375,7 +436,7 @@ def mode_of(branch: Branch) -> NonlinearMode:
         If it is not that of a mode.
     """
     known = branch.attributes
-    if not {"mode_number", "observed", "displacements"} <= set(known) or not len(branch):
+    if not {"mode_number", "observed"} <= set(known) or not len(branch):
         raise InputError("The branch is not that of a nonlinear mode; make one with "
                          "nonlinear_mode.")
     return NonlinearMode(branch, int(known["mode_number"]), str(known["observed"]))
@@ -393,30 +454,43 @@ def _leaving(
     start: LinearStart, row: Array, observed: str, amplitude: float, method: HarmonicBalance
 ) -> tuple[ModeProblem, Array, Array]:
     """Problem, unknowns and direction of the linear mode at a small amplitude."""
-    field, d, w = start.field, start.field.dimension, start.angular_frequency
-    seen = complex(row @ start.shape)
-    m = field.system().basis.modes
+    d, m, T = start.field.dimension, start.displacements, 2.0 * np.pi / start.angular_frequency
     starts.require_mean(method, start.state[:m])
-    if abs(seen) <= _LEAST_SEEN * np.linalg.norm(row[:m]) * np.linalg.norm(start.shape[:m]):
-        raise InputError(f"{observed} does not move in this mode, at {w / (2.0 * np.pi):.5g} Hz, "
-                         f"or hardly; observe another displacement.")
-    # The observed displacement begins at its largest value.
-    shape = start.shape * amplitude / seen
-    sizes = np.abs(shape)
-    sizes = np.maximum(sizes, _LEAST_SCALE * sizes[:m].max())
-    T = 2.0 * np.pi / w
-    scales = np.concatenate([sizes, [PERIOD_SCALE * T, _XI_SCALE * w]])
-    plain = starts.problem_for(field, field.values, 0, method, scales)
+    shape, scales = _first_motion(start, row, observed, amplitude)
+    plain = starts.problem_for(start.field, start.values, start.free, method, scales)
     waves = np.exp(2.0j * np.pi * plain.series.times)[:, None]
     leaving = starts.unknowns(plain, (waves * shape).real, 0.0)
     leaving[-2:] = 0.0
     u = starts.unknowns(plain, np.tile(start.state, (plain.samples, 1)), T) + leaving
-    lossless = abs(start.xi) <= _CONSERVATIVE * w and not plain.layout.memory
+    lossless = _lossless(start) and not plain.layout.memory
     problem = _mode_problem(
         plain, reference=plain.coefficients(leaving).copy(), limits=np.full(d, np.inf), row=row,
         conservative=lossless, loose=start.loose, home=start.state[:m],
         kept=plain.kept.left_by(start.state[None]) if plain.layout.memory else plain.kept)
     return problem, u, leaving / np.sqrt(problem.weights() @ leaving**2)
+
+
+def _first_motion(
+    start: LinearStart, row: Array, observed: str, amplitude: float
+) -> tuple[ComplexArray, Array]:
+    """Shape (d,) of the linear mode at an amplitude, and scales (d + 2,) of states, T and xi.
+
+    The observed displacement begins at its largest value.
+    """
+    m, w, shape = start.displacements, start.angular_frequency, start.shape
+    seen = complex(row @ shape)
+    if abs(seen) <= _LEAST_SEEN * np.linalg.norm(row[:m]) * np.linalg.norm(shape[:m]):
+        raise InputError(f"{observed} does not move in this mode, at {w / (2.0 * np.pi):.5g} Hz, "
+                         f"or hardly; observe another displacement.")
+    shape = shape * amplitude / seen
+    sizes = np.abs(shape)
+    sizes = np.maximum(sizes, _LEAST_SCALE * sizes[:m].max())
+    return shape, np.concatenate([sizes, [PERIOD_SCALE * 2.0 * np.pi / w, _XI_SCALE * w]])
+
+
+def _lossless(start: LinearStart) -> bool:
+    """Whether nothing is lost in the linear mode."""
+    return abs(start.xi) <= _CONSERVATIVE * start.angular_frequency
 
 
 def _mode_problem(plain: HarmonicProblem, **changes: Any) -> ModeProblem:

@@ -198,16 +198,15 @@ def cyclic_basis(
     diameters : sequence of int or 'all'
         Nodal diameters up to N / 2; 0 is always there. Engine order m needs those of all h m.
     rotation : Rotation, optional
-        At its speed about the axis. The stress is that of each body under its supports alone; where
-        bodies press on each other switch it off and give the common state as ``prestress``.
+        With the stress of each body under its supports alone; where bodies press on each other
+        switch it off and give the common state as ``prestress``.
     prestress : mapping of body to BodyFields, optional
         Whose stress stiffens the bodies; see :meth:`CyclicBasis.fields`.
 
     Raises
     ------
     InputError, MeshError
-        For unknown names, faces that do not match, pairings of other meshes, and as
-        :func:`~fecontact.reduction.sector_modes`.
+        For unknown names, faces or pairings that do not match; see :func:`sector_modes`.
 
     Warns
     -----

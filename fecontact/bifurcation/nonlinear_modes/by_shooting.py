@@ -1,0 +1,139 @@
+"""Nonlinear modes by shooting: periodic motions under negative damping from runs."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.harmonic.layout import Layout
+from fecontact.bifurcation.nonlinear_modes.linear_start import XI, LinearStart
+from fecontact.bifurcation.nonlinear_modes.mode_problem import (
+    motion_values,
+    none_grows,
+    with_frequency,
+)
+from fecontact.bifurcation.orbit_methods import Shooting
+from fecontact.bifurcation.orbits.shooting import ShootingProblem
+from fecontact.bifurcation.orbits.shooting_branches import attributes_of
+from fecontact.core.errors import InputError
+from fecontact.core.types import Array, ComplexArray
+
+# Harmonics of what is observed, from the samples of the runs.
+_HARMONICS = 63
+
+
+@dataclass(frozen=True, eq=False)
+class ShootingMode(ShootingProblem):
+    """Orbits of an autonomous system over xi, with what is observed of them.
+
+    Multipliers are stored of conservative motions alone; none makes a special point.
+
+    Attributes
+    ----------
+    row : (d,) array
+        What is observed.
+    conservative : bool
+        Whether xi is zero but for rounding where the mode begins.
+    """
+
+    row: Array = field(default_factory=lambda: np.zeros(0))
+    conservative: bool = False
+
+    ends: ClassVar[Mapping[str, BranchStatus]] = {}
+
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
+        """Period, velocities, extremes, and what is observed; stability where nothing is lost."""
+        found = super().point(u, linearisation, tangent)
+        T, d = self.period(u), self.field.dimension
+        samples = linearisation.paths[:, :-1].reshape(-1, d)
+        m = d // 2
+        H = min(_HARMONICS, len(samples) // 2 - 1)
+        waves = 2.0 / len(samples) * np.fft.rfft(samples[:, :m], axis=0)[: H + 1]
+        X = np.empty((2 * H + 1, m))
+        X[0], X[1::2], X[2::2] = 0.5 * waves[0].real, waves[1:].real, -waves[1:].imag
+        kept = {name: found[name] for name in ("mesh", "minimum", "maximum")}
+        if self.conservative:
+            multipliers = found["multipliers"]
+            kept |= {"multipliers": multipliers, "stable": none_grows(multipliers, 1),
+                     "trivial_error": found["trivial_error"]}
+        return kept | motion_values(Layout(d, m), X, T, self.row)
+
+    def lost(self, values: Mapping[str, Any]) -> bool:
+        """False: no special point of a mode follows from multipliers."""
+        return False
+
+    def note(self, points: Any) -> str:
+        """Nothing."""
+        return ""
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
+        """None."""
+        return {}
+
+    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """Turns of xi are no folds of the mode."""
+        return {"fold"}
+
+    def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
+        """Zero: multipliers under negative damping say nothing."""
+        return 0, 0
+
+    def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
+        """None: a mode ends at its amplitudes."""
+        return None
+
+    def _grown(self, u: Array) -> Array:
+        """Scales enlarged with the motion; those of period and xi follow the frequency."""
+        return with_frequency(super()._grown(u), self.period(u))
+
+
+def leaving_by_shooting(
+    start: LinearStart, shape: ComplexArray, scales: Array, row: Array, conservative: bool,
+    method: Shooting,
+) -> tuple[ShootingMode, Array, Array]:
+    """Problem, unknowns and direction of the linear mode of a shape (d,), at its amplitude.
+
+    ``scales`` (d + 2,) are those of the states, the period and xi.
+
+    Raises
+    ------
+    InputError
+        For a user's field, friction with memory, rigid motions, or a set-valued solver.
+    """
+    known = start.field
+    if not isinstance(known, ContactField):
+        raise InputError("nonlinear_mode: shooting is for contact systems; take HarmonicBalance() "
+                         "for a vector field.")
+    if known.dimension > 2 * start.displacements:
+        raise InputError("nonlinear_mode: friction with memory sticks at any deflection, so that "
+                         "its runs have no isolated periodic motion; take HarmonicBalance().")
+    if len(start.loose):
+        raise InputError("nonlinear_mode: nothing holds a rigid motion of the system, so that its "
+                         "runs have no isolated periodic motion; take HarmonicBalance().")
+    if not method.solver.smooth:
+        raise InputError("nonlinear_mode: Shooting(solver=SetValued()) has no modes; take a "
+                         "smoothed law and Auto().")
+    mesh = np.linspace(0.0, 1.0, method.segments + 1)
+    waves = (np.exp(2.0j * np.pi * mesh[:-1])[:, None] * shape).real
+    first = start.state + waves
+    problem = ShootingMode(
+        known, start.values, start.free, mesh, first[0].copy(), scales, rtol=method.rtol,
+        derivative_rtol=method.derivative_rtol, solver=method.solver,
+        limits=np.full(known.dimension, np.inf), row=row, conservative=conservative)
+    u = np.concatenate([first.reshape(-1), [2.0 * np.pi / start.angular_frequency, start.xi]])
+    leaving = np.append(waves.reshape(-1), [0.0, 0.0])
+    return problem, u, leaving / np.sqrt(problem.weights() @ leaving**2)
+
+
+def followed_by_shooting(
+    problem: ShootingMode, u: Array, leaving: Array, options: ContinuationOptions
+) -> Branch:
+    """The branch of a mode from its start."""
+    return continue_branch(
+        problem, u, options, name=XI, tangent=leaving,
+        attributes=attributes_of(problem) | {"conservative": problem.conservative})
