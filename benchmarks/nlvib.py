@@ -7,7 +7,7 @@ to the end of its first continuation, which is that of harmonic balance; its own
 derivatives from the elements, so they are switched on. Of example 6 that is the mode down to a
 frequency of 1 rad/s.
 
-Usage: python benchmarks/nlvib.py [--quick] [--nlvib FOLDER [--octave PROGRAM]]
+Usage: python benchmarks/nlvib.py [NUMBER ...] [--quick] [--nlvib FOLDER [--octave PROGRAM]]
 """
 
 import argparse
@@ -307,6 +307,7 @@ def result(branch: Branch) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("numbers", nargs="*", type=int, help="examples, by default all")
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--nlvib", type=Path, help="folder of a checkout of NLvib")
     parser.add_argument("--octave", default="octave")
@@ -314,7 +315,7 @@ def main() -> None:
     print(f"{'':29}points       time      result  "
           f"{'NLvib: points     time  ratio' * bool(given.nlvib)}")
     for number, example in EXAMPLES.items():
-        if given.quick and number in (3, 7):
+        if number not in (given.numbers or EXAMPLES) or (given.quick and number in (3, 7)):
             continue
         seconds, branch = timed(example, 1 if given.quick else RUNS)
         row = f"{number} {example.__name__.replace('_', ' '):25} {len(branch.points):8} " \
