@@ -53,6 +53,7 @@ from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.initial_state import initial_state
+from fecontact.integrate.solvers import AUTO
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.quasistatic.history import LoadHistory
@@ -393,11 +394,15 @@ def _by_orbit_method(
 ) -> Branch:
     """The branch at one level by collocation or shooting, from the orbit of harmonic balance.
 
-    Where harmonic balance finds none, it starts from the motion to which a run settles.
+    Where harmonic balance finds none, it starts from the motion to which a run settles; set-valued
+    orbits from a run by their solver, as harmonic balance knows smoothed laws alone.
     """
     _require_observable(layout_of(field), row)
     name, begin = list(field.parameters)[free], first
+    solver = method.solver if isinstance(method, Shooting) else AUTO
     try:
+        if not solver.smooth:
+            raise AnalysisError("Harmonic balance knows no set-valued laws.")
         begin, problem, u = _started(field, values, free, level_name, first,
                                      HarmonicBalance(stability=None), options, held, both=both)
         found = problem.linearise(u)
@@ -409,7 +414,8 @@ def _by_orbit_method(
             raise
         there = values.copy()
         there[free] = begin
-        motion = periodic_motion(field.system(there), longest_period=field.forcing_period(there))
+        motion = periodic_motion(field.system(there), longest_period=field.forcing_period(there),
+                                 solver=solver)
     at = values.copy()
     at[free] = begin
     try:
