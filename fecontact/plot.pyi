@@ -29,6 +29,7 @@ from .output.render.mode_movie import render_mode
 from .output.render.movie import picture
 from .output.render.offscreen import rendering_problem
 from .output.render.phase_movie import render_phase_space
+from .output.render.wheel_movie import render_wheel
 from .sweeps.plots import plot_sobol, plot_strobed, plot_sweep
 
 __all__ = [
@@ -77,6 +78,7 @@ __all__ = [
     "plot_wheel",
     "render_mode",
     "render_phase_space",
+    "render_wheel",
     "rendering_problem",
     "styled",
 ]

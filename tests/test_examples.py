@@ -61,7 +61,7 @@ EXAMPLES = {
     # A stuck blade with the springs of both contacts, in closed form.
     "platform_damper": (("out",), [(r"^ 1000.0 N: peak \S+ um at (\S+) Hz", 702.29, 0.3),
                                    (r"stuck: \S+ um at (\S+) Hz", 702.29, 0.02)],
-                        {"out/platform_damper.png"}),
+                        {"out/platform_damper.png", "out/platform_damper.mp4"}),
     "bladed_wheel": (("out",), [(r"^1000.0 N: peak \S+ um at (\S+) Hz", 504.39, 0.02),
                                 (r"stuck (\S+) Hz", 504.39, 0.01),
                                 (r"^diameter 4 at .* (\S+) Hz backwards", 785.9, 0.5)],

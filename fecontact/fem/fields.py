@@ -142,6 +142,22 @@ def body_elements(body: ElasticBody) -> Integers:
     return np.ascontiguousarray(body.basis.element_dofs.T.astype(np.int64))
 
 
+def of_one_kind(cells: Sequence[Integers], dimension: int) -> list[Integers]:
+    """First-order cells of several bodies: as simplices where their kinds differ."""
+    if len({array.shape[1] for array in cells}) == 1:
+        return list(cells)
+    return [_simplices(array, dimension) for array in cells]
+
+
+def _simplices(cells: Integers, dimension: int) -> Integers:
+    """Triangles or tetrahedra in the place of quadrilaterals or hexahedra."""
+    if cells.shape[1] == dimension + 1:
+        return cells
+    parts = ((0, 1, 2), (0, 2, 3)) if dimension == 2 else (
+        (0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
+    return np.concatenate([cells[:, list(part)] for part in parts])
+
+
 def linear_cells(nodes: Array, elements: Integers) -> Integers:
     """First-order cells between all nodes of elements, with positive orientation.
 

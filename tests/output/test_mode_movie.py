@@ -24,7 +24,7 @@ def test_largest_displacement_is_one_and_drawn_visibly():
     field = basis().mode_shapes
     shape = np.zeros((len(field.nodes), 2), dtype=complex)
     shape[3] = 3.0 - 4.0j, -1.0j
-    motion = ModeMotion(field, shape, phases(3600))
+    motion = ModeMotion(field, {1: shape}, phases(3600))
     sizes = [motion.body(frame)[1].max() for frame in range(0, 3600)]
     assert max(sizes) == pytest.approx(1.0, abs=1e-6)
     moved = max(np.abs(motion.body(frame)[0] - field.nodes).max() for frame in range(0, 3600, 10))
@@ -37,7 +37,7 @@ def test_a_real_mode_stands_and_a_complex_one_travels():
     wave = np.exp(-2j * np.pi * x)[:, None] * [0.0, 1.0]
     upper = field.nodes[:, 1] == field.nodes[:, 1].max()
     top = [[motion.body(frame)[0][upper, 1].argmax() for frame in range(8)]
-           for motion in (ModeMotion(field, shape, phases(8) + 0.1)
+           for motion in (ModeMotion(field, {1: shape}, phases(8) + 0.1)
                           for shape in (wave, wave.real + 0j))]
     assert len(set(top[0])) >= 7
     assert len(set(top[1])) == 2

@@ -14,6 +14,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ComplexArray
+from fecontact.core.units import listed
 from fecontact.laws.excitation import Load
 from fecontact.laws.signals.harmonic import Constant, Harmonic
 from fecontact.reduction.cyclic.cyclic_basis import CyclicBasis
@@ -45,22 +46,31 @@ class WheelMotion:
     period: float
     amplitudes: dict[int, ComplexArray]
 
-    def displacement(self, body: str, time: float, sector: int = 0) -> Array:
-        """Displacements (N, d) of the nodes of a body of a sector at a time [m].
+    def harmonic(self, body: str, h: int, sector: int = 0) -> ComplexArray:
+        """Complex displacements (N, d) of harmonic h of the nodes of a body of a sector [m].
 
-        Components are along the axes of sector 0, turned with the sector.
+        Components are along the axes of sector 0, turned with the sector; InputError for a body
+        or harmonic that is not there.
         """
         bodies = self.wheel.bodies
         if body not in bodies:
             raise InputError(f"WheelMotion: there is no body {body!r}{nearest(str(body), bodies)}; "
                              f"the bodies are {choices(bodies)}.")
-        alpha = self.wheel.symmetry.angle
-        found = np.zeros(bodies[body].nodes.shape)
-        for h, y in self.amplitudes.items():
-            shape = self.wheel.of(-h * self.order).shapes[body] @ y
-            phase = 2.0 * np.pi * time / self.period - self.order * sector * alpha
-            found = found + (shape * np.exp(1j * h * phase)).real
-        return found
+        if h not in self.amplitudes:
+            raise InputError(f"WheelMotion: h = {h!r} must be one of its harmonics, "
+                             f"{listed([str(one) for one in sorted(self.amplitudes)])}.")
+        shape = self.wheel.of(-h * self.order).shapes[body] @ self.amplitudes[h]
+        turn = np.exp(-1j * h * self.order * sector * self.wheel.symmetry.angle)
+        return np.asarray(turn * shape)
+
+    def displacement(self, body: str, time: float, sector: int = 0) -> Array:
+        """Displacements (N, d) of the nodes of a body of a sector at a time [m].
+
+        Components are along the axes of sector 0, turned with the sector.
+        """
+        phase = 2.0 * np.pi * time / self.period
+        return np.asarray(sum((self.harmonic(body, h, sector) * np.exp(1j * h * phase)).real
+                              for h in self.amplitudes))
 
     def on_wheel(self, time: float) -> dict[str, tuple[Array, Array]]:
         """Places and displacements (N sectors, n, d) of the nodes of each body at a time [m]."""

@@ -1,7 +1,7 @@
 """Movies of modes, real and complex: the body over whole periods of free vibration."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -25,25 +25,27 @@ from fecontact.reduction.mode_shapes import ModeShapes
 from fecontact.system.complex_modes import ComplexModes
 
 _VISIBLE = 0.08  # largest motion drawn, as a part of the body's extent
+# Phases at which the largest of a motion with several harmonics is looked for.
+_LOOKS = 65
 
 
 @dataclass(frozen=True, eq=False)
 class ModeMotion:
-    """One mode prepared for drawing: ``Re(shape exp(i phase))`` at some phases.
+    """Periodic motion prepared for drawing: ``Re sum_h shapes_h exp(i h phase)`` at some phases.
 
     Attributes
     ----------
     mode_shapes : ModeShapes
-    shape : (N, d) complex array
-        Displacements of the nodes; its size does not matter.
+    shapes : mapping of h to (N, d) complex array
+        Displacements of the nodes; their size does not matter. A mode has h = 1 alone.
     phases : (F,) array
-        [rad].
+        [rad], over whole periods.
     extent : float
         Largest motion drawn, as a part of the body's extent.
     """
 
     mode_shapes: ModeShapes
-    shape: ComplexArray
+    shapes: Mapping[int, ComplexArray]
     phases: Array
     extent: float = _VISIBLE
     colour: str = "displacement"
@@ -51,12 +53,22 @@ class ModeMotion:
     labels: tuple[tuple[str, int], ...] = ()
 
     @cached_property
-    def _unit_shape(self) -> ComplexArray:
-        """The shape with a largest displacement of one within the period."""
-        # The displacement of a node runs on an ellipse; this is its longer half-axis.
-        power = sum(np.abs(part) ** 2 for part in self.shape.T)
-        longest = np.sqrt(0.5 * (power + np.abs(sum(part**2 for part in self.shape.T)))).max()
-        return np.asarray(self.shape / (longest or 1.0))
+    def _largest(self) -> tuple[float, Array]:
+        """Largest displacement within the period, and that of each node along each axis (N, d)."""
+        if set(self.shapes) == {1}:
+            # The displacement of a node runs on an ellipse; this is its longer half-axis.
+            shape = self.shapes[1]
+            power = sum(np.abs(part) ** 2 for part in shape.T)
+            longest = np.sqrt(0.5 * (power + np.abs(sum(part**2 for part in shape.T)))).max()
+            return float(longest) or 1.0, np.abs(shape)
+        moved = [self._moved(phase) for phase in np.linspace(0.0, 2.0 * np.pi, _LOOKS).tolist()]
+        longest = max(float(np.linalg.norm(one, axis=1).max()) for one in moved)
+        return longest or 1.0, np.max(np.abs(moved), axis=0)
+
+    def _moved(self, phase: float) -> Array:
+        """Displacements (N, d) at a phase [rad]."""
+        total = sum(shape * np.exp(1j * h * phase) for h, shape in self.shapes.items())
+        return np.asarray(np.real(total))
 
     @property
     def _reach(self) -> float:
@@ -72,13 +84,14 @@ class ModeMotion:
     @cached_property
     def bounds(self) -> Array:
         """Smallest and largest coordinates (2, d) that the drawn body reaches [m]."""
-        moved = self._reach * np.abs(self._unit_shape)
+        longest, each = self._largest
+        moved = self._reach * each / longest
         return np.stack([(self.mode_shapes.nodes - moved).min(axis=0),
                          (self.mode_shapes.nodes + moved).max(axis=0)])
 
     def body(self, frame: int) -> tuple[Array, Array]:
         """Drawn positions (N, d) [m] and displacements (N,) relative to the largest."""
-        moved = (self._unit_shape * np.exp(1j * self.phases[frame])).real
+        moved = self._moved(float(self.phases[frame])) / self._largest[0]
         return self.mode_shapes.nodes + self._reach * moved, np.linalg.norm(moved, axis=1)
 
 
@@ -158,20 +171,29 @@ def render_mode(
     """
     require_kind("render_mode", ModalBasis, basis=basis)
     require_kind("render_mode", (ComplexModes, type(None)), modes=modes)
+    field, (q, words) = _field(basis), _chosen(basis, modes, mode)
+    return write_motion(ModeMotion(field, {1: field.shapes @ q}, np.zeros(0),
+                                   labels=body_labels(basis)),
+                        path, words if title is None else title, frames=frames, periods=periods,
+                        fps=fps, size=size, scale=scale, progress=progress)
+
+
+def write_motion(
+    motion: ModeMotion, path: str | Path, title: str, *, frames: int, periods: int, fps: float,
+    size: tuple[int, int], scale: float, progress: bool | Progress | None,
+) -> Path:
+    """Write a periodic motion, whose phases are set here; arguments as of :func:`render_mode`."""
     path, movie = target(path, fps, size)
     for name, value, least in (("frames", frames, 2), ("periods", periods, 1)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
             raise InputError(f"{name} = {value!r} must be a whole number of at least {least}.")
     require_scale("The mode", scale)
-    field, (q, words) = _field(basis), _chosen(basis, modes, mode)
     # Numbered pictures of one period suffice for any number of them.
     count = frames * (periods if movie else 1)
-    phases = 2.0 * np.pi * np.arange(count) / frames
-    motion = ModeMotion(field, field.shapes @ q, phases, _VISIBLE * scale,
-                        labels=body_labels(basis))
+    motion = replace(motion, phases=2.0 * np.pi * np.arange(count) / frames,
+                     extent=_VISIBLE * scale)
     require_rendering(size, MOVING)
-    return write_images(_images(motion, size, words if title is None else title), count, path, fps,
-                        size, progress)
+    return write_images(_images(motion, size, title), count, path, fps, size, progress)
 
 
 def _images(motion: ModeMotion, size: tuple[int, int], title: str) -> Iterator[Image]:

@@ -14,8 +14,9 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array
 from fecontact.fem.faces.frames import frames_of
+from fecontact.fem.fields import of_one_kind
 from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.reduction.assembly.links import Links, NonlinearSpring, linked
 from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs, spring_row
@@ -293,13 +294,8 @@ class _Places:
                 for _, one in given])
         elements = [one.cells if one.elements is None else one.elements for _, one in given]
         alike = len({array.shape[1] for array in elements}) == 1
-        cells = [one.cells for _, one in given]
-        if len({array.shape[1] for array in cells}) > 1:
-            # Quadrilaterals beside triangles: both as triangles. Likewise hexahedra.
-            cells = [_simplices(array, d) for array in cells]
-        outlines = [one.outline for _, one in given]
-        if len({array.shape[1] for array in outlines}) > 1:
-            outlines = [_simplices(array, 2) for array in outlines]
+        cells = of_one_kind([one.cells for _, one in given], d)
+        outlines = of_one_kind([one.outline for _, one in given], d - 1)
         first = [part.nodes[0] for part, _ in given]
 
         def together(arrays: Sequence[Any]) -> Any:
@@ -327,15 +323,6 @@ class _Places:
             powers[terms, rows] = one.powers
             stress[part.nodes[0] : sum(part.nodes), :, terms] = one.stress
         return NonlinearStress(coordinates, powers, stress)
-
-
-def _simplices(cells: Integers, dimension: int) -> Integers:
-    """Triangles or tetrahedra in the place of quadrilaterals or hexahedra."""
-    if cells.shape[1] == dimension + 1:
-        return cells
-    parts = ((0, 1, 2), (0, 2, 3)) if dimension == 2 else (
-        (0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
-    return np.concatenate([cells[:, list(part)] for part in parts])
 
 
 def _contact(bases: Mapping[str, ModalBasis], pairing: Pairing | PointPairing) -> _Contact:
