@@ -61,6 +61,8 @@ def test_a_mode_of_a_diameter_runs_around(modes):
     waves = [((drawn._moved(phase)[tips] * around).sum(axis=1) * np.exp(-3j * angle)).sum()
              for phase in (0.0, 0.2)]
     assert abs(np.angle(waves[1] / waves[0])) == pytest.approx(0.2, abs=1e-3)
+    wanted = modes.on_wheel(3, 0, 0.2).displacement
+    assert np.abs(drawn._moved(0.2) - wanted).max() < 1e-12 * np.abs(wanted).max()
 
 
 def test_modes_that_are_not_there_are_named(modes, motion):
