@@ -32,7 +32,7 @@ def test_examples_of_the_reference_run(stem, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = "\n".join(examples(stem))
     if rendering_problem() is not None:
-        text = re.sub(r"^>>> .*\b(?:render|render_mode|render_wheel|picture)\(.*\n(?:[^>].*\n)*", "", text,
+        text = re.sub(r"^>>> .*\b(?:render(?:_mode|_wheel)?|picture)\(.*\n(?:[^>].*\n)*", "", text,
                       flags=re.MULTILINE)
     test = doctest.DocTestParser().get_doctest(text, {"__name__": "__main__"}, f"{stem}.md",
                                                f"{stem}.md", 0)
