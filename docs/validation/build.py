@@ -16,6 +16,7 @@ import normal_contact
 import responses_section
 import sliding_solids_section
 import solids_section
+import turning_section
 import two_bodies_section
 import two_mass_section
 
@@ -43,6 +44,7 @@ def main() -> None:
                        ("two bodies", lambda: two_bodies_section.section(images)),
                        ("solids", lambda: solids_section.section(images)),
                        ("sliding solids", lambda: sliding_solids_section.section(images)),
+                       ("bodies that turn or repeat", turning_section.section),
                        ("continuation", continuation_cases.section),
                        ("frequency responses", lambda: responses_section.section(images)),
                        ("section 4.2", lambda: impact_section.section(images)),
