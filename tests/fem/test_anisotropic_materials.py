@@ -418,6 +418,20 @@ def test_anisotropic_materials_of_decks(tmp_path, kind):
     assert read(tmp_path, lossy).materials["ALL"].loss_factor == 0.04
 
 
+def test_expansion_of_decks(tmp_path):
+    """One number for isotropic materials; more is told, and leaves the material as it is."""
+    plain = deck("ORTHO").replace(f"TYPE=ORTHO\n{CONSTANTS['ORTHO']}",
+                                  "TYPE=ISO\n7e10, 0.33\n")
+    for lines in ("2.3e-5,\n", "2.3e-5, 20.\n"):
+        text = plain.replace("*DENSITY", f"*EXPANSION\n{lines}*DENSITY")
+        assert read(tmp_path, text).materials["ALL"].thermal_expansion == 2.3e-5
+    for text in (plain.replace("*DENSITY", "*EXPANSION\n2.3e-5, 20.\n2.5e-5, 90.\n*DENSITY"),
+                 deck("ORTHO").replace("*DENSITY", "*EXPANSION\n2.3e-5,\n*DENSITY")):
+        with pytest.warns(ModelWarning, match=r"'PLY' has an \*EXPANSION over directions or temp"):
+            found = read(tmp_path, text).materials["ALL"]
+        assert getattr(found, "thermal_expansion", 0.0) == 0.0
+
+
 @pytest.mark.parametrize(("lines", "axes"), [
     ("*ORIENTATION, NAME=O\n0, 1, 0, -1, 0, 0\n", MaterialAxes((0, 1, 0), (-1, 0, 0))),
     ("*ORIENTATION, NAME=O, SYSTEM=RECTANGULAR\n1, 2, 1, 1, 1, 2, 1, 1, 1\n3, 30.\n",

@@ -430,7 +430,7 @@ class _Assembly:
                 self.materials[options["NAME"].upper()] = {}
             case "ORIENTATION":
                 self.orientations[options["NAME"].upper()] = options, lines
-            case "ELASTIC" | "DENSITY" | "DAMPING" if self.materials:
+            case "ELASTIC" | "DENSITY" | "DAMPING" | "EXPANSION" if self.materials:
                 self.materials[next(reversed(self.materials))][keyword] = options, lines
             case _ if keyword in READ:
                 self.constraints.append((keyword, options, lines))

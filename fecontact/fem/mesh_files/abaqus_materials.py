@@ -1,10 +1,18 @@
 """Materials and orientations of Abaqus and CalculiX input files."""
 
+import warnings
 from collections.abc import Mapping
 
 import numpy as np
 
-from fecontact.core.errors import InputError, MeshError, choices, nearest, shown
+from fecontact.core.errors import (
+    InputError,
+    MeshError,
+    ModelWarning,
+    choices,
+    nearest,
+    shown,
+)
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
 from fecontact.fem.material_axes import CylindricalAxes, MaterialAxes
 from fecontact.fem.mesh_files.abaqus_keywords import Options
@@ -43,8 +51,9 @@ def material(name: str, given: Mapping[str, Given]) -> AnyMaterial | str:
     values = [*values, 0.0][:constants]
     rho = float(density[0].split(",")[0] or 0)
     loss = float(given.get("DAMPING", ({}, []))[0].get("STRUCTURAL") or 0)
+    expansion = _expansion(name, given, kind == "ISO")
     if kind == "ISO":
-        return Material(values[0], values[1], rho, loss)
+        return Material(values[0], values[1], rho, loss, expansion)
     if kind == "ENGINEERINGCONSTANTS":
         E, nu, G = zip(*[iter(values)] * 3, strict=True)
         return AnisotropicMaterial.orthotropic(E, nu, G, rho, loss_factor=loss)
@@ -53,6 +62,21 @@ def material(name: str, given: Mapping[str, Given]) -> AnyMaterial | str:
     for (row, column), value in zip(places, values, strict=True):
         stiffness[row, column] = stiffness[column, row] = value
     return AnisotropicMaterial(stiffness[np.ix_(_ORDER, _ORDER)].tolist(), rho, loss_factor=loss)
+
+
+def _expansion(name: str, given: Mapping[str, Given], isotropic: bool) -> float:
+    """Thermal expansion [1/K] of *EXPANSION; zero, with a warning, if it is not one number."""
+    if "EXPANSION" not in given:
+        return 0.0
+    options, lines = given["EXPANSION"]
+    values = [float(word or 0) for line in lines for word in line.rstrip(", ").split(",")]
+    # The temperature at which it holds may follow.
+    if isotropic and options.get("TYPE", "ISO").upper() == "ISO" and len(values) in (1, 2):
+        return values[0]
+    warnings.warn(f"The material '{name}' has an *EXPANSION over directions or temperatures, or no "
+                  f"isotropic elasticity; it is not read, and the material does not expand.",
+                  ModelWarning, stacklevel=4)
+    return 0.0
 
 
 def orientation(name: str, given: Mapping[str, Given]) -> MaterialAxes | CylindricalAxes | str:

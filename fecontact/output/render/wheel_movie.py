@@ -97,7 +97,7 @@ def _of_response(motion: WheelMotion) -> tuple[ModeMotion, str]:
 
 
 def _drawn(nodes: Array, cells: Integers, outline: Integers) -> ModeShapes:
-    """What is drawn of a body, without shapes and stress."""
+    """Nodes, cells and outline of a body, without shapes and stress."""
     import scipy.sparse as sp
 
     d = nodes.shape[1]
