@@ -13,7 +13,8 @@ from fecontact.fem.mesh_files.abaqus_keywords import Deck
 # Keywords of the mesh and its materials, besides those of constraints.
 _MESH = ("", "NODE", "ELEMENT", "SYSTEM", "NSET", "ELSET", "SURFACE", "PART", "END PART",
          "INSTANCE", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY", "SOLID SECTION", "MATERIAL",
-         "ELASTIC", "DENSITY", "DAMPING", "EXPANSION", "ORIENTATION", "INCLUDE", "HEADING", "PREPRINT")
+         "ELASTIC", "DENSITY", "DAMPING", "EXPANSION", "ORIENTATION", "INCLUDE", "HEADING",
+         "PREPRINT")
 # Loads and supports, which a study gives.
 _LOADS = ("BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", "INITIAL CONDITIONS")
 _CONTACT = ("CONTACT PAIR", "CONTACT", "CONTACT INCLUSIONS", "CONTACT PROPERTY ASSIGNMENT",
