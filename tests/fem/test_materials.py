@@ -131,6 +131,20 @@ def test_sections_of_a_deck_against_calculix(tmp_path):
     assert ElasticBody(mesh, ALUMINIUM).total_mass == pytest.approx(2700.0 * np.prod(SIZE))
 
 
+WARM = (MATERIALS.replace("7850.\n", "7850.\n*EXPANSION, ZERO=20.\n1.2e-5\n")
+        + "*EXPANSION\n2.3e-5, 20.\n")
+
+
+def test_thermal_expansion_of_a_deck_against_calculix(tmp_path):
+    """ccx 2.20, fixed at the left: *INITIAL CONDITIONS of 20, *TEMPERATURE of 80 at all nodes."""
+    mesh = read(tmp_path, deck_of(MESHES["tetrahedra"], WARM + SECTIONS))
+    assert [mesh.materials[name].thermal_expansion for name in ("NEAR", "FAR")] == [1.2e-5, 2.3e-5]
+    found = static_solution(ElasticBody(mesh, fixed={"A_left": "xyz"}), Load(), temperature=60.0)
+    corner = np.linalg.norm(found.nodes - (0.1, 0.04, 0.03), axis=1).argmin()
+    assert found.displacement[corner] == pytest.approx(
+        (1.099598e-4, 2.698495e-5, 1.945810e-5), rel=1e-6)
+
+
 def test_decks_in_millimetres_newtons_and_tonnes(tmp_path):
     text = deck_of(MESHES["tetrahedra"], MATERIALS.replace("2.1e11", "2.1e5").replace(
         "7850.", "7.85e-9").replace("7e10", "7e4").replace("2700.,", "2.7e-9") + SECTIONS)
