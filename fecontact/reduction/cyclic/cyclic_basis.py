@@ -206,7 +206,7 @@ def cyclic_basis(
     Raises
     ------
     InputError, MeshError
-        For unknown names, faces or pairings that do not match; see :func:`sector_modes`.
+        For unknown names, faces or pairings that do not match.
 
     Warns
     -----
