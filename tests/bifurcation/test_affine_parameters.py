@@ -161,6 +161,18 @@ def test_a_function_of_the_user_may_have_the_name_of_a_parameter():
     assert (turn, period) == (pytest.approx(TURN, rel=1e-14), None)
 
 
+def test_values_that_differ_by_rounding_do_not_tell_how_the_period_varies():
+    """Systems may have been made there before; results must not depend on it."""
+    def stronger(system, value):
+        return system.with_(**{"drive.amplitude_x": value})
+
+    field = contact_field(masses(drive=driven()), {"p": (1.3, stronger)})
+    for k in range(1, 100):
+        field.system(np.array([1.3 * (1.0 + 2e-15 * k)]))
+    turn, period = timing_of(field, np.array([1.3]), 0)
+    assert (turn, period) == (None, field.forcing_period(np.array([1.3])))
+
+
 @pytest.mark.parametrize(("load", "rests"), [(fc.Load(), True), (fc.Load(0.3), False)])
 def test_forces_at_rest_have_a_mean_only_where_a_load_is_constant(load, rests):
     rows = np.zeros((3, 1))

@@ -14,7 +14,6 @@ from fecontact.bifurcation import (
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.curves.codim2 import OrbitCurve
 from fecontact.bifurcation.orbits.mesh import extremes, node_times, rule
-from fecontact.bifurcation.orbits.starts import _at_phases
 
 
 def stuart_landau(t, x, p, out):
@@ -128,14 +127,3 @@ def test_a_point_of_a_curve_takes_one_step_where_the_guess_is_near(monkeypatch):
     assert np.abs(curve.parameter - curve.column("a") ** 2).max() < 1e-9
     assert len(calls["linearise"]) < 1.15 * len(curve)
     assert len(calls["evaluate"]) < 0.45 * len(curve)
-
-
-@pytest.mark.parametrize("forced", [True, False])
-def test_samples_put_on_a_mesh_keep_their_high_derivatives(forced):
-    """By lines between them the mesh would follow the spacing of the samples."""
-    t = np.linspace(0.0, 3.0, 6001)
-    phases = np.linspace(0.0, 1.0, 201)
-    found = _at_phases(t, np.sin(4.0 * np.pi * t)[:, None], 0.5, forced, phases, smooth=True)[:, 0]
-    assert np.abs(found - np.sin(2.0 * np.pi * phases)).max() < 1e-10
-    fourth = np.diff(found, 4) / (2.0 * np.pi / 200.0)**4
-    assert np.abs(fourth - np.sin(2.0 * np.pi * phases[2:-2])).max() < 0.02

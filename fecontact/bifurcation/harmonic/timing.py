@@ -11,6 +11,9 @@ from fecontact.system.fields.vector_field import VectorField
 _BESIDE = (0.97, 1.043)
 # Relative difference of numbers that count as the same.
 _SAME = 1e-13
+# Values at which the period is asked for are apart by this part at least: of values that are the
+# same but for rounding both the periods and the products are.
+_APART = 0.01
 
 
 def timing_of(
@@ -34,7 +37,7 @@ def timing_of(
         return None, None
     made = made_values(field, values, free) if isinstance(field, ContactField) else []
     places = [value for value in made if value * here > 0.0][: 1 + len(_BESIDE)]
-    if len(places) <= len(_BESIDE):
+    if len(places) <= len(_BESIDE) or np.ptp(places) < _APART * abs(here):
         places = [here, *(here * factor for factor in _BESIDE)]
     periods, products = [], []
     for value in places:

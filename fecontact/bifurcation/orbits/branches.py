@@ -401,7 +401,7 @@ def _collocated(field: VectorField, point: BranchPoint, method: Method) -> start
     found, nodes = starts.from_samples(
         field, values, problem.free, at.times, at.states, at.period,
         intervals if isinstance(method, Collocation) else _INTERVALS, degree, at.periods,
-        np.append(problem.scales[:d], problem.scales[-1]), smooth=True)
+        np.append(problem.scales[:d], problem.scales[-1]))
     return found, nodes, starts.along(found, nodes, motions[1], _ALONG)
 
 

@@ -24,8 +24,6 @@ Start = tuple[CollocationProblem, Array, Array]
 Begun = tuple[CollocationProblem, Array, Array | None]
 
 _CORRECTIONS = 25
-# Samples before the last period through which its spline goes too.
-_BEFORE = 4
 # Times the intervals on which an orbit is found where the number asked for does not lead there.
 _FINER = (2, 4)
 # First amplitudes of orbits at a Hopf point, tried in this order. With a strongly curved friction
@@ -93,7 +91,6 @@ def at_hopf(
 def from_samples(
     field: VectorField, values: Array, free: int, times: ArrayLike, states: ArrayLike,
     period: float | None, intervals: int, degree: int, periods: int, scales: Array,
-    smooth: bool = False,
 ) -> tuple[CollocationProblem, Array]:
     """Problem and first guess from a nearly periodic motion.
 
@@ -104,8 +101,6 @@ def from_samples(
     period : float or None
         Period of the motion [s]; None for the time since the motion last passed its end point.
         Forced systems take ``periods`` times the period of the forcing.
-    smooth : bool
-        Whether there are many samples of a smooth motion.
 
     field, values, free, intervals, degree, periods, scales
         See :func:`from_hopf`.
@@ -130,7 +125,7 @@ def from_samples(
         raise InputError(f"The samples cover {t[-1] - t[0]:g} s, but the period is {T:g} s; give "
                          f"at least one period.")
     fine = np.linspace(0.0, 1.0, 4 * intervals + 1)
-    sampled = partial(_at_phases, t, x, T, forcing is not None, smooth=smooth)
+    sampled = partial(_at_phases, t, x, T, forcing is not None)
     mesh = equidistributed(fine, sampled(node_times(fine, degree)), degree, intervals)
     nodes = sampled(node_times(mesh, degree))
     problem = CollocationProblem(field, values.copy(), free, mesh, degree, nodes,
@@ -139,23 +134,11 @@ def from_samples(
                                     [values[free]]])
 
 
-def _at_phases(
-    t: Array, x: Array, period: float, forced: bool, phases: Array, smooth: bool
-) -> Array:
-    """States (k, d) of a motion in its last period; phases of forced systems count from t = 0.
-
-    By lines between the samples, or by a spline: lines do not have the high derivatives that a
-    mesh follows. Where samples are few or motions have kinks splines have too much of them.
-    """
+def _at_phases(t: Array, x: Array, period: float, forced: bool, phases: Array) -> Array:
+    """States (k, d) of a motion in its last period; phases of forced systems count from t = 0."""
     offset = 0.0 if forced else t[-1] / period
     place = t[-1] - period * np.mod(t[-1] / period - offset - phases, 1.0)
-    if not smooth:
-        return np.stack([np.interp(place, t, column) for column in x.T], axis=1)
-    from scipy.interpolate import CubicSpline
-
-    first = max(int(np.searchsorted(t, t[-1] - period)) - _BEFORE, 0)
-    times, kept = np.unique(t[first:], return_index=True)
-    return np.asarray(CubicSpline(times, x[first:][kept])(place))
+    return np.stack([np.interp(place, t, column) for column in x.T], axis=1)
 
 
 def along(problem: CollocationProblem, u: Array, ahead: PeriodicMotion, distance: float) -> Array:
@@ -163,7 +146,7 @@ def along(problem: CollocationProblem, u: Array, ahead: PeriodicMotion, distance
     assert ahead.period is not None
     assert ahead.parameter_values is not None
     nodes = _at_phases(ahead.times, ahead.states, ahead.period, not problem.autonomous,
-                       node_times(problem.mesh, problem.degree), smooth=True)
+                       node_times(problem.mesh, problem.degree))
     there = np.concatenate([nodes.reshape(-1), [ahead.period] if problem.autonomous else [],
                             [ahead.parameter_values[problem.free]]])
     return (there - u) / distance
