@@ -151,7 +151,7 @@ def loop(mode: StuckMode, alpha: float, steps: int = 15) -> Loop:
             beyond = np.where(slips, size, 1.0)
             way = trial / beyond[:, None]
             R = np.where(slips[:, None], limit[:, None] * way, trial)
-            unbalanced = (basis.link_load + load * mode.shape - stiffness @ q + F @ normal
+            unbalanced = (basis.constant_load + load * mode.shape - stiffness @ q + F @ normal
                           - np.einsum("nk,nkm->m", R, along))
             turn = np.eye(2) - slips[:, None, None] * (way[:, :, None] * way[:, None, :])
             turn *= np.where(slips, k * limit / beyond, k)[:, None, None]
@@ -159,7 +159,7 @@ def loop(mode: StuckMode, alpha: float, steps: int = 15) -> Loop:
             tilted = np.einsum("nkm,nk->nm", along, way) * (slips * COEFFICIENT * closed)[:, None]
             slope += stiffness + (normal.T * closed) @ normal - tilted.T @ normal
             q = q + np.linalg.solve(slope, unbalanced)
-            if np.abs(unbalanced).max() < 1e-10 * np.abs(basis.link_load).max():
+            if np.abs(unbalanced).max() < 1e-10 * np.abs(basis.constant_load).max():
                 break
         else:
             raise RuntimeError(f"no equilibrium at alpha = {load:g}")

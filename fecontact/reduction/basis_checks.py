@@ -15,7 +15,7 @@ def frozen_arrays(basis: Any) -> None:
     squares overflow.
     """
     names = ["angular_frequencies", "damping", "T", "positions", "tributary", "boundary_rows"]
-    names += [name for name in ("inertia_rows", "stiffness", "contact_normals", "link_load")
+    names += [name for name in ("inertia_rows", "stiffness", "contact_normals", "constant_load")
               if getattr(basis, name) is not None]
     for name in names:
         array = np.array(getattr(basis, name), dtype=float, order="C")
@@ -62,7 +62,7 @@ def check_shapes(basis: Any) -> None:
     for name, shape in (("damping", (m, m)), ("T", (points, 3 * (d - 1), m)),
                         ("positions", (points, d)), ("inertia_rows", (d, m)),
                         ("boundary_rows", (len(basis.boundaries), d, m)),
-                        ("stiffness", (m, m)), ("link_load", (m,)),
+                        ("stiffness", (m, m)), ("constant_load", (m,)),
                         ("contact_normals", (n, d))):
         given = getattr(basis, name)
         if given is not None and given.shape != shape:

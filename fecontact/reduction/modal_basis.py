@@ -35,7 +35,7 @@ class ModalBasis(Summarised):
     """Mass-normalised modes ``q`` of a body, or several, and the motion of points of interest.
 
     The equations of motion are ``q'' + damping q' + stiffness_matrix q = T^T f + centrifugal_load
-    + link_load`` (4.1-1), where the stiffness matrix is ``diag(angular_frequencies^2)`` unless
+    + constant_load`` (4.1-1), where the stiffness matrix is ``diag(angular_frequencies^2)`` unless
     ``stiffness`` is given; the displacements of the points ``w = T q`` (4.1-12), [x, y, phi] for
     each, x tangential to the ground, y away from it, phi counter-clockwise. In space
     [x, y, z, phi_x, phi_y, phi_z], x and y tangential, z away from the ground; shapes below are
@@ -89,8 +89,9 @@ class ModalBasis(Summarised):
         Whether the other side of each contact node is the ground, not a body; None means all.
     parts : tuple of BodyPart
         The bodies, if there are several.
-    link_load : (m,) array or None
-        Constant modal forces of preloaded links between bodies, and of a change of temperature.
+    constant_load : (m,) array or None
+        Constant modal forces: of preloaded links between bodies, of a change of temperature, of
+        the rotation of a sector.
     springs : tuple of str
         Groups that are no interfaces, but nonlinear springs: one node each, which moves along its
         normal only.
@@ -126,7 +127,7 @@ class ModalBasis(Summarised):
     contact_normals: Array | None = None
     on_ground: NDArray[np.bool_] | None = None
     parts: tuple[BodyPart, ...] = ()
-    link_load: Array | None = None
+    constant_load: Array | None = None
     springs: tuple[str, ...] = ()
     first_passes: tuple[tuple[str, int], ...] = ()
     large_deflections: tuple[LargeDeflectionForces, ...] = ()
@@ -476,7 +477,7 @@ class ModalBasis(Summarised):
                 nonlinear_stress=None if given.nonlinear_stress is None else replace(
                     given.nonlinear_stress,
                     coordinates=given.nonlinear_stress.coordinates[:, chosen])),
-            link_load=None if self.link_load is None else self.link_load[chosen],
+            constant_load=None if self.constant_load is None else self.constant_load[chosen],
             large_deflections=tuple(replace(one, coordinates=one.coordinates[:, chosen])
                                     for one in self.large_deflections),
             parts=tuple(replace(part, modes=(int(below[first]), int(below[end] - below[first])))

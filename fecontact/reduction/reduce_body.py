@@ -224,7 +224,7 @@ def modal_basis(
         boundary_rows=rows[1:],
         rotation=None if turning is None else replace(turning, speed=0.0),
         stiffness=None if held or stress is None else coupled(w, shapes, stress),
-        link_load=None if expanding is None else expanding @ shapes,
+        constant_load=None if expanding is None else expanding @ shapes,
     )
     if condensed is not None:
         assert large_deflections is not None

@@ -51,8 +51,8 @@ def acting_loads(basis: ModalBasis, load: Load) -> Iterator[ActingLoad]:
         For points or boundaries that the basis does not have, gravity or base acceleration with a
         basis without rows of inertia, and places outside the body or for a basis without shapes.
     """
-    if basis.link_load is not None:
-        yield ActingLoad("the preload of links or the temperature", basis.link_load, 1.0,
+    if basis.constant_load is not None:
+        yield ActingLoad("the preload of links or the temperature", basis.constant_load, 1.0,
                          "they hold, or the body is held")
     d = basis.dimension
     components = basis.components

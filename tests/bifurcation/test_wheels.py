@@ -262,7 +262,7 @@ def test_stress_of_a_static_state_stiffens_as_that_of_the_rotation(sector):
                             **given)
 
     rest, plain = made(), Rotation(2000.0, stress_stiffening=False)
-    load = made(rotation=plain).basis.link_load
+    load = made(rotation=plain).basis.constant_load
     q = load / rest.basis.angular_frequencies**2
     stressed = made(rotation=plain, prestress={"s": rest.fields(q, "s")})
     turning, softer = made(rotation=Rotation(2000.0)), made(rotation=plain)

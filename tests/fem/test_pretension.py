@@ -179,7 +179,7 @@ def test_a_pair_of_forces_between_two_points():
     assert bolts.shortening[bolt] == pytest.approx(2.0 * force / k, rel=1e-12)
     held = bolts.basis
     for push in (0.0, load):
-        rest = (held.link_load + push * held.point_row("a", "z")) / held.angular_frequencies**2
+        rest = (held.constant_load + push * held.point_row("a", "z")) / held.angular_frequencies**2
         assert bolts.forces(rest)[bolt] == pytest.approx(force - 0.5 * push, rel=1e-4)
         assert held.point_row("b", "z") @ rest == pytest.approx((0.5 * push - force) / k, rel=1e-4)
     for wrong in (("a", "b"), ("a", "b", "phi_x"), ("a", "b", 3), 5):

@@ -167,14 +167,14 @@ def test_a_bolt_presses_two_masses_together_with_its_preload(bolt):
     assert (loaded.arrays.constant_load == system.arrays.constant_load).all()
 
 
-def test_link_load_is_stored(tmp_path):
+def test_constant_load_is_stored(tmp_path):
     from fecontact.io import read_basis, write_basis
 
     basis = assembled_basis({"a": mass(1.0), "b": mass(1.0)}, {}, [
         Spring("a.p", "b.p", 10.0, direction=(1, 0), preload=3.0)])
     write_basis(tmp_path / "basis.h5", basis)
-    assert (read_basis(tmp_path / "basis.h5").link_load == basis.link_load).all()
-    assert basis.select([0, 5]).link_load == pytest.approx(basis.link_load[[0, 5]])
+    assert (read_basis(tmp_path / "basis.h5").constant_load == basis.constant_load).all()
+    assert basis.select([0, 5]).constant_load == pytest.approx(basis.constant_load[[0, 5]])
 
 
 def test_bad_links_are_named():

@@ -137,8 +137,8 @@ def test_links_join_points_of_bodies(study):
     system = in_python({"P": (0.06, 0.06)}, [Spring("pad.P", direction=(0.0, 1.0), stiffness=1e4,
                                                     preload=30.0)])
     assert (linked.system().basis.T == system.basis.T).all()
-    assert (linked.system().basis.link_load == system.basis.link_load).all()
-    assert linked.reduced.basis.link_load.any()
+    assert (linked.system().basis.constant_load == system.basis.constant_load).all()
+    assert linked.reduced.basis.constant_load.any()
     assert fc.Study.from_toml(linked.to_toml()) == linked
     # The soft spring pulls the pad down: its preload and the load press on the block together.
     looser = linked.with_(**{"links.bolt.preload": 0.0})

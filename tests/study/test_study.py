@@ -586,7 +586,7 @@ def test_a_temperature_is_a_load_of_the_body(tmp_path):
     path.write_text(TINY.replace("modes = 5\n", "modes = 5\nreduction = \"residual\"\n"
                                                 "temperature = 80.0\n"))
     basis = Study.read(path).modal_basis()
-    w, load = basis.angular_frequencies, basis.link_load
+    w, load = basis.angular_frequencies, basis.constant_load
     assert np.abs(load[w == 0.0]).max() < 1e-9 * np.abs(load).max()
     moved = basis.fields(np.divide(load, w**2, out=np.zeros_like(w), where=w > 0.0))
     assert moved.temperature == pytest.approx(80.0)

@@ -91,7 +91,7 @@ def test_fields_are_those_of_the_whole_body_and_stiffen_it(tmp_path):
     write_basis(path, basis)
     state = fc.static_solution(body, Load(), temperature=gradient)
     for one in (basis, read_basis(path), basis.select(range(basis.modes))):
-        found = one.fields(one.link_load / one.angular_frequencies**2)
+        found = one.fields(one.constant_load / one.angular_frequencies**2)
         scale = np.abs(state.stress).max()
         assert np.abs(found.displacement - state.displacement).max() < 1e-9 * np.abs(
             state.displacement).max()

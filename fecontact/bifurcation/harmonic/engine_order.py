@@ -108,7 +108,8 @@ class EngineOrder:
             own, angular_frequencies=np.append(own.angular_frequencies, np.zeros(r)),
             damping=further(own.damping), T=T, boundary_rows=rows,
             stiffness=further(own.stiffness_matrix), parts=(),
-            link_load=None if own.link_load is None else np.append(own.link_load, np.zeros(r)))
+            constant_load=None if own.constant_load is None else np.append(
+                own.constant_load, np.zeros(r)))
 
     def system(self, system: ContactSystem) -> ContactSystem:
         """The system with these coordinates, for harmonic balance alone.

@@ -174,12 +174,14 @@ class FrequencyResponse(Summarised):
         return self.branches[level].points[int(np.argmax(self._gain(level)))]
 
     def peak_reached(self, level: int = 0) -> bool:
-        """Whether the amplitude falls on both sides of the peak, which is then no end of a branch.
+        """Whether the amplitude falls on both sides of the peak, and the branch is whole.
 
-        Or the force rises. Closed branches have no ends.
+        Or the force rises. A branch that ends before its bound may have a larger peak beyond.
+        Closed branches have no ends.
         """
         branch, place = self.branches[level], int(np.argmax(self._gain(level)))
-        return branch.status is BranchStatus.CLOSED or 0 < place < len(branch) - 1
+        return branch.status is BranchStatus.CLOSED or (
+            branch.status is BranchStatus.BOUND and 0 < place < len(branch) - 1)
 
     def summary(self) -> list[tuple[str, str]]:
         """Parameter, levels, special points of each branch, and how branches ended."""
@@ -200,7 +202,8 @@ class FrequencyResponse(Summarised):
                 *([(UNRESOLVED, UNRESOLVED_MEANING)]
                   if any(point.kind == UNRESOLVED for branch in self.branches
                          for point in branch.special) else []),
-                *([("peak", f"not reached{where}: the {extreme} at an end")]
+                *([("peak", f"perhaps not reached{where}: the {extreme} at an end, or a branch "
+                            f"stops before its bound")]
                   if rising else []),
                 ("ends", ", ".join(ends))]
 

@@ -101,7 +101,7 @@ def response(
         for number, branch in enumerate(found.response.branches):
             if branch.status is BranchStatus.POINTS:
                 where = "" if name is None else f"{name} = {found.response.levels[number]:g}: "
-                peak = "" if found.response.peak_reached(number) else " No peak is reached."
+                peak = "" if found.response.peak_reached(number) else " Its peak may lie beyond."
                 echo(f"note: {where}{branch.end}{peak}")
             if branch.message:
                 echo(f"note: {branch.message}")

@@ -38,7 +38,7 @@ from fecontact.reduction.rotating import ModalRotation
 # Higher levels of deflate take longer and gain three per cent.
 COMPRESSED: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": 1}
 _PLAIN = ("angular_frequencies", "damping", "T", "positions", "tributary")
-_OPTIONAL = ("inertia_rows", "stiffness", "contact_normals", "on_ground", "link_load")
+_OPTIONAL = ("inertia_rows", "stiffness", "contact_normals", "on_ground", "constant_load")
 _MODE_SHAPES = ("nodes", "cells", "outline", "shapes", "stress")
 
 
@@ -230,7 +230,7 @@ def stored_basis(group: Any) -> ModalBasis:
     require_lengths("'group_sizes'", len(names), sizes)
     boundaries: tuple[str, ...] = ()
     tributary = array(group, "tributary", (None,))
-    shapes = {"inertia_rows": (d, m), "stiffness": (m, m), "link_load": (m,),
+    shapes = {"inertia_rows": (d, m), "stiffness": (m, m), "constant_load": (m,),
               "contact_normals": (len(tributary), d)}
     given: dict[str, Any] = {name: array(group, name, shape) for name, shape in shapes.items()
                              if name in group}

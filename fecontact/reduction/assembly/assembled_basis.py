@@ -175,7 +175,7 @@ def assembled_basis(
         springs=tuple(springs),
         first_passes=tuple(halves),
         rotation=_rotation(bases, places),
-        link_load=_constant_loads(bases),
+        constant_load=_constant_loads(bases),
     )
     for name, basis in bases.items():
         whole = _with_large_deflections(whole, name, basis, places.columns(name))
@@ -186,9 +186,9 @@ def assembled_basis(
 
 def _constant_loads(bases: Mapping[str, ModalBasis]) -> Array | None:
     """The constant modal forces (m,) of all bodies; None if there are none."""
-    if all(one.link_load is None for one in bases.values()):
+    if all(one.constant_load is None for one in bases.values()):
         return None
-    return np.concatenate([np.zeros(one.modes) if one.link_load is None else one.link_load
+    return np.concatenate([np.zeros(one.modes) if one.constant_load is None else one.constant_load
                            for one in bases.values()])
 
 

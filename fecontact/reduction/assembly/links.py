@@ -213,7 +213,7 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
 
     Its modes are those of the linked bodies: no longer blocks of single bodies, so ``modes`` of all
     parts are empty. Rigid links reduce their number; damping becomes a full matrix; constant forces
-    of preloaded springs become the ``link_load``.
+    of preloaded springs become the ``constant_load``.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
     m, d = basis.modes, basis.dimension
     held, springs, stiffness = [np.zeros((0, m))], [np.zeros((0, m))], [np.zeros(0)]
     damping = np.array(basis.damping)
-    load = np.zeros(m) if basis.link_load is None else np.array(basis.link_load)
+    load = np.zeros(m) if basis.constant_load is None else np.array(basis.constant_load)
     for link in links:
         require_kind("Links", (Spring, Bushing, Hinge, FaceWeld, NonlinearSpring), link=link)
         if isinstance(link, NonlinearSpring):
@@ -286,7 +286,7 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
         stiffness=None if skew is None else np.diag(w**2) + modes.T @ skew @ modes,
         parts=tuple(replace(part, modes=(0, 0)) for part in basis.parts),
         rotation=None if basis.rotation is None else basis.rotation.in_modes(modes),
-        link_load=load @ modes if load.any() else None,
+        constant_load=load @ modes if load.any() else None,
         large_deflections=tuple(replace(one, coordinates=one.coordinates @ modes)
                                 for one in basis.large_deflections),
     )

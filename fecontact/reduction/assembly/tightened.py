@@ -39,7 +39,7 @@ class TightenedBolts:
     Attributes
     ----------
     basis : ModalBasis
-        With the springs that hold the bolts, and their forces as ``link_load``.
+        With the springs that hold the bolts, and their forces as ``constant_load``.
     tension : mapping of bolt to float
         Force of each bolt when it was tightened [N].
     shortening : mapping of bolt to float

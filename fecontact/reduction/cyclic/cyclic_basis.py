@@ -271,7 +271,7 @@ def cyclic_basis(
         boundaries=tuple(boundaries), boundary_rows=np.concatenate(rows),
         stiffness=None if not (rotation or prestress) else first.stiffness.real,
         contact_normals=nodes.normals, on_ground=nodes.on_ground,
-        link_load=load if load.any() else None, parts=_parts(parts))
+        constant_load=load if load.any() else None, parts=_parts(parts))
     return CyclicBasis(symmetry, dict(bodies), found, basis, nodes.gaps, tuple(loads))
 
 

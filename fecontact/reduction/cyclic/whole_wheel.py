@@ -206,7 +206,7 @@ class WholeWheel:
             first += count
         order = np.concatenate([np.zeros(0, int), *normals])
         squares = np.maximum(np.diag(self.stiffness), 0.0)
-        load = own.link_load
+        load = own.constant_load
         return ModalBasis(
             angular_frequencies=np.sqrt(squares), damping=self.damping,
             T=np.concatenate([np.zeros((2, *own.T.shape[1:2], self.modes)), *nodes,
@@ -218,7 +218,7 @@ class WholeWheel:
             thickness=own.thickness, stiffness=self.stiffness,
             contact_normals=None if own.contact_normals is None else own.contact_normals[order],
             on_ground=None if own.on_ground is None else own.on_ground[order],
-            link_load=None if load is None else np.append(
+            constant_load=None if load is None else np.append(
                 np.sqrt(N) * load, np.zeros(self.modes - len(load))))
 
     def per_sector(self, laws: Mapping[str, object]) -> dict[str, object]:
