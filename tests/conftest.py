@@ -40,7 +40,7 @@ LONG = {
     "test_disc_and_pads",
     "test_friction_damper", "test_lap_joint", "test_tipping_pad", "test_disc_brake",
     "test_bolted_plate", "test_friction_along_curves", "test_large_deflections",
-    "test_large_deflection_systems", "test_deflections",
+    "test_large_deflection_systems", "test_deflections", "test_deflections_joined",
     "test_sweep", "test_sweep_command", "test_sweep_strobed", "test_sweep_summaries",
     "test_movie", "test_analysis_plots", "test_trust", "test_damaged_files", "test_whole_files",
     "test_cli", "test_solid_commands", "test_cli_stop", "test_open", "test_locks", "test_bad_input",

@@ -44,6 +44,17 @@ def rectangle(length, height, columns, rows, **options):
                 **options)
 
 
+def joined(first, second, constraints=(), points=None):
+    """Two meshes as pieces of one, their boundaries as one.NAME and two.NAME."""
+    count = len(first.nodes)
+    boundaries = {f"{name}.{key}": facets + shift
+                  for name, mesh, shift in (("one", first, 0), ("two", second, count))
+                  for key, facets in mesh.boundaries.items()}
+    return Mesh(np.concatenate([first.nodes, second.nodes]),
+                np.concatenate([first.cells, second.cells + count]), boundaries, points or {},
+                constraints=constraints)
+
+
 def halved_towards_zero(length, times):
     """0 ... length, halved towards 0 so many times."""
     return np.concatenate([[0.0], length * 0.5 ** np.arange(times)[::-1]])

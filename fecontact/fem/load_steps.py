@@ -9,13 +9,13 @@ Comput. Struct. 13, 1981).
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
 
 from fecontact.core.errors import InputError, require_choice, require_finite, require_positive
 from fecontact.core.types import Array
-from fecontact.fem.finite_strain import FiniteStrainModel, StrainState
+from fecontact.fem.finite_strain import StrainState
 
 Steps = Literal["load", "arc"]
 # Iterations of Newton's method that a step should take, and bounds of the change of its length.
@@ -23,6 +23,17 @@ _WANTED, _LEAST, _MOST = 5, 0.4, 1.6
 # Displacement of an iteration, relative to the whole, that is rounding.
 _ROUNDING = 1e-11
 Loads = Callable[[Array], tuple[Array, Any]]
+
+
+class Equations(Protocol):
+    """Internal forces of a body over its free unknowns (f,), such as a FiniteStrainModel."""
+
+    @property
+    def expansion(self) -> Any:
+        """All displacements from the free unknowns, sparse (d n, f)."""
+
+    def state(self, q: Array) -> StrainState:
+        """Energy, forces and tangent at free unknowns."""
 
 
 @dataclass(frozen=True)
@@ -99,15 +110,15 @@ class FollowedPath:
 
 
 def follow(
-    model: FiniteStrainModel, loads: Loads, options: DeflectionSteps,
+    model: Equations, loads: Loads, options: DeflectionSteps,
     stop: Callable[[Array], bool] | None = None,
 ) -> FollowedPath:
     """Follow the equilibria of a body from no load to the load factor 1, or until ``stop``.
 
     Parameters
     ----------
-    model : FiniteStrainModel
-        The body.
+    model : Equations
+        Internal forces of the body, and of contacts if it has any.
     loads : callable
         Forces p (f,) of the whole load at free unknowns q, and their derivative or None.
     options : DeflectionSteps
@@ -117,10 +128,16 @@ def follow(
     """
     zero = np.zeros(model.expansion.shape[1])
     newton = _Newton(model, loads, options)
-    here = newton.point(zero, 0.0)
+    # Contacts may press without load.
+    start = newton.at_load(zero, 0.0)
+    if start is None:
+        return FollowedPath([newton.point(zero, 0.0)], False,
+                            "There is no equilibrium without load under the forces of the contacts "
+                            "alone.")
+    here, _ = start
     points, message = [here], ""
-    if not newton.size:
-        return FollowedPath([here, newton.point(zero, 1.0)], True, "There is no load.")
+    if not newton.loaded:
+        return FollowedPath([here, newton.point(here.q, 1.0)], True, "There is no load.")
     length, heading = options.first, newton.linear
     newton.scale = float(np.linalg.norm(newton.linear[:-1]))
     while len(points) <= options.most:
@@ -161,15 +178,14 @@ class _Newton:
     Points are (q, factor); ``scale`` makes displacements comparable with the factor.
     """
 
-    def __init__(self, model: FiniteStrainModel, loads: Loads, options: DeflectionSteps) -> None:
+    def __init__(self, model: Equations, loads: Loads, options: DeflectionSteps) -> None:
         self.model, self.loads, self.options = model, loads, options
         zero = np.zeros(model.expansion.shape[1])
         self.scale = 1.0
-        self.size = float(np.linalg.norm(loads(zero)[0]))
-        if self.size:
-            state = model.state(zero)
-            response = _factors(state.tangent).solve(loads(zero)[0])
-            self.linear = np.append(response, 1.0)
+        load, state = loads(zero)[0], model.state(zero)
+        self.loaded = bool(load.any())
+        self.size = float(np.linalg.norm(load if self.loaded else state.force)) or 1.0
+        self.linear = np.append(_factors(state.tangent).solve(load), 1.0)
 
     def point(self, q: Array, factor: float) -> PathPoint:
         """The equilibrium (q, factor) with its tangent."""

@@ -1,6 +1,6 @@
 """Arrays of a contact system for its compiled kernels."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -40,8 +40,8 @@ def system_arrays(
     """
     d, n = basis.dimension, basis.contact_nodes
     friction_groups = list(friction_groups)
-    normal, normal_parameters = _law_table(normal_groups)
-    friction, friction_parameters = _law_table(friction_groups)
+    normal, normal_parameters = law_table(normal_groups)
+    friction, friction_parameters = law_table(friction_groups)
     _set_return_times(basis, friction_groups, friction_parameters)
     # Of a node at least, as kernels take the largest number; without contact no node has it.
     memory = np.zeros(max(n, 1), dtype=np.int64)
@@ -218,7 +218,19 @@ def _set_return_times(basis: ModalBasis, friction_groups: list[LawGroup], table:
             table[nodes, 0] = _RETURN_PART / np.sqrt(square) if square > 0.0 else _RETURN_PART
 
 
-def _law_table(law_groups: Iterable[LawGroup]) -> tuple[Integers, Array]:
+def groups_of_laws(groups: Iterable[tuple[int, Any]], tributary: Array) -> Iterator[LawGroup]:
+    """Nodes, their shares of the face and law of groups of contact nodes, (count, law) each.
+
+    ``tributary`` (n,) are the parts of the face that belong to the nodes.
+    """
+    first = 0
+    for count, law in groups:
+        nodes = slice(first, first + count)
+        yield nodes, tributary[nodes] / tributary[nodes].sum(), law
+        first += count
+
+
+def law_table(law_groups: Iterable[LawGroup]) -> tuple[Integers, Array]:
     """Addresses (n,) and parameters (n, k) of the laws of all nodes."""
     groups = [(law, law.table(share)) for _, share, law in law_groups]
     nodes = sum(len(table) for _, table in groups)

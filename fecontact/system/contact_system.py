@@ -26,7 +26,7 @@ from fecontact.reduction.basis_parameters import basis_parameter, with_basis_par
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
-from fecontact.system.arrays import excited, system_arrays
+from fecontact.system.arrays import excited, groups_of_laws, system_arrays
 from fecontact.system.elastic_sliders import exact_arrays, slider_counts
 from fecontact.system.friction_memory import bristle_history, memory_scales, velocity_scale
 from fecontact.system.gap import Gap, gap_values
@@ -271,12 +271,8 @@ class ContactSystem(Summarised):
         counts = dict(basis.groups)
         groups += [(counts[one.group], one.law if kind == "normal" else NO_LAWS["friction"])
                    for one in basis.large_deflections]
-        first = 0
-        for count, law in groups:
-            nodes = slice(first, first + count)
-            if count or len(groups) == 1:
-                yield nodes, basis.tributary[nodes] / basis.tributary[nodes].sum(), law
-            first += count
+        return groups_of_laws(
+            [one for one in groups if one[0] or len(groups) == 1], basis.tributary)
 
     @property
     def share(self) -> Array:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from meshes_for_tests import rectangle
+from meshes_for_tests import joined, rectangle
 from solid_blocks import block_mesh
 
 from fecontact import (
@@ -26,17 +26,6 @@ from fecontact.reduction.solid_motions import rigid_motions
 
 STEEL = Material()
 TIE = Tie("one.right", "two.left")
-
-
-def joined(first, second, constraints=(), points=None):
-    """Two meshes as pieces of one, their boundaries as one.NAME and two.NAME."""
-    count = len(first.nodes)
-    boundaries = {f"{name}.{key}": facets + shift
-                  for name, mesh, shift in (("one", first, 0), ("two", second, count))
-                  for key, facets in mesh.boundaries.items()}
-    return Mesh(np.concatenate([first.nodes, second.nodes]),
-                np.concatenate([first.cells, second.cells + count]), boundaries, points or {},
-                constraints=constraints)
 
 
 def cut_block(first, second, *constraints, tetrahedra=False, gap=0.0, points=None):

@@ -1,7 +1,7 @@
 """Statics of elastic bodies with large deflections, by their finite elements."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.faces.contact_patches import Count
 from fecontact.fem.fields import BodyFields, body_elements
 from fecontact.fem.finite_strain import LARGE_STRAIN, FiniteStrainModel
 from fecontact.fem.follower_pressure import follower_pressure
@@ -20,6 +21,8 @@ from fecontact.fem.points import Place, place_rows
 from fecontact.laws.excitation import Load
 from fecontact.laws.signals.base import Signal
 from fecontact.reduction.eigenmodes import rigid_modes
+from fecontact.system.gap import Gap
+from fecontact.system.statics.ground_contact import GroundContact, GroundedModel, NormalLaws
 from fecontact.system.statics.static_solution import nodal_forces
 
 # Rotation up to which hinges and couplings are linear [rad].
@@ -42,11 +45,13 @@ class DeflectionPath(Summarised):
     unknowns : (s, f) array
         Displacements of the free unknowns, of bricks with their incompatible modes.
     energies : (s,) array
-        Strain energy [J].
+        Strain energy, with that of springs at points and of contacts [J].
     strains : (s,) array
         Largest component of Green and Lagrange's strain, without sign.
     unstable : (s,) integer array
         Number of negative eigenvalues of the tangent stiffness; zero in a stable state.
+    penetration, normal_force : (s, n) arrays
+        Of the contact nodes: penetration of the ground, below zero the gap [m], and force [N].
     reached : bool
         Whether the path ends with the whole load.
     message : str
@@ -60,6 +65,8 @@ class DeflectionPath(Summarised):
     energies: Array
     strains: Array
     unstable: Integers
+    penetration: Array
+    normal_force: Array
     reached: bool
     message: str
 
@@ -72,6 +79,8 @@ class DeflectionPath(Summarised):
             ("largest displacement", quantity(float(size), "m")),
             ("largest strain", f"{self.strains.max():.3g}"),
             ("unstable states", f"{np.count_nonzero(self.unstable)}"),
+            *([("nodes in contact", f"{np.count_nonzero(self.normal_force[-1])} of "
+                f"{self.normal_force.shape[1]}")] if self.normal_force.size else []),
             ("end", self.message),
         ]
 
@@ -104,6 +113,10 @@ def deflection_path(
     time: float = 0.0,
     follower: bool = False,
     steps: DeflectionSteps | None = None,
+    contact: str | Sequence[str] = (),
+    contact_nodes: Count | Sequence[Count] = "all",
+    normal: NormalLaws | None = None,
+    gap: Gap = 0.0,
 ) -> DeflectionPath:
     r"""Equilibria of a body with large deflections, from no load to the whole load.
 
@@ -112,8 +125,10 @@ def deflection_path(
 
     with Green and Lagrange's strain E, linear elastic (St. Venant and Kirchhoff's material).
     Displacements and rotations may be large, strains must be small. Supports, ties and constraints
-    are those of the body; hinges and couplings rotate by small angles. There is no contact: for
-    that give a reduced model ``large_deflections``, see :func:`~fecontact.modal_basis`.
+    are those of the body; hinges and couplings rotate by small angles. Contact is that with flat,
+    level ground, without friction, see :mod:`fecontact.system.statics.ground_contact`; for friction
+    and contact between bodies give a reduced model ``large_deflections``, see
+    :func:`~fecontact.modal_basis`.
 
     Parameters
     ----------
@@ -127,6 +142,12 @@ def deflection_path(
         True if pressures on boundaries act normal to the deformed outline, on its deformed size.
     steps : DeflectionSteps, optional
         Load steps by default; steps of the arc length pass limit points.
+    contact, contact_nodes : as of :func:`~fecontact.modal_basis`
+        Boundaries that may touch the ground, none by default, and their contact nodes.
+    normal : normal law, or mapping of boundary to normal law, optional
+        Force from penetration; required with contact.
+    gap : float, (n,) sequence, Crown or function of x
+        Initial distance of the contact nodes from the ground [m].
 
     Raises
     ------
@@ -158,15 +179,19 @@ def deflection_path(
         force, slope = follower_pressure(body, pressures, model.displacement(q))
         return dead + model.free(force), model.widened(slope)
 
-    path = follow(model, loads, steps or DeflectionSteps())
+    ground = GroundContact.of(body, contact, contact_nodes, normal, gap)
+    path = follow(GroundedModel(model, ground) if ground.laws else model, loads,
+                  steps or DeflectionSteps())
     found = path.points
+    depth = ground.penetration(np.array([model.displacement(one.q).ravel() for one in found]))
     result = DeflectionPath(
         body, np.array([one.factor for one in found]),
         np.array([model.displacement(one.q) for one in found]),
         np.array([one.q for one in found]),
         np.array([one.state.energy for one in found]),
         np.array([one.state.strain for one in found]),
-        np.array([one.unstable for one in found]), path.reached, path.message)
+        np.array([one.unstable for one in found]), depth,
+        np.array([ground.forces(one)[0] for one in depth]), path.reached, path.message)
     for sentence in _limits(result):
         warnings.warn(f"deflection_path: {sentence}", ModelWarning, stacklevel=2)
     return result
