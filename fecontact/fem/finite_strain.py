@@ -18,7 +18,8 @@ gradients g of the shape functions in the undeformed body,
 
 Both are exact derivatives of the energy, for which the rule of quadrature of the body stands. A
 plane body has no gradients along z; in plane stress C holds for S_zz = 0. The nine factors of
-incompatible modes of a brick are three further nodes of their own in each cell.
+incompatible modes of a brick are three further nodes of their own in each cell. Kinematic couplings
+and hinges turn by finite angles, see :mod:`fecontact.fem.finite_rotations`.
 """
 
 from dataclasses import dataclass
@@ -35,6 +36,7 @@ from fecontact.fem.cell_gradients import cell_gradients
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.equations import selects
 from fecontact.fem.fields import stress_of
+from fecontact.fem.finite_rotations import FiniteRotations
 from fecontact.fem.incompatible_modes import bubble_gradients
 from fecontact.fem.stress_stiffness import USED
 
@@ -122,22 +124,34 @@ class FiniteStrainModel:
         rows = sp.hstack([rows, sp.csr_array((rows.shape[0], more))])
         return sp.csr_array(rows.T @ sp.diags_array(k) @ rows)
 
+    @cached_property
+    def _rotations(self) -> FiniteRotations | None:
+        return FiniteRotations.of(self.body, self.expansion)
+
+    def _moved(self, q: Array) -> Array:
+        """Displacements (d n,), with factors of incompatible modes, from free unknowns (f,)."""
+        linear = np.asarray(self.expansion @ q)
+        return linear if self._rotations is None else linear + self._rotations.displacement(q)
+
     def displacement(self, q: Array) -> Array:
         """Displacements (N, d) of the nodes of the body from the free unknowns (f,)."""
-        d = self.body.dimension
-        return np.asarray(self.expansion @ q).reshape(-1, d)[: len(self.body.nodes)]
+        return self._moved(q).reshape(-1, self.body.dimension)[: len(self.body.nodes)]
 
     def stress(self, q: Array) -> Array:
         """Second stress of Piola and Kirchhoff (N, 4, k), of solids (N, 6, k), at the nodes [Pa].
 
         For free unknowns (f, k), in the order of :func:`fecontact.fem.stress_of`.
         """
-        u, own = np.asarray(self.expansion @ q), self.body.nodes.size
+        u, own = np.stack([self._moved(one) for one in q.T], axis=1), self.body.nodes.size
         return stress_of(self.body, u[:own], finite=True,
                          factors=u[own:] if self.body.has_incompatible_modes else None)
 
     def free(self, forces: Array) -> Array:
-        """Forces (f,) or (f, k) on the free unknowns of nodal forces (d N,) or (d N, k)."""
+        """Forces (f,) or (f, k) on the free unknowns of nodal forces (d N,) or (d N, k).
+
+        Nodes that turn as a rigid body pass on their resultant and the moment in the undeformed
+        body.
+        """
         found = np.zeros((self.expansion.shape[1], *forces.shape[1:]))
         own = self.body.expansion.T @ forces
         found[: len(own)] = own
@@ -148,7 +162,7 @@ class FiniteStrainModel:
         import scipy.sparse as sp
 
         d = self.body.dimension
-        u = np.asarray(self.expansion @ q)
+        u = self._moved(q)
         force = np.zeros((self.nodes, d))
         indptr, indices, slots = self._pattern
         blocks = np.zeros((len(indices) if tangent else 0, d, d))
@@ -162,16 +176,29 @@ class FiniteStrainModel:
             pull = self._springs @ u
             energy, total = energy + 0.5 * float(u @ pull), total + pull
             K = None if K is None else K + self._springs
-        return StrainState(energy, np.asarray(self.expansion.T @ total),
-                           None if K is None else self.reduced(K), float(found[1, 0]))
+        return StrainState(energy, *self._on_free(q, total, K), float(found[1, 0]))
 
-    def widened(self, matrix: Any) -> Any:
-        """Sparse (f, f) matrix over the free unknowns of one over displacements of the body."""
+    def acting(self, q: Array, force: Array, matrix: Any) -> tuple[Array, Any]:
+        """Forces (f,) and their sparse derivative (f, f) at free unknowns.
+
+        Of forces (d N,) on the deflected nodes and their derivative, sparse (d N, d N).
+        """
         import scipy.sparse as sp
 
-        more = self.body.dimension * self.nodes - matrix.shape[0]
-        wide = sp.block_diag([matrix, sp.csc_array((more, more))]) if more else matrix
-        return self.reduced(sp.csc_array(wide))
+        more = self.body.dimension * self.nodes - len(force)
+        if more:
+            matrix = sp.csc_array(sp.block_diag([matrix, sp.csc_array((more, more))]))
+        return self._on_free(q, np.append(force, np.zeros(more)), matrix)
+
+    def _on_free(self, q: Array, force: Array, K: Any) -> tuple[Array, Any]:
+        """Forces and tangent over the free unknowns; K may be None."""
+        turning = self._rotations
+        if turning is None:
+            return np.asarray(self.expansion.T @ force), None if K is None else self.reduced(K)
+        J = (self.expansion + turning.slopes(q)).tocsc()
+        if K is not None:
+            K = (J.T @ K @ J + turning.curvature(q, force)).tocsc()
+        return np.asarray(J.T @ force), K
 
     def reduced(self, matrix: Any) -> Any:
         """Sparse (f, f) matrix over the free unknowns of one over all displacements."""

@@ -46,7 +46,8 @@ def reference_motions(body: Any) -> dict[str, Any]:
     scale = np.where(np.isin(moving, turning), 1.0 / body.mesh.extent, 1.0)
     found = sp.lil_array((unknowns.count, size))
     found.setdiag(1.0)
-    parts, label = connected_components(C_m.T @ C_m, directed=False)
+    # Signs aside, as arms on both sides of a reference point would cancel.
+    parts, label = connected_components(abs(C_m).T @ abs(C_m), directed=False)
     for part in range(parts):
         own = np.flatnonzero(label == part)
         rows = np.unique(C_m[:, own].nonzero()[0])

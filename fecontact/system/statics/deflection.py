@@ -11,9 +11,11 @@ from fecontact.core.errors import InputError, ModelWarning, require_finite
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity
+from fecontact.fem.constraints import Coupling
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.faces.contact_patches import Count
 from fecontact.fem.fields import BodyFields, body_elements
+from fecontact.fem.finite_rotations import turning_nodes
 from fecontact.fem.finite_strain import LARGE_STRAIN, FiniteStrainModel
 from fecontact.fem.follower_pressure import follower_pressure
 from fecontact.fem.load_steps import DeflectionSteps, follow
@@ -25,8 +27,10 @@ from fecontact.system.gap import Gap
 from fecontact.system.statics.ground_contact import GroundContact, GroundedModel, NormalLaws
 from fecontact.system.statics.static_solution import nodal_forces
 
-# Rotation up to which hinges and couplings are linear [rad].
+# Rotation up to which distributing couplings are linear [rad].
 SMALL_ANGLE = 0.1
+# Strain by the linear equations of a rotation, relative to that of the body, that is small.
+_FALSE = 0.01
 
 
 @read_only_arrays
@@ -86,8 +90,10 @@ class DeflectionPath(Summarised):
 
     def displacement(self, place: Place) -> Array:
         """Displacements (s, d) of a point of the mesh, a boundary's mean, or a place [m]."""
-        d = self.body.dimension
-        rows = place_rows(self.body, place, "displacement").matrix[:d]
+        body = self.body
+        rows = place_rows(body, place, "displacement").matrix[: body.dimension]
+        if isinstance(place, str) and place in body.references:
+            return np.asarray((rows @ _linear_displacements(self)).T)
         return np.asarray((rows @ self.displacements.reshape(len(self.load_factors), -1).T).T)
 
     def fields(self, state: int = -1) -> BodyFields:
@@ -125,7 +131,8 @@ def deflection_path(
 
     with Green and Lagrange's strain E, linear elastic (St. Venant and Kirchhoff's material).
     Displacements and rotations may be large, strains must be small. Supports, ties and constraints
-    are those of the body; hinges and couplings rotate by small angles. Contact is that with flat,
+    are those of the body; distributing couplings rotate by small angles. Forces on nodes of hinges
+    and kinematic couplings keep their moment about the reference point. Contact is that with flat,
     level ground, without friction, see :mod:`fecontact.system.statics.ground_contact`; for friction
     and contact between bodies give a reduced model ``large_deflections``, see
     :func:`~fecontact.modal_basis`.
@@ -157,8 +164,9 @@ def deflection_path(
     Warns
     -----
     ModelWarning
-        If the whole load was not reached, for strains above 1 %, and for hinges and couplings that
-        turn by more than 0.1 rad.
+        If the whole load was not reached, for strains above 1 %, for distributing couplings that
+        turn by more than 0.1 rad, and for nodes of a hinge or kinematic coupling that turns and
+        that another constraint or support holds too.
     """
     require_kind("deflection_path", ElasticBody, body=body)
     require_kind("deflection_path", Load, load=load)
@@ -177,7 +185,8 @@ def deflection_path(
         if not pressures:
             return dead, None
         force, slope = follower_pressure(body, pressures, model.displacement(q))
-        return dead + model.free(force), model.widened(slope)
+        pushed, stiffness = model.acting(q, force, slope)
+        return dead + pushed, stiffness
 
     ground = GroundContact.of(body, contact, contact_nodes, normal, gap)
     path = follow(GroundedModel(model, ground) if ground.laws else model, loads,
@@ -223,20 +232,22 @@ def _limits(path: DeflectionPath) -> list[str]:
     if path.strains.max() > LARGE_STRAIN:
         found.append(f"the strain reaches {path.strains.max():.2g}; above {LARGE_STRAIN:g} metals "
                      f"yield and rubber has another law, so lower the load.")
-    turned = max(_rotations(path), default=0.0)
+    body, linear = path.body, _linear_displacements(path)
+    turned = max((float(np.abs(body.motion_rows(one.reference)[body.dimension :] @ linear).max())
+                  for one in body.equations
+                  if isinstance(one, Coupling) and one.kind == "distributing"), default=0.0)
     if turned > SMALL_ANGLE:
-        found.append(f"a hinge or the reference point of a coupling turns by {turned:.2g} rad; "
-                     f"their equations are those of small angles up to {SMALL_ANGLE:g} rad.")
+        found.append(f"the reference point of a distributing coupling turns by {turned:.2g} rad; "
+                     f"its equations are those of small angles up to {SMALL_ANGLE:g} rad.")
+    found += [f"nodes of {one.name} turn as a rigid body, but other constraints or supports hold "
+              f"some of them too, so that their equations are those of small angles and strain the "
+              f"body; let no other one name these nodes."
+              for one in turning_nodes(body) if one.shared and (
+                  np.linalg.norm(one.rows @ linear, axis=0)**2 > 2.0 * _FALSE * path.strains).any()]
     return found
 
 
-def _rotations(path: DeflectionPath) -> list[float]:
-    """Largest rotations of hinges and reference points of couplings [rad]."""
-    body, d = path.body, path.body.dimension
-    flat = path.displacements.reshape(len(path.load_factors), -1).T
-    found = [float(np.abs(body.motion_rows(name)[d:] @ flat).max()) for name in body.references]
-    for hinge in body.hinges:
-        arms = np.linalg.norm(body.nodes[hinge.nodes] - hinge.centre, axis=1).max()
-        moved = np.linalg.norm(path.displacements[:, hinge.nodes], axis=2).max()
-        found.append(float(moved / arms))
-    return found
+def _linear_displacements(path: DeflectionPath) -> Array:
+    """Displacements (d N, s) by the linear equations of couplings and hinges."""
+    E = path.body.expansion
+    return np.asarray(E @ path.unknowns[:, : E.shape[1]].T)

@@ -123,10 +123,11 @@ class GroundedModel:
         contact = self.contact
         depth = contact.penetration(self.model.displacement(q).ravel())
         force, slope = contact.forces(depth)
-        stiffness = contact.rows.T @ sp.diags_array(slope) @ contact.rows
+        pull, stiffness = self.model.acting(
+            q, -(contact.rows.T @ force),
+            sp.csc_array(contact.rows.T @ sp.diags_array(slope) @ contact.rows))
         return replace(found, energy=found.energy + contact.stored_energy(depth),
-                       force=found.force - self.model.free(contact.rows.T @ force),
-                       tangent=(found.tangent + self.model.widened(stiffness)).tocsc())
+                       force=found.force + pull, tangent=(found.tangent + stiffness).tocsc())
 
 
 def _laws(normal: NormalLaws, groups: Sequence[tuple[str, int]]) -> Iterator[tuple[int, NormalLaw]]:
