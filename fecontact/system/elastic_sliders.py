@@ -13,7 +13,7 @@ import numpy as np
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.core.types import Array, Integers
-from fecontact.laws.signatures import ground_at
+from fecontact.laws.signatures import friction_law, ground_at
 from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import (
     SystemArrays,
@@ -188,6 +188,20 @@ def slider_counts(system: Any) -> Integers:
         if law.memory and law.sliders(share) is not None:
             counts[nodes] = law.memory
     return counts
+
+
+@friction_law
+def no_friction(v, F, p):
+    """Nothing: what nodes feel beside their elements."""
+    return 0.0, 0.0, 0.0
+
+
+def without_elements(arrays: SystemArrays) -> SystemArrays:
+    """Arrays of a system of plane bodies whose nodes feel no friction, with its parameters."""
+    return arrays._replace(
+        memory=np.zeros_like(arrays.memory),
+        friction=np.full_like(arrays.friction, no_friction.address),
+        bristle_stiffness=np.zeros((2, len(arrays.memory), 0)))
 
 
 def exact_arrays(arrays: SystemArrays, counts: Integers) -> SystemArrays:

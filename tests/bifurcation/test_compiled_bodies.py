@@ -155,9 +155,6 @@ def test_derivatives_are_those_of_the_residual(name, friction):
     u = np.append(np.random.default_rng(2).normal(size=problem.size), field.values[0])
     here = problem.linearise(u)
     assert isinstance(here, CompiledLinearisation)
-    if name.startswith("friction") and isinstance(friction, JenkinsFriction):
-        # Laws are differenced across the kink at the limit of an element: a known shortcoming.
-        pytest.xfail("derivatives to the limits of elastic Coulomb elements are one-sided")
     steady = problem.equations(float(u[-1])).numbers[4]
     assert steady == (name.startswith("drive"))
     differences = np.empty(here.condensed.shape)

@@ -61,18 +61,17 @@ def exact(w):
 
 
 @pytest.mark.parametrize("w", [1.05, 1.1, 1.2, 1.3])
-@pytest.mark.parametrize("samples", [32, 64, 128, 512])
+@pytest.mark.parametrize("samples", [7, 8, 16, 32])
 def test_it_is_the_distance_to_the_describing_function(w, samples):
     problem, u = orbit(jenkins(w), 1, samples)
     off = abs(u[1] - 1j * u[2] - exact(w)) / abs(exact(w))
     assert 0.5 * off < sampling_error(problem, u, fixed(u)) < 2.0 * off
 
 
-@pytest.mark.parametrize("samples", [32, 128])
-def test_along_a_branch_it_is_the_distance_at_right_angles(samples):
+def test_along_a_branch_it_is_the_distance_at_right_angles():
     """From the curve of the describing function."""
     branch = frequency_response(
-        jenkins_system(), BOUNDS, method=HarmonicBalance(1, samples, stability=None),
+        jenkins_system(), BOUNDS, method=HarmonicBalance(1, 8, stability=None),
         options=ContinuationOptions(points=60, largest_step=0.1)).branches[0]
     turned = 0
     for point in branch.points[1:-1:7]:
@@ -184,10 +183,10 @@ def test_orbits_at_rest_have_no_error(bounds):
 def test_samples_are_doubled_until_a_response_is_accurate(stability):
     found = frequency_response(
         jenkins_system(), BOUNDS, method=HarmonicBalance(
-            1, 32, stability=stability, sampling_tolerance=1e-3),
+            1, 4, stability=stability, sampling_tolerance=1e-3),
         options=ContinuationOptions(points=60, largest_step=0.1)).branches[0]
     samples = found.attributes["samples"]
-    assert samples in (128, 256)
+    assert samples == 16
     assert found.attributes["sampling_error"] < 1e-3
     off = [abs((point.u[1] - 1j * point.u[2]) / exact(TURN * point.parameter) - 1.0)
            for point in found.points[::6]]
@@ -208,18 +207,18 @@ def test_samples_are_doubled_until_a_response_is_accurate(stability):
 def test_harmonics_and_samples_grow_together():
     found = frequency_response(
         jenkins_system(), (1.15 / TURN, 1.2 / TURN), method=HarmonicBalance(
-            1, 16, tolerance=2e-3, sampling_tolerance=2e-3, stability=None),
+            1, 4, tolerance=2e-3, sampling_tolerance=1e-4, stability=None),
         options=ContinuationOptions(points=4)).branches[0]
     assert found.column("truncation_error").max() <= 2e-3
-    assert found.attributes["sampling_error"] <= 2e-3
+    assert found.attributes["sampling_error"] <= 1e-4
     assert found.attributes["harmonics"] > 2
-    assert found.attributes["samples"] > 16 * found.attributes["harmonics"]
+    assert found.attributes["samples"] > 4 * found.attributes["harmonics"]
 
 
 def test_modes_get_samples_enough_too():
     mode = nonlinear_mode(jenkins_system(), (2.5, 6.0), method=HarmonicBalance(
-        1, 32, sampling_tolerance=2e-3), options=ContinuationOptions(points=60, largest_step=0.1))
-    assert mode.branch.attributes["samples"] > 32
+        1, 4, sampling_tolerance=2e-3), options=ContinuationOptions(points=60, largest_step=0.1))
+    assert mode.branch.attributes["samples"] > 4
     assert mode.branch.attributes["sampling_error"] <= 2e-3
 
 

@@ -2,6 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
+from copy import copy
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -14,6 +15,7 @@ from fecontact.core.checks import as_texts, require_kind
 from fecontact.core.types import Array
 from fecontact.system import jacobian as kernels
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.elastic_sliders import without_elements
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.forcing_period import common_period, drive_sets_period
 from fecontact.system.nodes import SystemArrays
@@ -44,6 +46,7 @@ class ContactField(VectorField):
         self.state_names = (*(f"q{i}" for i in modes), *(f"q{i}'" for i in modes),
                             *(f"z{j}.{k + 1}" for j in range(base.basis.contact_nodes)
                               for k in range(base.memory)))
+        self._bare = False
         varying = family.varying
         self._constant_period = varying is not None and not self._moves_forcing(varying)
 
@@ -77,7 +80,17 @@ class ContactField(VectorField):
 
     def arrays(self, values: Array) -> SystemArrays:
         """Arrays of the system for kernels, for parameter values (k,)."""
-        return self._family.arrays(values)
+        found = self._family.arrays(values)
+        return without_elements(found) if self._bare else found
+
+    def without_elements(self) -> "ContactField":
+        """The field of the states [q, q'] of plane bodies that feel no friction.
+
+        It has the same parameters, those of friction too.
+        """
+        found = copy(self)
+        found._bare, found.state_names = True, self.state_names[: 2 * self._family.base.basis.modes]
+        return found
 
     @property
     def constant_period(self) -> bool:
@@ -87,7 +100,7 @@ class ContactField(VectorField):
     def rates(self, t: Array, x: Array, values: Array) -> Array:
         """Rates (N, d); see :meth:`VectorField.rates`."""
         f = np.empty_like(x)
-        kernels.batch_rates(t, x, self._family.arrays(values), f)
+        kernels.batch_rates(t, x, self.arrays(values), f)
         return f
 
     def derivatives(
@@ -97,7 +110,7 @@ class ContactField(VectorField):
         chosen = tuple(active)
         n, d = x.shape
         f, J = np.empty((n, d)), np.empty((n, d, d))
-        arrays = self._family.arrays(values)
+        arrays = self.arrays(values)
         if not chosen:
             kernels.batch_derivatives(t, x, arrays, arrays, 0.0, f, J, np.empty((0, 0)))
             return f, J, np.empty((n, d, 0))

@@ -9,6 +9,7 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks, kink_onsets
+from fecontact.bifurcation.harmonic.elements import follow_elements
 from fecontact.bifurcation.harmonic.engine_order import Waves
 from fecontact.bifurcation.harmonic.few_contacts import Factors, FewContacts, contact_directions
 from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
@@ -29,7 +30,7 @@ from fecontact.system.fields.vector_field import VectorField
 _DIFFERENCE = 1e-5
 UNREPEATED = ("The internal variables of friction do not come to repeat; take more samples a "
               "period.")
-_NOTHING_KEPT = Kept(np.zeros((0, 0)), np.zeros(0), np.zeros(0, dtype=np.int64))
+_NOTHING_KEPT = Kept(np.zeros((0, 0)), np.zeros(0), *np.zeros((2, 0), dtype=np.int64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +40,9 @@ class Balance:
     With tau = t / T, displacements q and other states y are Fourier series with H harmonics,
     velocities follow from q. The residuals q'' - f_v and y' - f_y, at N samples a period, have no
     part in the harmonics 0..H (alternating frequency and time). Internal variables z of friction
-    are marched around the period; see :mod:`fecontact.bifurcation.harmonic.memory`. If f does not
+    are marched around the period, see :mod:`fecontact.bifurcation.harmonic.memory`; elastic Coulomb
+    elements of plane bodies are followed exactly, see
+    :mod:`fecontact.bifurcation.harmonic.elements`, and f is that without them. If f does not
     depend on t, T is an unknown and the phase is fixed by int <x, y'> = 0 with the orbit y before;
     else T is ``periods`` times the period of the forcing.
 
@@ -183,9 +186,44 @@ class Balance:
                       np.zeros((1, 1, 1)) if derivatives is None else derivatives, widths)
         return widths
 
+    @cached_property
+    def bare(self) -> VectorField:
+        """The field without elements that are followed exactly."""
+        if not self.kept.exact:
+            return self.field
+        assert isinstance(self.field, ContactField)
+        return self.field.without_elements()
+
+    def bare_states(self, states: Array) -> Array:
+        """States (N, d) without elements that are followed exactly."""
+        return np.ascontiguousarray(states[:, : self.bare.dimension])
+
+    def followed(
+        self, u: Array, period: float, derivatives: bool = True
+    ) -> tuple[Array, Array, Array]:
+        """Friction (n, N) of elements at the samples, deflections (N, c), and derivatives.
+
+        The latter (n, N, 4 H + 2) are those to coefficients along tangent and normal.
+
+        Raises
+        ------
+        AnalysisError
+            If elements do not come to repeat.
+        """
+        assert isinstance(self.field, ContactField)
+        n, N = len(self.kept.elements), self.samples
+        r, z = np.zeros((n, N)), np.zeros((N, self.layout.memory))
+        rows = np.zeros((n, N, 4 * self.harmonics + 2) if derivatives else (0, 0, 0))
+        X = np.ascontiguousarray(self.coefficients(u)[:, : self.layout.displacements])
+        if not follow_elements(X, period, self.field.arrays(self.parameters(u)),
+                               self.kept.elements, self.kept.offsets, self.series.values,
+                               derivatives, r, z, rows):
+            raise AnalysisError(UNREPEATED)
+        return r, z, rows
+
     def rates(self, times: Array, states: Array, values: Array, period: float) -> Array:
-        """Rates (N, d) at the samples, with kinks between them."""
-        found = self.field.rates(times, states, values)
+        """Rates (N, d) at the samples, with kinks between them; those of :attr:`bare`."""
+        found = self.bare.rates(times, self.bare_states(states), values)
         self.add_kinks(times, states, values, period, found)
         return found
 
@@ -271,9 +309,22 @@ class Linearised:
         return self.problem.marched(self.u, self.period)
 
     @cached_property
+    def elements(self) -> tuple[Array, Array, Array]:
+        """See :meth:`Balance.followed`."""
+        return self.problem.followed(self.u, self.period)
+
+    @cached_property
+    def tangents(self) -> Array:
+        """Rows (n, m) of the displacements of nodes along their tangents."""
+        assert isinstance(self.problem.field, ContactField)
+        return self.problem.field.arrays(self.problem.parameters(self.u)).rows[:, 0]
+
+    @cached_property
     def memory(self) -> Array:
         """Internal variables (N, c) at the samples."""
         layout = self.problem.layout
+        if self.problem.kept.exact:
+            return self.elements[1]
         if not layout.memory:
             return np.zeros((self.problem.samples, 0))
         return np.ascontiguousarray(self.marched[:, layout.states - layout.memory :])
@@ -285,17 +336,24 @@ class Linearised:
 
     @cached_property
     def rates(self) -> Array:
-        """Rates f (N, d) at the samples."""
+        """Rates f (N, d) at the samples, without those of elements that are followed exactly."""
         if "derivatives" in self.__dict__:
-            return self.derivatives[0]
-        return self.problem.rates(self.times, self.states, self.problem.parameters(self.u),
-                                  self.period)
+            found = self.derivatives[0]
+        else:
+            found = self.problem.rates(self.times, self.states, self.problem.parameters(self.u),
+                                       self.period)
+        if self.problem.kept.exact:
+            found = found.copy()
+            m = self.problem.layout.displacements
+            found[:, m : 2 * m] -= self.elements[0].T @ self.tangents
+        return found
 
     @cached_property
     def derivatives(self) -> tuple[Array, Array, Array]:
-        """Rates and their derivatives to states and parameter at the samples."""
+        """Rates without elements, and their derivatives to states and parameter at the samples."""
         problem, values = self.problem, self.problem.parameters(self.u)
-        f, J, P = problem.field.derivatives(self.times, self.states, values, (problem.free,))
+        f, J, P = problem.bare.derivatives(self.times, problem.bare_states(self.states), values,
+                                           (problem.free,))
         if problem.onsets.size:
             self._widths = problem.add_kinks(self.times, self.states, values, self.period, f, J)
             h = _DIFFERENCE * max(abs(float(self.u[-1])), 1e-3)
@@ -305,6 +363,17 @@ class Linearised:
                 problem.add_kinks(self.times, self.states, beside, self.period, change)
                 P[:, :, 0] += side * change / (2.0 * h)
         return f, J, P
+
+    @property
+    def by_states(self) -> Array:
+        """Derivatives (N, d, d) of the rates to all states at the samples, z among them."""
+        problem = self.problem
+        if not problem.kept.exact:
+            return self.derivatives[1]
+        values = problem.parameters(self.u)
+        f, J, _ = problem.field.derivatives(self.times, self.states, values)
+        problem.add_kinks(self.times, self.states, values, self.period, f, J)
+        return J
 
     @cached_property
     def residual(self) -> Array:
@@ -441,6 +510,27 @@ class Linearised:
                      problem.kept.blocks, right)
         return right
 
+    def _add_elements(self, found: Array) -> None:
+        """Add what elements contribute to derivatives (n, n + e) of the balance."""
+        problem, u, rows = self.problem, self.u, self.tangents
+        assert isinstance(problem.field, ContactField)
+        L, n = len(problem.reference), problem.size
+        change = problem.series.projection @ self.elements[2]
+        both = problem.field.arrays(problem.parameters(u)).rows
+        within = found[:n, :n].reshape(L, -1, L, both.shape[2])
+        for axis in range(2):
+            within += np.einsum("jqk,ji,jo->qiko", change[:, :, axis * L : (axis + 1) * L], rows,
+                                both[:, axis], optimize=True)
+        for column in range(-problem.common, 0):
+            h = _DIFFERENCE * max(abs(float(u[column])), 1e-3)
+            sides = []
+            for sign in (1.0, -1.0):
+                end = u.copy()
+                end[column] += sign * h
+                sides.append(problem.followed(end, problem.period(end), False)[0])
+            by_column = problem.series.projection @ ((sides[0] - sides[1]).T / (2.0 * h) @ rows)
+            found[:n, column] += by_column.reshape(-1)
+
     def _coupled(self, z: Array) -> Array:
         """Change (n, columns) of the balance with a change (N, c, columns) of z."""
         problem, layout, transforms = self.problem, self.problem.layout, self.problem.series
@@ -464,7 +554,9 @@ class Linearised:
         n = problem.size
         found = np.empty((n + problem.autonomous, n + problem.common))
         found[:n, :n], found[:n, n:] = self.matrix, self._common
-        if problem.layout.memory:
+        if problem.kept.exact:
+            self._add_elements(found)
+        elif problem.layout.memory:
             found[:n] += self._coupled(self._followed)
         if problem.autonomous:
             found[n, :n], found[n, n:] = problem.phase_row, 0.0

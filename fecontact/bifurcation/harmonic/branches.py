@@ -305,13 +305,16 @@ def sampling_error(
     A step of Newton's method leads to the orbits of twice the samples, at right angles to the
     tangent, so that at folds it is as long as elsewhere. What is left of the residual with as many
     samples as the problem has is no error of theirs, and taken off. Kinks of laws make errors of
-    order 1 / N^2, of which a fourth is left there: the error is four thirds of that step.
+    order 1 / N^2, of which a fourth is left there: the error is four thirds of that step. Forces
+    whose second half of a period mirrors the first are the same at an odd number of samples and at
+    twice as many: these are taken four times.
 
     Its length is the root of three squares: the root mean square of harmonics 1 to H, relative to
     that of the orbit or ``least``, whichever is larger; the change of an unknown period, relative
     to it; that of the parameter, in widths of the diagram.
     """
-    finer = replace(problem, samples=2 * problem.samples, before=(), bend=None)
+    samples = problem.samples * (4 if problem.samples % 2 else 2)
+    finer = replace(problem, samples=samples, before=(), bend=None)
     try:
         linearised = finer.linearise(u)
         residual = linearised.residual - problem.evaluate(u).residual

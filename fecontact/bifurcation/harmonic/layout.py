@@ -91,6 +91,19 @@ def memory_blocks(field: VectorField, layout: Layout) -> Integers:
     return np.where(slider_counts(system) > 0, system.basis.dimension - 1, 0)
 
 
+def element_counts(field: VectorField, layout: Layout) -> Integers:
+    """Numbers (n,) of elements of the nodes, followed exactly; zero for all where there are others.
+
+    Others are internal variables that are no elements, and elements in two directions.
+    """
+    if not (layout.memory and isinstance(field, ContactField)):
+        return np.zeros(layout.nodes, dtype=np.int64)
+    system = field.system()
+    counts = slider_counts(system)
+    exact = system.basis.dimension == 2 and np.array_equal(counts, system.arrays.memory)
+    return counts if exact else np.zeros_like(counts)
+
+
 def filled(layout: Layout, X: Array, z: Array, period: float, values: Array) -> Array:
     """States (N, d) from coefficients, internal variables (N, c) and the basis (N, 2 H + 1)."""
     m, end = layout.displacements, layout.states - layout.memory

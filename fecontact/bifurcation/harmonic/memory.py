@@ -11,6 +11,9 @@ that never slides: s is the deflection x + a of an element that has stuck since 
 the part that it slid back then (:class:`Kept`). One that slides a little gives up as much of a as
 it must. What is found repeats, so that its derivatives are those of these equations, cyclic, node
 by node and element by element.
+
+Elastic Coulomb elements of plane bodies are marched only beside other internal variables, see
+:mod:`fecontact.bifurcation.harmonic.elements`.
 """
 
 from dataclasses import dataclass
@@ -43,11 +46,20 @@ class Kept:
     blocks : (n,) array
         How many internal variables of each node act on each other: those of an element, and all of
         others, 0.
+    elements : (n,) array
+        Numbers of elements of each node that are followed exactly, see
+        :mod:`fecontact.bifurcation.harmonic.elements`; none or all are.
     """
 
     rows: Array
     offsets: Array
     blocks: Integers
+    elements: Integers
+
+    @property
+    def exact(self) -> bool:
+        """Whether all internal variables are those of elements that are followed exactly."""
+        return bool(self.elements.any())
 
     def at(self, q: Array) -> Array:
         """Deflections (N, c) for displacements q (N, m)."""
@@ -57,7 +69,8 @@ class Kept:
         """Those that elements have after states (N, d), on the average."""
         c, m = self.rows.shape
         return Kept(self.rows, (states[:, states.shape[1] - c :]
-                                - states[:, :m] @ self.rows.T).mean(axis=0), self.blocks)
+                                - states[:, :m] @ self.rows.T).mean(axis=0), self.blocks,
+                    self.elements)
 
 
 def differences(z: Array) -> Array:

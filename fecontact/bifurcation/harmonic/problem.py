@@ -73,7 +73,7 @@ class HarmonicLinearisation(Linearised):
         """Multipliers and stability."""
         if self.problem.stability != "Koopman-Hill":
             return by_transitions(self.problem, self.u, self.memory)
-        return by_hill(self.problem, self.u, self.derivatives[1])
+        return by_hill(self.problem, self.u, self.by_states)
 
     @cached_property
     def neglected(self) -> tuple[float, float]:

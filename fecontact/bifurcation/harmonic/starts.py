@@ -13,7 +13,12 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.engine_order import EngineOrder, WaveField, Waves
-from fecontact.bifurcation.harmonic.layout import element_rows, layout_of, memory_blocks
+from fecontact.bifurcation.harmonic.layout import (
+    element_counts,
+    element_rows,
+    layout_of,
+    memory_blocks,
+)
 from fecontact.bifurcation.harmonic.memory import Kept
 from fecontact.bifurcation.harmonic.method import HarmonicBalance, require_wave
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
@@ -48,7 +53,7 @@ def problem_for(
     layout = layout_of(field)
     kept = Kept(element_rows(field, layout),
                 np.zeros(layout.memory) if offsets is None else np.array(offsets, dtype=float),
-                memory_blocks(field, layout))
+                memory_blocks(field, layout), element_counts(field, layout))
     found = HarmonicProblem(
         field, values.copy(), free, method.highest, method.count,
         np.zeros((2 * method.highest + 1, layout.harmonic)), scales, layout, periods,

@@ -56,8 +56,8 @@ def derivatives_along(
             for i in range(c):
                 x[p, 2 * m + i] = ((1.0 - part_of) * zs[k, first % N, i]
                                    + part_of * zs[k, (first + 1) % N, i])
-        batch_derivatives(t, x, e.contact, e.contact, 0.0, f, J[k], np.empty((0, 0)))
-        add_kinks(t, x, e.contact, e.onsets, T / N, 1, f, J[k], widths)
+        batch_derivatives(t, x, e.whole, e.whole, 0.0, f, J[k], np.empty((0, 0)))
+        add_kinks(t, x, e.whole, e.onsets, T / N, 1, f, J[k], widths)
         for p in range(P):
             for i in range(m):
                 for j in range(m):

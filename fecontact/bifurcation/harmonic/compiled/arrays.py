@@ -20,7 +20,9 @@ class Room(NamedTuple):
     in the last row. Plain contact forces are found row by row over the samples: ``motion`` (2 m, N)
     displacements and velocities, ``pushes`` (m, N) forces, ``node`` (9, N) what belongs to a
     node; ``widths`` (m, N) is what kinks add, see
-    :func:`fecontact.bifurcation.harmonic.compiled.kinks.add_kinks`.
+    :func:`fecontact.bifurcation.harmonic.compiled.kinks.add_kinks`. ``friction`` (3, n, N) is that
+    of elements which are followed exactly, with what it is beside the parameter; ``by_node``
+    (n, N, 4 H + 2) are its derivatives, ``left`` (N, c) room for deflections.
     """
 
     t: Vector
@@ -56,6 +58,9 @@ class Room(NamedTuple):
     pushes: Matrix
     node: Matrix
     widths: Matrix
+    friction: Block
+    by_node: Block
+    left: Matrix
 
 
 class Equations(NamedTuple):
@@ -66,16 +71,18 @@ class Equations(NamedTuple):
     and damping are ``body`` (4, m, m), values at p = 0 and slopes of both, loads ``given`` (2, N,
     m) at the samples, with the harmonics ``pulls`` (2, 2 H + 1, m). Otherwise ``contact`` is the
     whole system and these are zero. ``springs`` (c, m) and ``offsets`` (c,) give the deflections to
-    which internal variables return, ``blocks`` (n,) how many of a node act on each other,
-    ``onsets`` (k, n) the penetrations at which normal forces have kinks. Numbers are the period
-    times p or 0, the period, least and largest p for which this holds, whether contact forces do
-    not depend on p and t, whether they are plain, of displacements and velocities in the plane
-    alone, bounds of the branch, tolerance, largest step, largest turn, Newton's rounding, whether
-    folds are located, whether all forces at rest have no mean; and of Newton's method the size of a
-    second step over the square of the first, negative if unknown, with the number of times it was
-    relied on; and whether contact forces may have kinks. ``limits`` (m,) bound the scales of the
-    displacements; ``nodes`` have internal variables. ``kept`` are the rows of the coefficients
-    (2 H + 1, m) that are unknown, the others are zero.
+    which internal variables return, ``blocks`` (n,) how many of a node act on each other; these are
+    none where all are elements that are followed exactly, ``elements`` (n,) numbers of which with
+    ``kept_offsets`` (c,) of those that never slide. Then ``contact`` is without them, ``whole``
+    with them. ``onsets`` (k, n) the penetrations at which normal forces have kinks. Numbers are the
+    period times p or 0, the period, least and largest p for which this holds, whether contact
+    forces do not depend on p and t, whether they are plain, of displacements and velocities in the
+    plane alone, bounds of the branch, tolerance, largest step, largest turn, Newton's rounding,
+    whether folds are located, whether all forces at rest have no mean; and of Newton's method the
+    size of a second step over the square of the first, negative if unknown, with the number of
+    times it was relied on; and whether contact forces may have kinks. ``limits`` (m,) bound the
+    scales of the displacements; ``nodes`` have internal variables. ``kept`` are the rows of the
+    coefficients (2 H + 1, m) that are unknown, the others are zero.
     """
 
     contact: SystemArrays
@@ -93,6 +100,9 @@ class Equations(NamedTuple):
     springs: Matrix
     offsets: Vector
     blocks: IntegerVector
+    elements: IntegerVector
+    kept_offsets: Vector
+    whole: SystemArrays
     onsets: Matrix
     limits: Vector
     numbers: Vector
@@ -124,17 +134,22 @@ class Reached(NamedTuple):
 
 
 def room_for(
-    harmonics: int, samples: int, modes: int, memory: int, nodes: int, coupled: int
+    harmonics: int, samples: int, modes: int, memory: int, nodes: int, coupled: int,
+    exact: bool,
 ) -> Room:
     """Room for a system of so many modes and internal variables, on so many nodes.
 
-    At most ``coupled`` modes are solved for together.
+    At most ``coupled`` modes are solved for together. Internal variables that are ``exact`` are
+    those of elements that are followed exactly.
     """
+    deflections, followed = memory, nodes if exact else 0
+    memory = 0 if exact else memory
     L, N, m, c = 2 * harmonics + 1, samples, modes, memory
     n, d, k = L * m, 2 * m + c, L * coupled
     s = c // nodes if nodes else 0
     return Room(
-        np.empty(N), np.empty((N, d)), np.empty((N, d)), np.empty((N, c)), np.empty((N, c)),
+        np.empty(N), np.empty((N, d)), np.empty((N, d)), np.empty((N, deflections)),
+        np.empty((N, c)),
         np.empty((N, d)), np.empty((N if c else 0, d)), np.empty((N, d, d)),
         np.empty((N if c else 0, d, d)),
         np.empty((2, m, L)), np.empty((max(m, 2 * coupled**2), N)), np.empty(4 * L * coupled**2),
@@ -143,4 +158,6 @@ def room_for(
         np.empty((k + 1) ** 2), np.empty(k + 1, dtype=np.int64), np.arange(m),
         np.array([coupled]), np.empty((2, m)), np.empty((3, m, 2 * m)), np.empty((2, m, m)),
         np.empty(n), np.empty(n), np.empty(n), np.empty(n + 1), np.empty((16, n + 1)),
-        np.empty((d - c, N)), np.empty((m, N)), np.empty((9, N)), np.zeros((m, N)))
+        np.empty((d - c, N)), np.empty((m, N)), np.empty((9, N)), np.zeros((m, N)),
+        np.empty((3, followed, N)), np.empty((followed, N, 2 * L)),
+        np.empty((N, deflections if exact else 0)))

@@ -13,6 +13,7 @@ from fecontact.bifurcation.harmonic.compiled.loads import forces_at_rest
 from fecontact.core.types import Array
 from fecontact.laws.normal.bilateral import BilateralPolynomial
 from fecontact.system.contact_system import needs_friction
+from fecontact.system.elastic_sliders import without_elements
 from fecontact.system.nodes import SystemArrays
 
 # Most unknowns that compiled code without LAPACK solves for together.
@@ -87,8 +88,10 @@ class CompiledBalance:
         found = self.known[key]
         if not small and found.contact is near.arrays:
             return None
-        if found.offsets is not problem.kept.offsets:
-            found = self.known[key] = found._replace(offsets=problem.kept.offsets)
+        if found.kept_offsets is not problem.kept.offsets:
+            found = self.known[key] = found._replace(
+                kept_offsets=problem.kept.offsets,
+                offsets=problem.kept.offsets[: 0 if problem.kept.exact else None])
         return found
 
     def _made(
@@ -105,8 +108,8 @@ class CompiledBalance:
         numbers[arrays.LOW], numbers[arrays.HIGH] = near.low, near.high
         most = m if problem.size <= MOST_UNKNOWNS else max(1, MOST_UNKNOWNS // L)
         room = arrays.room_for(problem.harmonics, problem.samples, m, layout.memory, layout.nodes,
-                               most)
-        contact = near.arrays
+                               most, problem.kept.exact)
+        contact, kept = near.arrays, problem.kept
         body, given = np.zeros((4, m, m)), np.zeros((2, problem.samples, m))
         found = self._without_contact(problem, near)
         if found is not None:
@@ -115,12 +118,16 @@ class CompiledBalance:
             numbers[arrays.STEADY] = self._steady(near)
             numbers[arrays.RESTS] = rests and numbers[arrays.STEADY]
             numbers[arrays.PLAIN] = (numbers[arrays.STEADY] and problem.size <= MOST_UNKNOWNS
-                                     and not layout.memory and self._plain(near))
+                                     and (kept.exact or not layout.memory)
+                                     and self._plain(near))
+        marched = slice(0, 0 if kept.exact else None)
+        elements = kept.elements if kept.exact else kept.elements[:0]
         return arrays.Equations(
-            contact, near.flat, near.base, near.slope, series.times, series.values,
-            series.projection, series.cosines, series.sines, body, given,
-            series.projection @ given, problem.kept.rows, problem.kept.offsets,
-            problem.kept.blocks, problem.onsets,
+            without_elements(contact) if kept.exact else contact, near.flat, near.base,
+            near.slope, series.times, series.values, series.projection, series.cosines,
+            series.sines, body, given,
+            series.projection @ given, kept.rows[marched], kept.offsets[marched],
+            kept.blocks, elements, kept.offsets, contact, problem.onsets,
             np.full(m, np.inf), numbers, layout.nodes, problem.rows_kept, room)
 
     def _without_contact(

@@ -11,6 +11,7 @@ import numpy as np
 from fecontact.bifurcation.harmonic.compiled.arrays import PERIOD, PLAIN, STEADY, TURN
 from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks
 from fecontact.bifurcation.harmonic.compiled.plain_forces import combine, plain_forces, project
+from fecontact.bifurcation.harmonic.elements import element_forces
 from fecontact.bifurcation.harmonic.memory import LEAK, march, solve_around
 from fecontact.bifurcation.harmonic.series import fill_blocks
 from fecontact.core.compiled import helper, routine
@@ -121,6 +122,30 @@ def balance(u, T, loads, e, out):
                 out[k * m + j] += linear[0, i, j] * place + linear[1, i, j] * speed
 
 
+@helper
+def _follow(u, T, derivatives, e, friction, z):
+    """Fill friction (n, N) of elements that are followed exactly; 0 if they do not repeat."""
+    m, L = e.springs.shape[1], e.values.shape[1]
+    return element_forces(u[: L * m].reshape((L, m)), T, e.contact, e.elements, e.kept_offsets,
+                          e.values, derivatives, friction, z, e.room.by_node)
+
+
+@helper
+def _add_friction(e):
+    """Add the friction of elements that was found to the rows of the forces, or to the rates."""
+    room, plain = e.room, e.numbers[PLAIN] != 0.0
+    m, rows = e.springs.shape[1], e.contact.rows
+    for j in range(len(e.elements)):
+        friction = room.friction[0, j]
+        for i in range(m):
+            factor = rows[j, 0, i]
+            for n in range(len(friction)):
+                if plain:
+                    room.pushes[i, n] -= factor * friction[n]
+                else:
+                    room.f[n, m + i] -= factor * friction[n]
+
+
 @routine
 def evaluate_at(u, derivatives, e):
     """Residual at u, with derivatives at the samples if asked for; returns the period.
@@ -133,6 +158,10 @@ def evaluate_at(u, derivatives, e):
     if e.numbers[PLAIN] != 0.0:
         take_motion(u, T, e)
         plain_forces(derivatives, T / len(e.tau), e)
+        if len(e.elements) > 0:
+            if _follow(u, T, derivatives, e, room.friction[0], room.z) == 0:
+                return 0.0
+            _add_friction(e)
         balance(u, T, 1.0, e, room.residual)
         return T
     take_states(u, T, e, room.x)
@@ -154,6 +183,10 @@ def evaluate_at(u, derivatives, e):
         batch_rates(room.t, room.x, e.contact, room.f)
     add_kinks(room.t, room.x, e.contact, e.onsets, T / len(e.tau), derivatives, room.f, room.J,
               room.widths)
+    if len(e.elements) > 0:
+        if _follow(u, T, derivatives, e, room.friction[0], room.z) == 0:
+            return 0.0
+        _add_friction(e)
     take_pushes(room.f, e)
     balance(u, T, 1.0, e, room.residual)
     return T
@@ -262,7 +295,10 @@ def _by_parameter(u, T, e):
 
 @helper
 def _beside(u, central, e, followed):
-    """Fill ``column``, and the last columns of ``followed``, by differences; z held."""
+    """Fill ``column``, and the last columns of ``followed``, by differences.
+
+    z is held, and so is the friction of elements that are followed exactly.
+    """
     room = e.room
     n, p = len(room.residual), u[len(u) - 1]
     m, c, N = e.springs.shape[1], len(e.offsets), len(e.tau)
@@ -282,6 +318,7 @@ def _beside(u, central, e, followed):
         batch_rates(room.t, room.x, e.contact, room.f)
         add_kinks(room.t, room.x, e.contact, e.onsets, T / len(e.tau), 0, room.f, room.J,
                   room.widths)
+        _add_friction(e)
         take_pushes(room.f, e)
         balance(there, T, 1.0, e, room.beside)
         for k in range(n):
@@ -355,6 +392,52 @@ def _add_memory(T, e):
                 room.column[q * m + j] -= e.projection[q, k] * room.forces[k, j, n]
 
 
+@helper
+def _add_by_elements(u, T, central, e):
+    """Add what elements that are followed exactly contribute to ``square`` and ``column``.
+
+    They give the derivatives to the parameter by differences.
+    """
+    room, rows = e.room, e.contact.rows
+    m, L, N = e.springs.shape[1], e.values.shape[1], len(e.tau)
+    square = room.square[: L * m * L * m].reshape((L, m, L, m))
+    spectrum = np.empty((L, 2 * L))
+    for j in range(len(e.elements)):
+        spectrum[:, :] = 0.0
+        for q in range(L):
+            row = spectrum[q]
+            for n in range(N):
+                factor, change = e.projection[q, n], room.by_node[j, n]
+                for k in range(2 * L):
+                    row[k] += factor * change[k]
+        for q in range(L):
+            for i in range(m):
+                along = rows[j, 0, room.order[i]]
+                for k in range(L):
+                    for o in range(m):
+                        square[q, i, k, o] += along * (
+                            rows[j, 0, room.order[o]] * spectrum[q, k]
+                            + rows[j, 1, room.order[o]] * spectrum[q, L + k])
+    n, p = L * m, u[len(u) - 1]
+    h = (_CENTRAL if central else _ONE_SIDED) * max(abs(p), 1e-3)
+    there, width = room.vectors[7], 2.0 * h if central else h
+    for k in range(n):
+        there[k] = u[k]
+    for side in range(2 if central else 1):
+        there[n] = p + h if side == 0 else p - h
+        _follow(there, take_parameter(there[n], e), False, e, room.friction[1 + side], room.left)
+    take_parameter(p, e)
+    change, pushed = room.node[0], room.along[:L]
+    for j in range(len(e.elements)):
+        above, below = room.friction[1, j], room.friction[2 if central else 0, j]
+        for i in range(N):
+            change[i] = (above[i] - below[i]) / width
+        project(e.projection, change, pushed)
+        for q in range(L):
+            for i in range(m):
+                room.column[q * m + i] += rows[j, 0, i] * pushed[q]
+
+
 @routine
 def condense(u, T, central, e):
     """Fill ``condensed`` and ``column``, the derivatives of the residual evaluated at u."""
@@ -374,6 +457,8 @@ def condense(u, T, central, e):
         _beside(u, central, e, room.followed)
     if c > 0:
         _add_memory(T, e)
+    elif len(e.elements) > 0:
+        _add_by_elements(u, T, central, e)
     condensed = room.condensed[: k * (k + 1)].reshape((k, k + 1))
     square = room.square[: k * k].reshape((k, k))
     for q in range(L):

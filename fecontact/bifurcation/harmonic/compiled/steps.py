@@ -86,7 +86,7 @@ def _keep(count, u, along, weights, sign, scales, way, e, out):
     for k in range(len(u)):
         out.u[count, k], out.tangent[count, k] = u[k], along[k] / size
     for n in range(len(e.tau)):
-        for i in range(len(e.offsets)):
+        for i in range(len(e.kept_offsets)):
             out.z[count, n, i] = e.room.z[n, i]
     take_forces(u[len(u) - 1], e, out.forces[count])
     take_mean(e, out.mean[count])
@@ -146,7 +146,7 @@ def steps(
         bend[k], third[k] = 0.5 * bend[k], 0.0
     step, count, halvings, last_turn, alike, far = out.step[0], 0, 0, 0.0, 0, 0.0
     # With internal variables of friction branches have kinks, too many for a cubic.
-    smooth = 0.0 if len(e.offsets) > 0 else 1.0
+    smooth = 0.0 if len(e.kept_offsets) > 0 else 1.0
     why[0] = FULL
     e.numbers[SQUARE] = -1.0
     while count < len(out.u):

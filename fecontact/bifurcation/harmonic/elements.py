@@ -1,0 +1,584 @@
+r"""Elastic Coulomb elements of plane bodies in harmonic balance, exact between samples too.
+
+The slip path s of a node is a Fourier series, known at all times. The deflection z of an element
+follows it within its limit l = mu P / k under the pressing force P: from where slip ends, at s_e,
+the element sticks with
+
+.. math:: z = s - s_e \pm l_e,
+
+until z meets a limit again, and slides with z = +-l then. Both places are located: slip ends where
+s' falls to the rate of the limit, and begins where z crosses the limit. P goes through its samples
+as a cubic spline of Catmull and Rom.
+
+z(T) as a function of z(0) is a translation between two ends, those of motions that begin far on
+either side. It repeats between these ends, as near to the deflection that was kept as they allow,
+and on ground that travels at one of them.
+
+Where slip begins and ends between samples the slope and the curvature of the force jump. Sampled as
+they are, answers would depend on where between the samples that is. Forces near by are means with
+the kernel of :mod:`fecontact.bifurcation.harmonic.compiled.kinks`: to each sample at the distance
+y h from a jump, all jumps of the p-th derivative add themselves times h^p G_p(y), the mean of
+y_+^p / p! less this itself.
+
+Derivatives are those of these equations. They follow one node's own coefficients, whatever the
+number of modes, and change from sample to sample only where an element begins or ceases to slide:
+the work hardly grows with the number of elements.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from fecontact.core.compiled import borrowing, helper, kernel, routine
+from fecontact.core.records import Block, IntegerVector, Matrix, Vector
+from fecontact.system.elastic_sliders import limit_of
+from fecontact.system.kernels import normal_gradients
+from fecontact.system.nodes import (
+    NodeMotion,
+    SystemArrays,
+    ground_motion,
+    node_contact,
+)
+
+# Largest number of periods after which elements repeat, and relative change that is none.
+_ROUNDS, _REPEATS = 6, 1e-12
+# Relative way around a period on ground that does not travel.
+_STILL = 1e-11
+# Steps and relative accuracy of places between samples.
+_STEPS, _LOCATED = 60, 1e-15
+# Part of its limit by which an element is beyond it that does not slide.
+_ROUNDING = 1e-12
+# Distance in intervals up to which a place is a zero.
+_CLOSE = 1e-6
+# Part of a sample's distance over which the acceleration of the ground is taken.
+_BESIDE = 0.125
+
+
+class Path(NamedTuple):
+    """Slip path of a node over a period: coefficients (L,) of its series, and pieces of it.
+
+    Pieces (k,) lie in one interval of samples each, between two ends ``first`` and ``last`` in
+    parts of it; slip has one direction there. ``moved`` is the way [m]; ``end_rate`` is the rate
+    of the path, ``end_pressing`` and ``end_pressing_rate`` are P [N] and its rate at the last end.
+    Rates are per interval. ``pressing`` (N,) are samples of P, ``slopes`` (N, 2 L) their
+    derivatives to the node's coefficients along tangent and normal, without entries if P is
+    constant. ``slides`` is the factor of the motion of the ground, ``period`` is T [s].
+    """
+
+    series: Vector
+    pressing: Vector
+    slopes: Matrix
+    interval: IntegerVector
+    first: Vector
+    last: Vector
+    moved: Vector
+    end_rate: Vector
+    end_pressing: Vector
+    end_pressing_rate: Vector
+    slides: float
+    period: float
+
+
+@helper
+def _moved_at(path, n, part, s):
+    """Path and its first three derivatives at a part of interval n, per interval."""
+    N, X = len(path.pressing), path.series
+    tau = (n + part) / N
+    turn = 2.0 * math.pi / N
+    c1, s1 = math.cos(2.0 * math.pi * tau), math.sin(2.0 * math.pi * tau)
+    place, rate, bend, third = X[0], 0.0, 0.0, 0.0
+    c, d = 1.0, 0.0
+    for k in range(1, len(X) // 2 + 1):
+        c, d = c * c1 - d * s1, d * c1 + c * s1
+        even, odd = X[2 * k - 1] * c + X[2 * k] * d, X[2 * k] * c - X[2 * k - 1] * d
+        w = k * turn
+        place += even
+        rate += w * odd
+        bend -= w * w * even
+        third -= w * w * w * odd
+    if path.slides == 0.0:
+        return place, rate, bend, third
+    h, t = path.period / N, tau * path.period
+    moved = ground_motion(t, s)
+    place -= path.slides * moved.travel
+    rate -= path.slides * moved.speed * h
+    beside = _BESIDE * h
+    bend -= path.slides * (ground_motion(t + beside, s).speed
+                           - ground_motion(t - beside, s).speed) * h / (2.0 * _BESIDE)
+    return place, rate, bend, third
+
+
+@helper
+def _spline(part, order):
+    """Weights of four samples about an interval for the spline, or a derivative of it."""
+    x = part
+    if order == 0:
+        return (0.5 * x * (-1.0 + x * (2.0 - x)), 1.0 + 0.5 * x * x * (3.0 * x - 5.0),
+                0.5 * x * (1.0 + x * (4.0 - 3.0 * x)), 0.5 * x * x * (x - 1.0))
+    if order == 1:
+        return (0.5 * (-1.0 + x * (4.0 - 3.0 * x)), 0.5 * x * (9.0 * x - 10.0),
+                0.5 * (1.0 + x * (8.0 - 9.0 * x)), 0.5 * x * (3.0 * x - 2.0))
+    return 2.0 - 3.0 * x, 9.0 * x - 5.0, 4.0 - 9.0 * x, 3.0 * x - 1.0
+
+
+@helper
+def _pressing_at(path, n, part, order):
+    """P, or a derivative of it, at a part of interval n; never below zero."""
+    P, N = path.pressing, len(path.pressing)
+    if len(path.slopes) == 0:
+        return P[0] if order == 0 else 0.0
+    a, b, c, d = _spline(part, 0)
+    value = a * P[n - 1] + b * P[n] + c * P[(n + 1) % N] + d * P[(n + 2) % N]
+    if order == 0 or value < 0.0:
+        return max(value, 0.0) if order == 0 else 0.0
+    a, b, c, d = _spline(part, order)
+    return a * P[n - 1] + b * P[n] + c * P[(n + 1) % N] + d * P[(n + 2) % N]
+
+
+@helper
+def _beyond(path, n, part, order, pull, base, s):
+    """Path less ``pull`` times P less ``base``, or a derivative of it, and the next derivative."""
+    place, rate, bend, third = _moved_at(path, n, part, s)
+    if order == 0:
+        return (place - pull * _pressing_at(path, n, part, 0) - base,
+                rate - pull * _pressing_at(path, n, part, 1))
+    if order == 1:
+        return (rate - pull * _pressing_at(path, n, part, 1),
+                bend - pull * _pressing_at(path, n, part, 2))
+    return bend, third
+
+
+@borrowing
+def _zero(path, n, low, high, order, pull, base, s):
+    """Zero of :func:`_beyond` between two parts of interval n; the nearer end if the sign stays."""
+    f_low, f_high = (_beyond(path, n, low, order, pull, base, s)[0],
+                     _beyond(path, n, high, order, pull, base, s)[0])
+    if f_low * f_high >= 0.0:
+        return high if abs(f_high) < abs(f_low) else low
+    x = low - f_low * (high - low) / (f_high - f_low)
+    for _ in range(_STEPS):
+        f, slope = _beyond(path, n, x, order, pull, base, s)
+        if f * f_low > 0.0:
+            low = x
+        else:
+            high = x
+        ahead = x - f / slope if slope != 0.0 else low
+        if not low < ahead < high:
+            ahead = 0.5 * (low + high)
+        if abs(ahead - x) <= _LOCATED:
+            return ahead
+        x = ahead
+    return x
+
+
+@borrowing
+def _turns(path, n, v, a, w, b, s):
+    """Parts of interval n at which slip turns, ascending; 2 for none.
+
+    Rates and second derivatives of the path at the two ends are v, a and w, b.
+    """
+    if v * w < 0.0:
+        return _zero(path, n, 0.0, 1.0, 1, 0.0, 0.0, s), 2.0
+    if v * a < 0.0 and w * b > 0.0:
+        between = _zero(path, n, 0.0, 1.0, 2, 0.0, 0.0, s)
+        if _moved_at(path, n, between, s)[1] * v < 0.0:
+            return (_zero(path, n, 0.0, between, 1, 0.0, 0.0, s),
+                    _zero(path, n, between, 1.0, 1, 0.0, 0.0, s))
+    return 2.0, 2.0
+
+
+@helper
+def _add_piece(path, k, n, first, last, moved, rate):
+    """Fill piece k, in interval n."""
+    path.interval[k], path.first[k], path.last[k] = n, first, last
+    path.moved[k], path.end_rate[k] = moved, rate
+    path.end_pressing[k] = _pressing_at(path, n, last, 0)
+    path.end_pressing_rate[k] = _pressing_at(path, n, last, 1)
+
+
+@borrowing
+def _cut(path, s):
+    """Fill the pieces of a path; returns their number."""
+    k = 0
+    start, v, a, _ = _moved_at(path, 0, 0.0, s)
+    for n in range(len(path.pressing)):
+        end, w, b, _ = _moved_at(path, n, 1.0, s)
+        first = 0.0
+        for turn in _turns(path, n, v, a, w, b, s):
+            if first < turn < 1.0:
+                place = _moved_at(path, n, turn, s)[0]
+                _add_piece(path, k, n, first, turn, place - start, 0.0)
+                start, first, k = place, turn, k + 1
+        _add_piece(path, k, n, first, 1.0, end - start, w)
+        start, v, a, k = end, w, b, k + 1
+    return k
+
+
+@borrowing
+def _stuck_since(path, n, ends, last, pull, s):
+    """Deflection at the end of a piece of an element that slid up to a place before."""
+    return (pull * _pressing_at(path, n, ends, 0) + _moved_at(path, n, last, s)[0]
+            - _moved_at(path, n, ends, s)[0])
+
+
+@borrowing
+def _change(path, k, ratio, z, side, locate, s):
+    """Deflection and side at the end of piece k, from those before it.
+
+    ``side`` is 0 for an element that sticks, else the sign of its deflection. Also where slip ends,
+    and where it begins, in parts of the interval, -1 where it does not, and the side of the slip
+    that ends. Where slip begins is found if that is asked for.
+    """
+    limit, n = ratio * path.end_pressing[k], path.interval[k]
+    first, last = path.first[k], path.last[k]
+    ends, begins, of = -1.0, -1.0, side
+    if side == 0.0:
+        z += path.moved[k]
+    else:
+        ends = first
+        if side * _beyond(path, n, first, 1, side * ratio, 0.0, s)[0] > 0.0:
+            ends = _zero(path, n, first, last, 1, side * ratio, 0.0, s)
+        z = _stuck_since(path, n, ends, last, side * ratio, s)
+        first = ends
+    if abs(z) <= limit * (1.0 + _ROUNDING):
+        return z, 0.0, ends, begins, of
+    side = 1.0 if z > 0.0 else -1.0
+    stays = side * (path.end_rate[k] - side * ratio * path.end_pressing_rate[k]) >= 0.0
+    if locate or not stays:
+        base = _moved_at(path, n, last, s)[0] - z
+        begins = _zero(path, n, first, last, 0, side * ratio, base, s)
+    if stays or ends >= 0.0:
+        return side * limit, side, ends, begins, of
+    # The limit grows faster than the path again.
+    ends = _zero(path, n, begins, last, 1, side * ratio, 0.0, s)
+    return _stuck_since(path, n, ends, last, side * ratio, s), 0.0, ends, begins, side
+
+
+@helper
+def _advance(path, k, ratio, z, side, locate, s):
+    """As :func:`_change`, quickly where nothing begins or ends."""
+    limit = ratio * path.end_pressing[k]
+    if side == 0.0:
+        ahead = z + path.moved[k]
+        if abs(ahead) <= limit * (1.0 + _ROUNDING):
+            return ahead, side, -1.0, -1.0, side
+    elif side * (path.end_rate[k] - side * ratio * path.end_pressing_rate[k]) >= 0.0:
+        return side * limit, side, -1.0, -1.0, side
+    return _change(path, k, ratio, z, side, locate, s)
+
+
+@borrowing
+def _repeated(path, count, ratio, kept, s):
+    """Deflection at the start that repeats, its side, and where slip ended last.
+
+    ``count`` is the number of pieces. The place is a piece, -1 for an element that never slides, a
+    part of its interval, and the side on which the element slid. Also whether it repeats.
+    """
+    low, high, low_side, high_side, way, size = -np.inf, np.inf, 0.0, 0.0, 0.0, 0.0
+    # Where slip ended last: piece, place and side.
+    low_end, high_end, end = (-1, 0.0, 0.0), (-1, 0.0, 0.0), (-1, 0.0, 0.0)
+    apart = True
+    for k in range(count):
+        high, high_side, ends, _, of = _advance(path, k, ratio, high, high_side, False, s)
+        if ends >= 0.0:
+            high_end = k, ends, of
+        if apart:
+            low, low_side, ends, _, of = _advance(path, k, ratio, low, low_side, False, s)
+            if ends >= 0.0:
+                low_end = k, ends, of
+            apart = low < high
+        way += path.moved[k]
+        size = max(size, abs(way))
+    if not apart:
+        return high, high_side, high_end, True
+    z, side = kept, 0.0
+    if abs(way) > _STILL * size:
+        z = np.inf if way > 0.0 else -np.inf
+    if z >= high:
+        z, end = high, high_end
+    elif z <= low:
+        z, end = low, low_end
+    for _ in range(_ROUNDS):
+        start = z
+        for k in range(count):
+            z, side, ends, _, of = _advance(path, k, ratio, z, side, False, s)
+            size = max(size, abs(z))
+            if ends >= 0.0:
+                end = k, ends, of
+        if abs(z - start) <= _REPEATS * size:
+            return z, side, end, True
+    return z, side, end, False
+
+
+@helper
+def _means(y):
+    """G_0, G_1 and G_2 at a distance of y samples behind a jump."""
+    step, ramp, curve = 0.0, 0.0, 0.0
+    factor = 1.0
+    for i in range(5):
+        r = y + 2.0 - i
+        if r > 0.0:
+            q = r * r
+            step += factor * q * (q / 24.0 - 1.0 / 12.0)
+            ramp += factor * q * r * (q / 120.0 - 1.0 / 36.0)
+            curve += factor * q * q * (q / 720.0 - 1.0 / 144.0)
+        factor *= -(4.0 - i) / (i + 1.0)
+    if y > 0.0:
+        step, ramp, curve = step - 1.0, ramp - y, curve - 0.5 * y * y
+    return step, ramp, curve
+
+
+@helper
+def _add_row(path, n, part, order, pull, factor, row):
+    """Add to a row (2 L,) a factor times the derivatives of :func:`_beyond` to coefficients."""
+    N, L = len(path.pressing), len(path.series)
+    tau = (n + part) / N
+    c1, s1 = math.cos(2.0 * math.pi * tau), math.sin(2.0 * math.pi * tau)
+    c, d = 1.0, 0.0
+    if order == 0:
+        row[0] += factor
+    for k in range(1, L // 2 + 1):
+        c, d = c * c1 - d * s1, d * c1 + c * s1
+        w = 2.0 * math.pi * k / N
+        if order == 0:
+            row[2 * k - 1] += factor * c
+            row[2 * k] += factor * d
+        elif order == 1:
+            row[2 * k - 1] -= factor * w * d
+            row[2 * k] += factor * w * c
+        else:
+            row[2 * k - 1] -= factor * w * w * c
+            row[2 * k] -= factor * w * w * d
+    if len(path.slopes) == 0 or pull == 0.0:
+        return
+    if not _pressing_at(path, n, part, 0) > 0.0:
+        return
+    weights = _spline(part, order)
+    for i in range(4):
+        there = path.slopes[(n - 1 + i) % N]
+        for k in range(2 * L):
+            row[k] -= factor * pull * weights[i] * there[k]
+
+
+@borrowing
+def _add_begun(path, n, part, pull, spring, stuck, s, r, rows, room):
+    """Add to forces r (N,), and to their derivatives, the means about a place where slip begins.
+
+    ``stuck`` (2 L,) are the derivatives of z - s before.
+    """
+    N = len(r)
+    _, rate, bend, third = _moved_at(path, n, part, s)
+    jump = pull * _pressing_at(path, n, part, 1) - rate
+    over = bend - pull * _pressing_at(path, n, part, 2)
+    shift, by_jump, by_bend = room[0], room[1], room[2]
+    if len(rows) > 0:
+        for k in range(len(shift)):
+            shift[k], by_jump[k], by_bend[k] = stuck[k], 0.0, 0.0
+        _add_row(path, n, part, 0, pull, 1.0, shift)
+        _add_row(path, n, part, 1, pull, -1.0, by_jump)
+        _add_row(path, n, part, 2, 0.0, -1.0, by_bend)
+        for k in range(len(shift)):
+            shift[k] = shift[k] / jump if jump != 0.0 else 0.0
+            by_jump[k] -= over * shift[k]
+            by_bend[k] -= third * shift[k]
+    for i in range(-1, 3):
+        place = (n + i) % N
+        step, ramp, curve = _means(i - part)
+        r[place] += spring * (jump * ramp - bend * curve)
+        if len(rows) > 0:
+            along = jump * step - bend * ramp
+            for k in range(len(shift)):
+                rows[place, k] += spring * (ramp * by_jump[k] + curve * by_bend[k]
+                                            - along * shift[k])
+
+
+@borrowing
+def _add_ended(path, n, part, pull, spring, s, r, rows, room):
+    """Add to forces r (N,), and to their derivatives, the means about a place where slip ends."""
+    N = len(r)
+    _, _, bend, third = _moved_at(path, n, part, s)
+    off, over = _beyond(path, n, part, 1, pull, 0.0, s)
+    shift, by_bend = room[0], room[2]
+    if len(rows) > 0:
+        for k in range(len(shift)):
+            shift[k], by_bend[k] = 0.0, 0.0
+        # Elsewhere slip ends because P jumps.
+        if abs(off) < _CLOSE * abs(over):
+            _add_row(path, n, part, 1, pull, -1.0 / over, shift)
+        _add_row(path, n, part, 2, 0.0, 1.0, by_bend)
+        for k in range(len(shift)):
+            by_bend[k] += third * shift[k]
+    for i in range(-1, 3):
+        place = (n + i) % N
+        _, ramp, curve = _means(i - part)
+        r[place] += spring * bend * curve
+        if len(rows) > 0:
+            for k in range(len(shift)):
+                rows[place, k] += spring * (curve * by_bend[k] - bend * ramp * shift[k])
+
+
+@helper
+def _count_in(side, ratio, spring, kept, sign, n, held, sliding, turned):
+    """Count an element in, or out, of those that stick and slide from sample n on."""
+    if side == 0.0:
+        held[n] += sign * spring
+        for k in range(len(kept)):
+            turned[n, k] += sign * spring * kept[k]
+    else:
+        sliding[n] += sign * spring * side * ratio
+
+
+@borrowing
+def _follow(path, count, ratio, spring, kept, return_time, s, z, r, sums, rows, room):
+    """Fill the deflections z (N,) of one element, and add its forces to r (N,).
+
+    With rows (N, 2 L), derivatives of the forces about jumps are added to them, and to ``sums``
+    what the element adds to the stiffness of those that stick, (N,), to the limits of those that
+    slide, (N,), and to derivatives that stay in stick, (N, 2 L). Returns whether it repeats.
+    """
+    deflection, side, end, repeats = _repeated(path, count, ratio, kept, s)
+    N, wanted = len(r), len(rows) > 0
+    held, sliding, turned = sums
+    stuck, last = room[3], room[4]
+    for k in range(len(stuck)):
+        stuck[k] = 0.0
+    if wanted and side == 0.0 and end[0] >= 0:
+        _add_row(path, path.interval[end[0]], end[1], 0, end[2] * ratio, -1.0, stuck)
+    for k in range(len(stuck)):
+        last[k] = stuck[k]
+    last_side, changed = side, False
+    if wanted:
+        _count_in(side, ratio, spring, stuck, 1.0, 0, held, sliding, turned)
+    for k in range(count):
+        n = path.interval[k]
+        deflection, side, ends, begins, of = _advance(path, k, ratio, deflection, side, True, s)
+        again = side == 0.0 and begins >= 0.0
+        if again:
+            _add_begun(path, n, begins, of * ratio, spring, stuck, s, r, rows, room)
+        if ends >= 0.0:
+            _add_ended(path, n, ends, of * ratio, spring, s, r, rows, room)
+            if wanted:
+                for i in range(len(stuck)):
+                    stuck[i] = 0.0
+                _add_row(path, n, ends, 0, of * ratio, -1.0, stuck)
+        if begins >= 0.0 and not again:
+            _add_begun(path, n, begins, side * ratio, spring, stuck, s, r, rows, room)
+        changed = changed or ends >= 0.0 or begins >= 0.0
+        if path.last[k] < 1.0:
+            continue
+        sample = (n + 1) % N
+        r[sample] += spring * deflection
+        z[sample] = deflection
+        if side != 0.0:
+            z[sample] += side * return_time * abs(path.end_rate[k]) * N / path.period
+        if changed and wanted and sample > 0:
+            _count_in(last_side, ratio, spring, last, -1.0, sample, held, sliding, turned)
+            _count_in(side, ratio, spring, stuck, 1.0, sample, held, sliding, turned)
+            for i in range(len(stuck)):
+                last[i] = stuck[i]
+            last_side = side
+            changed = False
+    return repeats
+
+
+@routine
+def _path_of(j, X, T, values, s, derivatives):
+    """Slip path of node j for coefficients X (L, m) of the displacements, with its pieces."""
+    N, L = values.shape
+    m = X.shape[1]
+    series, rates = np.zeros((2, L)), np.zeros((2, L))
+    for axis in range(2):
+        for k in range(L):
+            for i in range(m):
+                series[axis, k] += s.rows[j, axis, i] * X[k, i]
+        for k in range(1, L // 2 + 1):
+            w = 2.0 * math.pi * k / T
+            rates[axis, 2 * k - 1] = w * series[axis, 2 * k]
+            rates[axis, 2 * k] = -w * series[axis, 2 * k - 1]
+    pressing, slopes, gradients = np.empty(N), np.zeros((N, 2 * L)), np.empty((3, 4))
+    varies = False
+    for n in range(N):
+        moved = np.zeros(4)
+        for k in range(L):
+            for axis in range(2):
+                moved[axis] += values[n, k] * series[axis, k]
+                moved[2 + axis] += values[n, k] * rates[axis, k]
+        contact = node_contact(j, NodeMotion(moved[0], moved[1], moved[2], moved[3], 0.0, 0.0),
+                               ground_motion(n * T / N, s), s)
+        _, pressing[n] = normal_gradients(j, contact, s, gradients)
+        varies = varies or pressing[n] != pressing[0]
+        for axis in range(2):
+            place, speed = gradients[2, axis], gradients[2, 2 + axis]
+            varies = varies or place != 0.0 or speed != 0.0
+            if derivatives:
+                slopes[n, axis * L] = place
+                for k in range(1, L // 2 + 1):
+                    w = 2.0 * math.pi * k / T
+                    c, d = values[n, 2 * k - 1], values[n, 2 * k]
+                    slopes[n, axis * L + 2 * k - 1] = place * c - speed * w * d
+                    slopes[n, axis * L + 2 * k] = place * d + speed * w * c
+    most = 3 * N
+    path = Path(series[0], pressing, slopes if varies else slopes[:0],
+                np.empty(most, dtype=np.int64), np.empty(most), np.empty(most), np.empty(most),
+                np.empty(most), np.empty(most), np.empty(most), s.sliding[j], T)
+    return path, _cut(path, s)
+
+
+@routine
+def element_forces(X, T, s, elements, offsets, values, derivatives, r, z, rows):
+    """Fill r (n, N) with the friction of the elements of all nodes at the samples.
+
+    X (L, m) are coefficients of the displacements, T the period [s], ``elements`` (n,) numbers of
+    elements, ``offsets`` (c,) deflections less displacements of those that never slide, ``values``
+    (N, L) the series at the samples. Also fills the deflections z (N, c) and, with derivatives,
+    rows (n, N, 2 L) of those of r to the coefficients of a node along its tangent and its normal.
+    Returns 0 where an element does not come to repeat, else 1.
+    """
+    N, L = values.shape
+    states = len(offsets) // len(elements)
+    done = 1
+    held, sliding, turned = np.empty(N), np.empty(N), np.empty((N if derivatives else 0, 2 * L))
+    room, nothing = np.empty((5, 2 * L)), np.empty((0, 2 * L))
+    sums = held, sliding, turned
+    for j in range(len(elements)):
+        for n in range(N):
+            r[j, n], held[n], sliding[n] = 0.0, 0.0, 0.0
+        if elements[j] == 0:
+            continue
+        path, count = _path_of(j, X, T, values, s, derivatives)
+        own = rows[j] if derivatives else nothing
+        own[:, :] = 0.0
+        turned[:, :] = 0.0
+        p = s.friction_parameters[j]
+        start = _moved_at(path, 0, 0.0, s)[0] + path.slides * ground_motion(0.0, s).travel
+        for i in range(elements[j]):
+            place = j * states + i
+            if not _follow(path, count, limit_of(j, i, elements[j], 1.0, s), p[1 + i],
+                           start + offsets[place], p[0], s, z[:, place], r[j], sums, own, room):
+                done = 0
+        if not derivatives:
+            continue
+        stiffness, limits, kept = 0.0, 0.0, room[0]
+        kept[:] = 0.0
+        for n in range(N):
+            stiffness += held[n]
+            limits += sliding[n]
+            for k in range(2 * L):
+                kept[k] += turned[n, k]
+                own[n, k] += kept[k]
+            for k in range(L):
+                own[n, k] += stiffness * values[n, k]
+            if len(path.slopes) > 0:
+                for k in range(2 * L):
+                    own[n, k] += limits * path.slopes[n, k]
+    return done
+
+
+@kernel
+def follow_elements(
+    X: Matrix, T: float, s: SystemArrays, elements: IntegerVector, offsets: Vector, values: Matrix,
+    derivatives: int, r: Matrix, z: Matrix, rows: Block,
+) -> int:
+    """:func:`element_forces` for Python; ``rows`` may be empty without derivatives."""
+    return element_forces(X, T, s, elements, offsets, values, derivatives != 0, r, z, rows)
