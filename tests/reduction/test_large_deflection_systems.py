@@ -3,13 +3,16 @@
 import numpy as np
 import pytest
 import test_large_deflections as beams
+from meshes_for_tests import rectangle
 from scipy.sparse.linalg import eigsh
 
 from fecontact import (
     BoundaryLoad,
     ContactSystem,
+    ElasticBody,
     Load,
     LoadPath,
+    Mesh,
     ModelWarning,
     PointLoad,
     Study,
@@ -18,12 +21,13 @@ from fecontact import (
     modal_basis,
     simulate,
 )
-from fecontact.analysis import DeflectionSteps, complex_modes, deflection_path
+from fecontact.analysis import DeflectionSteps, complex_modes, deflection_path, prestressed_modes
 from fecontact.analysis.summaries import largest_displacement, peak_normal_force
 from fecontact.bifurcation import HarmonicBalance, frequency_response, nonlinear_mode
+from fecontact.fem import Coupling, PointSpring
 from fecontact.fem.finite_strain import FiniteStrainModel
 from fecontact.integrate import CVODE, EventDriven, Rodas5P, TimeStepping
-from fecontact.laws import Harmonic
+from fecontact.laws import Harmonic, JenkinsFriction, PrescribedForce
 from fecontact.reduction import LargeDeflections
 
 H = beams.H
@@ -141,3 +145,49 @@ def test_study():
     moved = np.abs(run.displacement("middle")).max()
     assert largest_displacement(run) == pytest.approx(moved, rel=1e-9)
     assert peak_normal_force(run) == 0.0
+
+
+STUCK = 3e6  # tangential stiffness below the washer [N/m]
+
+
+def bolted(spring):
+    """A panel clamped at its left end, the other one on friction or on a spring along x."""
+    mesh = rectangle(beams.L, H, 30, 2, points={"middle": (0.5 * beams.L, 0.5 * H)})
+    pressed = {
+        name: mesh.boundaries[side][mesh.nodes[mesh.boundaries[side], 0].min(axis=1) > 0.9]
+        for name, side in (("seat", "bottom"), ("washer", "top"))}
+    mean = Coupling("seat", "hub", (0.95, 0.0), "distributing")
+    mesh = Mesh(mesh.nodes, mesh.cells, {**mesh.boundaries, **pressed}, mesh.points,
+                constraints=(mean,) if spring else ())
+    return ElasticBody(mesh, beams.STEEL, thickness=beams.B, fixed={"left": "xy", "washer": "y"},
+                       attachments=(PointSpring((("hub", (1.0, 0.0)),), STUCK),) if spring else ())
+
+
+def test_preload_of_a_bolted_panel():
+    """Pulled, or pushed below buckling, under pressure, with friction that sticks at its end.
+
+    Statics and prestressed modes against the whole body with its tangent stiffness.
+    """
+    basis = modal_basis(bolted(False), 4, contact="seat", contact_nodes=1, B="", C="", points={
+        "middle": "middle", "end": "right"}, reduction="residual", tolerance=0.0, loads=(
+            "top", "right"), large_deflections=LargeDeflections(1.7 * H, 3))
+    body = bolted(True)
+    model = FiniteStrainModel(body)
+    mass = (body.expansion.T @ body.mass @ body.expansion).tocsc()
+    for pull in (-5e6, 2e7):
+        load = Load(boundaries=(BoundaryLoad("top", pressure=2.5e3),
+                                BoundaryLoad("right", pressure=-pull)))
+        system = ContactSystem(basis, PrescribedForce(1.0), JenkinsFriction(STUCK, 1e4), load=load)
+        history = load_history(system, LoadPath(load_scale=(0.0, 0.5, 1.0)))
+        path = deflection_path(body, load)
+        q = history.modal_coordinates[-1]
+        for place, axis in (("middle", 1), ("end", 0)):
+            exact = path.displacement("right" if place == "end" else place)[-1, axis]
+            assert basis.point_row(place, "xy"[axis]) @ q == pytest.approx(exact, rel=0.01)
+        held = -STUCK * path.displacement("hub")[-1, 0]
+        assert history.friction_force[-1, 0] == pytest.approx(held, rel=0.01)
+        squares = eigsh(model.state(path.unknowns[-1]).tangent, k=2, M=mass, sigma=0.0)[0]
+        exact = np.sqrt(np.sort(squares)) / (2.0 * np.pi)
+        modes = prestressed_modes(system, history)
+        assert modes.frequencies_hz[:2] == pytest.approx(exact, rel=5e-3)
+        assert exact[0] > 1.15 * basis.frequencies_hz[0]
