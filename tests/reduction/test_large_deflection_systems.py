@@ -184,7 +184,7 @@ def test_preload_of_a_bolted_panel():
         for place, axis in (("middle", 1), ("end", 0)):
             exact = path.displacement("right" if place == "end" else place)[-1, axis]
             assert basis.point_row(place, "xy"[axis]) @ q == pytest.approx(exact, rel=0.01)
-        held = -STUCK * path.displacement("hub")[-1, 0]
+        held = STUCK * path.displacement("hub")[-1, 0]
         assert history.friction_force[-1, 0] == pytest.approx(held, rel=0.01)
         squares = eigsh(model.state(path.unknowns[-1]).tangent, k=2, M=mass, sigma=0.0)[0]
         exact = np.sqrt(np.sort(squares)) / (2.0 * np.pi)
