@@ -72,9 +72,19 @@ class FiniteStrainModel:
 
     These are the free degrees of freedom of the body, see ``ElasticBody.expansion``, then the
     factors of incompatible modes, if it has such.
+
+    Attributes
+    ----------
+    body : ElasticBody
+        The body.
+    geometric : sparse (d N, d N) array, optional
+        Geometric stiffness of a stress in the undeformed body that constant loads balance, see
+        :func:`fecontact.fem.stress_stiffness.stress_stiffness`. With Green and Lagrange's strain
+        its energy is exactly ``u^T K_sigma u / 2``.
     """
 
     body: ElasticBody
+    geometric: Any = None
 
     @cached_property
     def _cells(self) -> tuple[Array, Array, Integers, Array]:
@@ -114,15 +124,17 @@ class FiniteStrainModel:
 
     @cached_property
     def _springs(self) -> Any:
-        """Stiffness of springs at points over all displacements, or None."""
+        """Stiffness of springs at points and of the stress over all displacements, or None."""
         import scipy.sparse as sp
 
         rows, k, _ = self.body.springs
-        if not k.any():
+        if not k.any() and self.geometric is None:
             return None
-        more = self.body.dimension * self.nodes - rows.shape[1]
-        rows = sp.hstack([rows, sp.csr_array((rows.shape[0], more))])
-        return sp.csr_array(rows.T @ sp.diags_array(k) @ rows)
+        own = sp.csr_array(rows.T @ sp.diags_array(k) @ rows)
+        if self.geometric is not None:
+            own = own + self.geometric
+        more = self.body.dimension * self.nodes - own.shape[0]
+        return sp.csr_array(sp.block_diag([own, sp.csr_array((more, more))])) if more else own
 
     @cached_property
     def _rotations(self) -> FiniteRotations | None:

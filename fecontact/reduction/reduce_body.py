@@ -114,6 +114,7 @@ def modal_basis(
         Displacements are those in the frame that rotates with the body, modes those at rest.
     prestress, large_deflections : BodyFields and LargeDeflections, optional
         Stress that stiffens the body; forces of large deflections, see its own documentation.
+        With both, displacements count from the stressed body, without the loads of the stress.
     temperature : float, (N,) array or function of the coordinates, optional
         Its change [K], a constant load that completes the modes; see :mod:`fecontact.fem.thermal`.
     rows : sequence of sparse (k, d N) arrays
@@ -152,7 +153,7 @@ def modal_basis(
         raise InputError("loads complete the modes only with reduction = 'residual' or "
                          "'craig-bampton'; choose one of these, or leave loads out.")
     if large_deflections is not None:
-        _check_large_deflections(large_deflections, reduction, rotation, prestress, temperature)
+        _check_large_deflections(large_deflections, reduction, rotation, temperature)
     warm = None if temperature is None else _warmed(body, temperature, reduction)
     expanding = None if warm is None else thermal_forces(body, warm)
     stress = None if prestress is None else geometric_stiffness(body, prestress)
@@ -171,7 +172,7 @@ def modal_basis(
     is_point = row < at_points.shape[0]
     used = (row < d * (2 + len(face.tributary))) | ~is_point
     condensed = None if large_deflections is None else condensed_body(
-        body, system, *flexibility.modes, large_deflections)
+        body, system, *flexibility.modes, large_deflections, stress)
     fields = None if condensed is None else condensed.independent_fields(
         system, flexibility.modes[1])
     w, free_shapes, own = _modes(flexibility.of_rows(used), modes, reduction, tolerance,
@@ -243,7 +244,7 @@ def _warmed(body: ElasticBody, temperature: Temperature, reduction: Reduction) -
 
 def _check_large_deflections(
     given: LargeDeflections, reduction: Reduction, rotation: Rotation | None,
-    prestress: BodyFields | None, temperature: Temperature | None,
+    temperature: Temperature | None,
 ) -> None:
     """Raise InputError for options that do not go with large deflections."""
     require_kind("modal_basis", LargeDeflections, large_deflections=given)
@@ -251,15 +252,12 @@ def _check_large_deflections(
         raise InputError("large_deflections are those of vibration modes; choose reduction = "
                          "'vibration' or 'residual'.")
     if rotation is not None:
-        raise InputError("large_deflections and rotation do not go together; leave one of them "
-                         "out.")
-    if prestress is not None:
-        raise InputError("large_deflections and prestress do not go together; leave prestress out "
-                         "and give the load to the system, where the deflection stresses the "
-                         "body.")
+        raise InputError("large_deflections and rotation do not go together, as Coriolis and "
+                         "centrifugal forces would need the quadratic displacement too; leave one "
+                         "of them out, or give the stress of the rotation as prestress.")
     if temperature is not None:
         raise InputError("large_deflections and temperature do not go together; leave one of them "
-                         "out.")
+                         "out, or give the static solution with the temperature as prestress.")
 
 
 def reduce_bodies(

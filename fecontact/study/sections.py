@@ -232,6 +232,10 @@ class BasisSettings:
         if any(count != "all" and count < 1 for count in counts):
             raise InputError(f"BasisSettings: contact_nodes = {self.contact_nodes} must be at "
                              f"least 1, or \"all\".")
+        if self.prestress and self.large_deflections is not None:
+            raise InputError("BasisSettings: prestress = true and large_deflections do not go "
+                             "together, as the load would stress the body twice; leave prestress "
+                             "out: the deflection under the load stresses the body.")
         for name in self.points:
             if name.isdecimal():
                 raise InputError(f"BasisSettings: points has the name '{name}', but contact nodes "

@@ -10,6 +10,7 @@ from fecontact import (
     BoundaryLoad,
     ContactSystem,
     ElasticBody,
+    InputError,
     Load,
     LoadPath,
     Mesh,
@@ -145,6 +146,8 @@ def test_study():
     moved = np.abs(run.displacement("middle")).max()
     assert largest_displacement(run) == pytest.approx(moved, rel=1e-9)
     assert peak_normal_force(run) == 0.0
+    with pytest.raises(InputError, match="would stress the body twice"):
+        Study.from_toml(STUDY.replace("modes = 1", "modes = 1\nprestress = true"))
 
 
 STUCK = 3e6  # tangential stiffness below the washer [N/m]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from meshes_for_tests import grid, rectangle
 from scipy.integrate import cumulative_trapezoid
+from scipy.special import ellipk
 
 import fecontact as fc
 from fecontact import (
@@ -116,11 +117,38 @@ def test_a_spring_holds_the_end_of_a_beam(stiffness):
     a = 2.0
     found = backbone(system, a * RADIUS, ("middle", "y"), [a * RADIUS])[0]
     c = 0.25 * stiffness / (1.0 + stiffness)
-    hard = 1.0 + c * a**2
-    from scipy.special import ellipk
+    assert found == pytest.approx(duffing(c * a**2), rel=2e-3)
 
-    exact = np.pi / 2.0 * np.sqrt(hard) / ellipk(c * a**2 / 2.0 / hard)
-    assert found == pytest.approx(exact, rel=2e-3)
+
+@pytest.mark.parametrize("part", [-0.5, 2.0])
+def test_backbone_of_a_stressed_beam(part):
+    """Between hinges with the tension N = part N_E: x'' + (1 + N / N_E) x + (a x)^3 / 4 = 0.
+
+    Compressed by heat, or pulled, and then held in its hinges.
+    """
+    pull = part * np.pi**2 * E * H**2 / 12.0 / L**2
+    held, slides = beam("hinged"), beam("sliding")
+    if part < 0.0:
+        held = ElasticBody(held.mesh, Material(E, 0.0, 7800.0, thermal_expansion=1e-5),
+                           thickness=B, fixed=held.fixed)
+        state = fc.static_solution(held, Load(), temperature=-pull / (E * 1e-5))
+    else:
+        state = fc.static_solution(slides, Load(boundaries=(
+            BoundaryLoad("right", pressure=-pull),)))
+    basis = modal_basis(held, 1, contact=(), points={"middle": "middle"}, prestress=state,
+                        large_deflections=LargeDeflections(0.6 * H))
+    linear = np.pi / 2.0 * np.sqrt(E / 7800.0) * RADIUS / L**2 * np.sqrt(1.0 + part)
+    assert basis.frequencies_hz[0] == pytest.approx(linear, rel=2e-3)
+    a = 2.0
+    found = backbone(ContactSystem(basis), a * RADIUS, ("middle", "y"), [a * RADIUS])[0]
+    c = 0.25 / (1.0 + part)
+    assert found == pytest.approx(duffing(c * a**2), rel=3e-3)
+
+
+def duffing(c):
+    """Frequency ratio of x'' + x + c x^3 = 0 at the amplitude 1."""
+    hard = 1.0 + c
+    return np.pi / 2.0 * np.sqrt(hard) / ellipk(c / 2.0 / hard)
 
 
 def cantilever_coefficient():
@@ -299,7 +327,8 @@ def test_limits_are_said():
     body = beam("hinged", 8)
     given = LargeDeflections(0.5 * H)
     for options, told in (({"reduction": "craig-bampton"}, "vibration modes"),
-                          ({"rotation": fc.fem.Rotation(1.0)}, "rotation do not go together")):
+                          ({"rotation": fc.fem.Rotation(1.0)}, "rotation do not go together"),
+                          ({"temperature": 1.0, "reduction": "residual"}, "as prestress")):
         with pytest.raises(InputError, match=told):
             modal_basis(body, 2, contact=(), large_deflections=given, **options)
     with pytest.raises(InputError, match="mode 3 is not among the 2 modes"):

@@ -96,9 +96,13 @@ class CondensedBody:
 
 
 def condensed_body(
-    body: ElasticBody, system: FreeSystem, w: Array, shapes: Array, given: LargeDeflections
+    body: ElasticBody, system: FreeSystem, w: Array, shapes: Array, given: LargeDeflections,
+    geometric: Any = None,
 ) -> CondensedBody:
     """Fit the potential of modes with frequencies (m,) and free shapes (f, m).
+
+    ``geometric``, sparse (d N, d N), is the geometric stiffness of a stress in the body, that of
+    ``system`` too.
 
     Raises
     ------
@@ -119,7 +123,8 @@ def condensed_body(
     if numbers.max() >= len(w):
         raise InputError(f"large_deflections: mode {numbers.max()} is not among the {len(w)} modes "
                          f"of the basis, which count from 0; ask for more modes.")
-    states = LoadedStates(body, system, w, shapes, int(numbers[0]), given.largest_displacement)
+    states = LoadedStates(body, system, w, shapes, int(numbers[0]), given.largest_displacement,
+                          geometric)
     while True:
         fit = _Fit(states, numbers)
         if given.accuracy is None or max(fit.force_error, fit.displacement_error) <= (

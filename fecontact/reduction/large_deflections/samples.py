@@ -5,6 +5,7 @@ largest displacement; displacements are in units of this one.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -66,13 +67,15 @@ class LoadedStates:
         Mode whose displacement is ``size``.
     size : float
         Largest displacement [m].
+    geometric : sparse (d N, d N) array, optional
+        Geometric stiffness of a stress in the body.
     """
 
     def __init__(
         self, body: ElasticBody, system: FreeSystem, w: Array, shapes: Array, first: int,
-        size: float,
+        size: float, geometric: Any = None,
     ) -> None:
-        self.model, self.shapes, self.size = FiniteStrainModel(body), shapes, size
+        self.model, self.shapes, self.size = FiniteStrainModel(body, geometric), shapes, size
         self.inertia = np.asarray(system.mass @ shapes)
         whole = np.asarray(body.expansion @ shapes)
         moved = whole.reshape(-1, body.dimension, len(w))
