@@ -165,13 +165,11 @@ def large_deflection_forces(
         strict=True)]
     for i in range(d):
         springs += _square_times(own[i], stiff[:, i, i] / largest[i] ** 2,
-                                 response[:, i, i] * reach[i] ** 2, reach[i] * largest[i], 1.0)
+                                 response[:, i, i] * reach[i] ** 2, reach[i] * largest[i])
     for i, j in combinations(range(d), 2):
-        # 2 q_i q_j = ((q_i + q_j)^2 - (q_i - q_j)^2) / 2
         pull = stiff[:, i, j] / (largest[i] * largest[j])
         moved, far = response[:, i, j] * reach[i] * reach[j], reach[i] * largest[i]
-        for sign in (1.0, -1.0):
-            springs += _square_times(own[i] + sign * own[j], pull, moved, far, 0.5 * sign)
+        springs += _product(own[i], own[j], pull, moved, far)
     reached = _reached(springs, fitted, response, reach)
     kept = [one for one, size_of in zip(springs, reached, strict=True)
             if size_of > _NO_SPRING * max(reached)]
@@ -183,21 +181,39 @@ def large_deflection_forces(
 
 
 def _square_times(
-    row: Array, pull: Array, moved: Array, far: float, factor: float
+    row: Array, pull: Array, moved: Array, far: float
 ) -> list[tuple[Array, float, float]]:
-    """Springs with the potential ``-factor (row . x)^2 (pull . x) / 2``.
+    """Springs with the potential ``-(row . x)^2 (pull . x) / 2``.
 
     ``s^2 z = ((s + c z)^3 - (s - c z)^3 - 2 (c z)^3) / (6 c)``, where c makes both comparable:
     ``moved`` is a displacement x that belongs to s = ``far``.
     """
-    along = abs(float(pull @ moved))
-    if not along:
-        return []
-    c = far / along
-    size = -0.5 * factor / (6.0 * c)
+    c = _comparable(pull, moved, far)
     # A spring with the potential g e^3 has the tension 3 g e^2.
-    return [(row + c * pull, 3.0 * size, 0.0), (row - c * pull, -3.0 * size, 0.0),
-            (c * pull, -6.0 * size, 0.0)]
+    size = -0.25 / c if c else 0.0
+    return [(row + c * pull, size, 0.0), (row - c * pull, -size, 0.0),
+            (c * pull, -2.0 * size, 0.0)] if c else []
+
+
+def _product(
+    first: Array, second: Array, pull: Array, moved: Array, far: float
+) -> list[tuple[Array, float, float]]:
+    """Springs with the potential ``-(first . x) (second . x) (pull . x)``.
+
+    ``24 a b c z = (a + b + c z)^3 - (-a + b + c z)^3 - (a - b + c z)^3 - (a + b - c z)^3``;
+    ``moved`` and ``far`` are those of :func:`_square_times`.
+    """
+    c = _comparable(pull, moved, far)
+    size = -0.125 / c if c else 0.0
+    return [(row, sign * size, 0.0) for row, sign in (
+        (first + second + c * pull, 1.0), (second - first + c * pull, -1.0),
+        (first - second + c * pull, -1.0), (first + second - c * pull, -1.0))] if c else []
+
+
+def _comparable(pull: Array, moved: Array, far: float) -> float:
+    """Factor that makes ``pull . x`` as long as ``far`` under the displacement ``moved``, or 0."""
+    along = abs(float(pull @ moved))
+    return far / along if along else 0.0
 
 
 def _reached(
