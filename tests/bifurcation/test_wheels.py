@@ -1,5 +1,7 @@
 """One meshed sector under engine order against the whole wheel of finite elements."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -24,12 +26,18 @@ from fecontact.bifurcation import (
     HarmonicBalance,
     contact_field,
     frequency_response,
+    nonlinear_mode,
     orbit_branch,
     wheel_motion,
     wheel_stability,
     wheel_system,
 )
 from fecontact.bifurcation.harmonic.starts import problem_for
+from fecontact.bifurcation.nonlinear_modes.linear_start import (
+    field_over_xi,
+    unforced,
+    with_mass_damping,
+)
 from fecontact.fem import CyclicSymmetry, Rotation, pair_faces
 from fecontact.fem.points import place_rows
 from fecontact.laws import Harmonic, JenkinsFriction, PrescribedForce
@@ -76,8 +84,10 @@ def response(system, bounds, points=1, observe=("s.tip", "y"), harmonics=(0, 1, 
         method=HarmonicBalance(list(harmonics), 48, stability=None, **options))
 
 
-def every_sector(sector, order, hertz, deviations=(0.0,) * N):
+def every_sector(sector, order, hertz, deviations=(0.0,) * N, nodes=False):
     """The wheel of finite elements with its contact rows, independent of the modes of a sector.
+
+    All nodes are points if asked for, 'node0.5' that of number 5 of sector 0.
 
     The modulus of each blade deviates from that of steel; damping is that of the tuned wheel.
     """
@@ -105,12 +115,15 @@ def every_sector(sector, order, hertz, deviations=(0.0,) * N):
     feet = pairing.feet @ sp.kron(sp.eye_array(count), SYMMETRY.rotation(2))
     contact = np.concatenate([
         rows(frames @ pairing.nodes, s) - rows(frames @ feet, (s + 1) % N) for s in range(N)])
+    unit = np.eye(3, 2 * count)
+    every = {f"node{s}.{k}": rows(sp.csr_array(np.roll(unit, 2 * k, axis=1)), s)
+             for s in range(N) for k in range(count)} if nodes else {}
     mass, stiffness, steel = ((E.T @ one @ E).toarray() for one in (
         body.mass, body.stiffness, tuned.stiffness))
     basis = basis_from_matrices(
         mass, stiffness,
         {"contact": contact.reshape(-1, 3, E.shape[1]), **{
-            f"tip{s}": rows(tip, s) for s in range(N)}},
+            f"tip{s}": rows(tip, s) for s in range(N)}, **every},
         damping=DAMPING.mass_factor * mass + DAMPING.stiffness_factor * steel,
         tributary=np.tile(pairing.tributary, N))
     return ContactSystem(
@@ -166,6 +179,90 @@ def test_a_mistuned_wheel_with_friction_is_that_of_finite_elements(sector, wheel
     assert abs(tips[0] / sticking - 1.0) > 1e-3
 
 
+def mode_of(wheel, order, bounds=(1e-7, 1e-4), number=1):
+    return nonlinear_mode(
+        system_of(wheel, 1.0), bounds, number, observe=("s.tip", "y"),
+        options=ContinuationOptions(points=2000, step=0.1, largest_step=0.3, tolerance=1e-12),
+        method=HarmonicBalance([0, 1, 3], 48, stability=None, repeats=EngineOrder(wheel, order)))
+
+
+@pytest.mark.parametrize(("order", "number"), [(1, 1), (2, 1), (3, 1), (4, 2)])
+def test_nonlinear_mode_of_a_wave_is_one_of_the_whole_wheel(sector, wheel, order, number):
+    """It satisfies the equations of all sectors of finite elements, with the same xi, to 1e-9."""
+    mode = mode_of(wheel, order, number=number)
+    index = int(np.argmax(mode.damping_ratio)) if order != 2 else len(mode) // 2
+    point = mode.branch.points[index]
+    field = EngineOrder(wheel, order).field(contact_field(system_of(wheel, 1.0), [NAME]))
+    motion = wheel_motion(field, point)
+    whole = contact_field(unforced(every_sector(sector, order, 1.0, nodes=True)), {
+        "xi": (point.parameter, with_mass_damping)})
+    basis, count = whole.system().basis, len(sector.nodes)
+    T = np.concatenate([basis.T[basis.point_index(f"node{s}.{k}"), :2]
+                        for s in range(N) for k in range(count)])
+    X = np.zeros((7, basis.modes))
+    for h in (0, 1, 3):
+        shapes = np.concatenate([motion.harmonic("s", h, s).ravel() for s in range(N)])
+        q, *_ = np.linalg.lstsq(T, shapes, rcond=None)
+        assert T @ q == pytest.approx(shapes, abs=1e-9 * np.abs(shapes).max())
+        X[max(0, 2 * h - 1)] = q.real
+        if h:
+            X[2 * h] = -q.imag
+    problem = problem_for(whole, whole.values, 0, HarmonicBalance([0, 1, 3], 48),
+                          np.ones(whole.dimension + 2))
+    rest = np.zeros(whole.dimension)
+    rest[: basis.modes] = X[0]
+    problem = replace(problem, kept=problem.kept.left_by(rest[None]))
+    u = np.concatenate([X.ravel(), [motion.period, point.parameter]])
+    size = (2.0 * np.pi / motion.period) ** 2 * np.abs(X).max()
+    assert np.abs(problem.linearise(u).residual[:-1]).max() < 1e-9 * size
+    # The equations are not met with another damping.
+    u[-1] *= 1.01
+    assert np.abs(problem.linearise(u).residual[:-1]).max() > 1e-6 * size
+    # Kinetic energy of the wheel is that of N sectors.
+    speeds = 2.0 * np.pi / motion.period * np.repeat([0, 1, 2, 3], 2)[1:, None] * X
+    assert N * point.values["mean_square_velocity"] == pytest.approx(
+        0.5 * (speeds**2).sum(), rel=1e-8)
+
+
+def test_nonlinear_mode_of_a_wave_begins_stuck_and_ends_free(wheel):
+    """Frequencies of the sector with the contact closed and without; damping of the material."""
+    mode, one = mode_of(wheel, 1, bounds=(1e-7, 1e-2)), wheel.of(1)
+    nodes = one.T[2 : 2 + wheel.basis.contact_nodes, 0]
+    shares = wheel.basis.tributary / wheel.basis.tributary.sum()
+    stuck = one.stiffness + FRICTION.stiffness * (nodes.conj().T * shares) @ nodes
+    for K, w in ((stuck, mode.angular_frequency[0]), (one.stiffness, mode.angular_frequency[-1])):
+        assert w == pytest.approx(np.sqrt(np.linalg.eigvalsh(K)[0]), rel=2e-5)
+    w, shapes = np.linalg.eigh(stuck)
+    damping = (shapes[:, 0].conj() @ one.damping @ shapes[:, 0]).real
+    assert mode.xi[0] == pytest.approx(damping, rel=1e-4)
+    assert mode.damping_ratio.max() > 5.0 * mode.damping_ratio[0]
+    # A slipping node with constant normal force loses 4 mu N times its slip amplitude a period.
+    free = 0.5 * (DAMPING.mass_factor / mode.angular_frequency[-1]
+                  + DAMPING.stiffness_factor * mode.angular_frequency[-1])
+    assert mode.damping_ratio[-1] == pytest.approx(free, rel=2e-3)
+
+
+def test_waves_that_run_against_each_other_are_one_mode(wheel):
+    """Orders 1 and 3 of 4 sectors, without rotation; the forward wave is the backward one."""
+    first, second = (mode_of(wheel, order, (1e-7, 1e-6)) for order in (1, 3))
+    at = np.interp(4e-7, first.amplitude, first.frequency_hz)
+    assert np.interp(4e-7, second.amplitude, second.frequency_hz) == pytest.approx(at, rel=1e-3)
+
+
+def test_modes_of_waves_refuse_what_does_not_fit(sector, wheel):
+    mode, wave = mode_of(wheel, 1, (1e-7, 2e-7)), EngineOrder(wheel, 1)
+    with pytest.raises(InputError, match="not for travelling waves"):
+        mode.at(system_of(wheel, 1.0), amplitude=1.5e-7)
+    field = wave.field(contact_field(system_of(wheel, 1.0), [NAME]))
+    with pytest.raises(InputError, match="take a point of a response"):
+        wheel_stability(field, mode.branch.points[0])
+    with pytest.raises(InputError, match="from 1 to 34"):
+        mode_of(wheel, 1, number=99)
+    with pytest.raises(InputError, match="is for contact systems"):
+        nonlinear_mode(field, (1e-7, 1e-6), observe=("s.tip", "y"),
+                       method=HarmonicBalance([0, 1], stability=None, repeats=wave))
+
+
 def test_few_modes_suffice(sector, wheel):
     """Six modes of each diameter, and residual vectors of contact nodes and tip."""
     few = cyclic_basis({"s": sector}, SYMMETRY, {"shroud": shroud(sector)}, modes=6,
@@ -210,21 +307,25 @@ def test_whole_wheel_has_the_frequencies_of_finite_elements(sector, wheel):
     assert np.linalg.eigvalsh(WholeWheel(wheel).stiffness) == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", [NAME, "load.forces.0.signal.amplitude"])
+@pytest.mark.parametrize("name", [NAME, "load.forces.0.signal.amplitude", "xi"])
 def test_derivatives_of_a_wave_are_differences_of_its_equations(sector, name):
-    """To all coefficients and to the parameter, which changes the period or does not."""
+    """To all coefficients, to the parameter, which changes the period or does not, and to both."""
     few = cyclic_basis({"s": sector}, SYMMETRY, {"shroud": shroud(sector)}, modes=3,
                        points={"s.tip": "tip"}, damping=DAMPING, diameters=[0, 1])
     hertz = 1.01 * first_hz(few, 1)
-    field = EngineOrder(few, 1).field(contact_field(system_of(few, hertz), [name]))
+    system, wave = system_of(few, hertz), EngineOrder(few, 1)
+    field = (field_over_xi(system, 30.0, wave) if name == "xi"
+             else wave.field(contact_field(system, [name])))
     method = HarmonicBalance([0, 1, 3], 48, stability=None)
     problem = problem_for(field, field.values, 0, method, np.ones(field.dimension + 2))
     size = 1e-6 * np.random.default_rng(3).normal(size=problem.size)
     size[problem.left_out] = 0.0
-    u, unit = np.append(size, field.values), np.full(problem.size + 1, 1e-11)
-    unit[-1] = 1e-5 * field.values[0]
+    period = [1.0 / hertz] if problem.autonomous else []
+    u = np.concatenate([size, period, field.values])
+    unit = np.append(np.full(problem.size, 1e-11), 1e-5 * u[problem.size :])
     found, turns = problem.linearise(u).condensed, np.diag(unit)
     # Coefficients that are left out stay zero.
+    assert problem.autonomous == (name == "xi")
     for k in np.delete(np.arange(len(u)), problem.left_out):
         ends = [problem.linearise(u + sign * turns[k]).residual for sign in (1.0, -1.0)]
         expected = (ends[0] - ends[1]) / (2.0 * unit[k])

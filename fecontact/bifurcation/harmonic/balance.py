@@ -382,7 +382,7 @@ class Linearised:
         turned = self.free_balance.copy()
         if problem.ties is not None:
             problem.ties.residual(problem.coefficients(self.u), turned, self.period,
-                                  problem.harmonics_kept)
+                                  float(self.u[-1]), problem.harmonics_kept)
         found = turned.reshape(-1)
         found[problem.left_out] = self.u[problem.left_out]
         if not problem.autonomous:
@@ -562,7 +562,8 @@ class Linearised:
             found[n, :n], found[n, n:] = problem.phase_row, 0.0
         if problem.ties is not None:
             problem.ties.derivatives(found[:n], problem.coefficients(self.u), self.free_balance,
-                                     self.period, self._by_common, problem.harmonics_kept)
+                                     self.period, float(self.u[-1]), self._by_common,
+                                     problem.harmonics_kept)
         return zero_left_out(found, problem.left_out)
 
     def solve(self, row: Array, rhs: Array) -> Array:

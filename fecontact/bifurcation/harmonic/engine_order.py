@@ -4,11 +4,13 @@ Forces ``F cos(W t - 2 pi m s / N)`` on sectors s are engine order m. The wheel 
 ``u_s(t) = u_0(t - m s T / N)``, whose harmonic h belongs to the nodal diameter k with
 ``k = -h m mod N``. Of displacements d of contact nodes and points, each harmonic satisfies
 
-.. math:: d_h = H_h f_h, \qquad
-    H_h = W_k (K_k - (h \Omega)^2 + i h \Omega C_k)^{-1} W_k^H
+.. math:: d_h = H_h (f_h + i S_k d_h), \qquad
+    H_h = W_k (K_k - (h \Omega)^2 + i h \Omega (C_k - \xi) + i W_k^H S_k W_k)^{-1} W_k^H
 
 with the modes and complex rows W_k of its own diameter, forces f_h by alternating frequency and
-time. The mean, harmonic 0, is that of the diameter 0 in its modal coordinates.
+time. Nonlinear modes have a negative damping xi, and as they begin at resonances an imaginary
+stiffness S_k, diagonal, which acts on both sides and changes no solution; it keeps H_h finite. Both
+are zero for responses. The mean, harmonic 0, is that of the diameter 0 in its modal coordinates.
 """
 
 from dataclasses import dataclass, field, replace
@@ -32,6 +34,8 @@ from fecontact.system.statics.equilibrium import equilibrium_coordinates
 
 # Size of rows, relative to the largest, of displacements that are always zero.
 _STILL = 1e-12
+# Softness of displacements, relative to the softest one, below which it counts as this.
+_SOFTEST = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,12 +180,15 @@ class EngineOrder:
 class WaveField(ContactField):
     """A contact system of one sector under engine order as a vector field, for harmonic balance.
 
-    ``EngineOrder(wheel, order).field(contact_field(system, names))`` makes it.
+    ``EngineOrder(wheel, order).field(contact_field(system, names))`` makes it. The only parameter
+    of an ``unfolded`` field is the negative damping xi of all masses of the wheel.
     """
 
-    def __init__(self, family: ParametrisedSystem, waves: EngineOrder) -> None:
+    def __init__(
+        self, family: ParametrisedSystem, waves: EngineOrder, unfolded: bool = False
+    ) -> None:
         super().__init__(family)
-        self.waves = waves
+        self.waves, self.unfolded = waves, unfolded
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,11 +196,14 @@ class Waves:
     """Equations d_h = H_h f_h of the harmonics of one sector.
 
     The first ``means`` coordinates are modes of the diameter 0, which have the mean alone; the
-    others are displacements, which have harmonics 1 to H alone.
+    others are displacements, which have harmonics 1 to H alone. The parameter is the negative
+    damping xi if the field is ``unfolded``.
     """
 
     repeats: EngineOrder
-    _known: dict[int, tuple[ComplexArray, ...]] = field(default_factory=dict)
+    unfolded: bool = False
+    _known: dict[int, tuple[ComplexArray, ComplexArray, ComplexArray, Array]] = field(
+        default_factory=dict)
 
     @property
     def means(self) -> int:
@@ -214,8 +224,8 @@ class Waves:
         zero[0, self.means :] = True
         return np.flatnonzero(zero)
 
-    def _of(self, harmonic: int) -> tuple[ComplexArray, ...]:
-        """Stiffness, damping (m, m) and rows (r, m) of the diameter of a harmonic."""
+    def _of(self, harmonic: int) -> tuple[ComplexArray, ComplexArray, ComplexArray, Array]:
+        """Stiffness, damping (m, m), rows (r, m) and S (r,) of the diameter of a harmonic."""
         given = self.repeats
         k = -harmonic * given.order % given.wheel.symmetry.sectors
         if k not in self._known:
@@ -223,34 +233,91 @@ class Waves:
             points, components = np.array(given.places, dtype=int).reshape(-1, 2).T
             rows = np.concatenate([one.T[points, components],
                                    one.boundary_rows.reshape(-1, len(one.stiffness))])
-            self._known[k] = one.stiffness, one.damping, rows
+            stiffness = (_stiffness_at(one.stiffness, rows) if self.unfolded
+                         else np.zeros(len(rows)))
+            self._known[k] = one.stiffness, one.damping, rows, stiffness
         return self._known[k]
 
-    def compliance(self, harmonic: int, w: float) -> tuple[ComplexArray, ComplexArray]:
-        """H_h (r, r) at the angular frequency w of harmonic 1, and its derivative to w."""
-        K, C, W = self._of(harmonic)
-        moved = self._solved(harmonic, w, W.conj().T)
-        change = 1j * harmonic * C - 2.0 * harmonic**2 * w * np.eye(len(K))
-        return W @ moved, -W @ self._solved(harmonic, w, change @ moved)
+    def _damping(self, parameter: float) -> float:
+        """Negative damping xi [1/s] at a value of the parameter."""
+        return parameter if self.unfolded else 0.0
 
-    def response(self, harmonic: int, w: float, forces: ComplexArray) -> ComplexArray:
-        """Coordinates (m,) of the modes of a harmonic under forces (r,) on the displacements."""
-        return self._solved(harmonic, w, self._of(harmonic)[2].conj().T @ forces)
+    def compliance(
+        self, harmonic: int, w: float, parameter: float
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+        """H_h (r, r) at the angular frequency w of harmonic 1, its derivatives to w and xi."""
+        K, C, W, _ = self._of(harmonic)
+        unit, xi = np.eye(len(K)), self._damping(parameter)
+        moved = self._solved(harmonic, w, xi, W.conj().T)
+        change = 1j * harmonic * (C - xi * unit) - 2.0 * harmonic**2 * w * unit
+        return (W @ moved, -W @ self._solved(harmonic, w, xi, change @ moved),
+                1j * harmonic * w * W @ self._solved(harmonic, w, xi, moved))
 
-    def _solved(self, harmonic: int, w: float, forces: ComplexArray) -> ComplexArray:
+    def amplitudes(
+        self, harmonic: int, coefficients: Array, balance: Array, period: float, parameter: float
+    ) -> ComplexArray:
+        """Coordinates (m,) of the modes of a harmonic at a solution.
+
+        ``balance`` (2 H + 1, b) is that of free masses.
+        """
+        w, (_, _, W, S) = 2.0 * np.pi / period, self._of(harmonic)
+        q, free = self._harmonic(coefficients, balance, harmonic, w)
+        return self._solved(harmonic, w, self._damping(parameter),
+                            W.conj().T @ (1j * S * q - free))
+
+    def mean_square_velocity(
+        self, coefficients: Array, balance: Array, period: float, parameter: float,
+        kept: Integers,
+    ) -> float:
+        """Twice the mean kinetic energy of one sector [J]; arguments as for others."""
+        w = 2.0 * np.pi / period
+        return float(sum(0.5 * (np.abs(h * w * self.amplitudes(
+            h, coefficients, balance, period, parameter)) ** 2).sum() for h in kept[kept > 0]))
+
+    def linearised(self, jacobian: Array) -> tuple[ComplexArray, ComplexArray]:
+        """The linearised equations of harmonic 1 and how its states follow.
+
+        Of the Jacobian (d, d) of the field's states [q, q', z] a matrix A (n, n) of the states
+        [y, y', z] with the modes y of the diameter; and (d, n) of the former from the latter.
+        """
+        K, C, W, _ = self._of(1)
+        m, b, c = len(K), self.means + len(W), len(jacobian) - 2 * (self.means + len(W))
+        back = np.zeros((len(jacobian), 2 * m + c), dtype=complex)
+        back[self.means : b, :m], back[b + self.means : 2 * b, m : 2 * m] = W, W
+        back[2 * b :, 2 * m :] = np.eye(c)
+        A = np.zeros((2 * m + c, 2 * m + c), dtype=complex)
+        A[:m, m : 2 * m] = np.eye(m)
+        A[m : 2 * m] = W.conj().T @ jacobian[b + self.means : 2 * b] @ back
+        A[m : 2 * m, :m] -= K
+        A[m : 2 * m, m : 2 * m] -= C
+        A[2 * m :] = jacobian[2 * b :] @ back
+        return A, back
+
+    def _harmonic(
+        self, coefficients: Array, balance: Array, h: int, w: float
+    ) -> tuple[ComplexArray, ComplexArray]:
+        """Displacements (r,) of a harmonic, and the forces on them with opposite sign."""
+        c, s, first = 2 * h - 1, 2 * h, self.means
+        q: ComplexArray = np.asarray(
+            coefficients[c, first:] - 1j * coefficients[s, first:], dtype=complex)
+        return q, balance[c, first:] - 1j * balance[s, first:] + (h * w) ** 2 * q
+
+    def _solved(
+        self, harmonic: int, w: float, xi: float, forces: ComplexArray
+    ) -> ComplexArray:
         """Response of the modes to forces (m,) or (m, k)."""
-        K, C, _ = self._of(harmonic)
-        own = harmonic * w
+        K, C, W, S = self._of(harmonic)
+        own, unit = harmonic * w, np.eye(len(K))
         try:
             return np.asarray(np.linalg.solve(
-                K - own**2 * np.eye(len(K)) + 1j * own * C, forces))
+                K - own**2 * unit + 1j * (own * (C - xi * unit) + W.conj().T * S @ W), forces))
         except np.linalg.LinAlgError:
             raise AnalysisError(f"Harmonic {harmonic} is at a resonance without damping at "
                                 f"{w / (2.0 * np.pi):.6g} Hz; give the modes some damping."
                                 ) from None
 
     def residual(
-        self, coefficients: Array, found: Array, period: float, kept: Integers
+        self, coefficients: Array, found: Array, period: float, parameter: float, kept: Integers
     ) -> None:
         """Put the equations of the kept harmonics into found (2 H + 1, b).
 
@@ -260,19 +327,19 @@ class Waves:
         found[0, :first] *= self.softness
         for h in kept[kept > 0].tolist():
             c, s = 2 * h - 1, 2 * h
-            q = coefficients[c, first:] - 1j * coefficients[s, first:]
-            free = found[c, first:] - 1j * found[s, first:] + (h * w) ** 2 * q
-            value = q + self.compliance(h, w)[0] @ free
+            q, free = self._harmonic(coefficients, found, h, w)
+            S = self._of(h)[3]
+            value = q + self.compliance(h, w, parameter)[0] @ (free - 1j * S * q)
             found[c, first:], found[s, first:] = value.real, -value.imag
 
     def derivatives(
-        self, matrix: Array, coefficients: Array, balance: Array, period: float,
+        self, matrix: Array, coefficients: Array, balance: Array, period: float, parameter: float,
         by_common: Array, kept: Integers,
     ) -> None:
         """Put the derivatives into a matrix ((2 H + 1) b, columns) of those of the balance.
 
         ``balance`` (2 H + 1, b) is that of free masses, ``by_common`` the derivatives of the
-        period to the last columns.
+        period to the last columns, of which the very last is that of the parameter.
         """
         w, (L, b), first = 2.0 * np.pi / period, coefficients.shape, self.means
         turning = -w / period * by_common
@@ -280,19 +347,22 @@ class Waves:
         for h in kept[kept > 0].tolist():
             c, s = 2 * h - 1, 2 * h
             cosines, sines = (np.arange(row * b + first, row * b + b) for row in (c, s))
-            H, slope = self.compliance(h, w)
-            q = coefficients[c, first:] - 1j * coefficients[s, first:]
-            free = balance[c, first:] - 1j * balance[s, first:] + (h * w) ** 2 * q
+            S, (H, slope, by_xi) = self._of(h)[3], self.compliance(h, w, parameter)
+            q, free = self._harmonic(coefficients, balance, h, w)
+            acting = free - 1j * S * q
             change = matrix[cosines] - 1j * matrix[sines]
             own = np.zeros_like(change)
             places = np.arange(b - first)
             own[places, cosines], own[places, sines] = 1.0, -1j
-            change = own + H @ (change + (h * w) ** 2 * own)
-            change[:, L * b :] += np.outer(slope @ free + 2.0 * h * h * w * (H @ q), turning)
+            change = own + H @ (change + ((h * w) ** 2 - 1j * S)[:, None] * own)
+            change[:, L * b :] += np.outer(slope @ acting + 2.0 * h * h * w * (H @ q), turning)
+            if self.unfolded:
+                change[:, -1] += by_xi @ acting
             matrix[cosines], matrix[sines] = change.real, -change.imag
 
     def neglected(
-        self, coefficients: Array, forces: Array, period: float, sizes: Array, kept: Integers
+        self, coefficients: Array, forces: Array, period: float, parameter: float, sizes: Array,
+        kept: Integers,
     ) -> float:
         """Root mean square of harmonics that are left out over that of those that are kept.
 
@@ -308,9 +378,17 @@ class Waves:
             if h in kept:
                 continue
             try:
-                added = self.compliance(h, w)[0] @ spectrum[h]
+                added = self.compliance(h, w, parameter)[0] @ spectrum[h]
             except InputError:
                 return float("nan")
             total += float((np.abs(added / sizes[first:]) ** 2).sum())
         whole = float(((coefficients[1:, first:] / sizes[first:]) ** 2).sum())
         return float(np.sqrt(total / whole)) if whole > 0.0 else 0.0
+
+
+def _stiffness_at(stiffness: ComplexArray, rows: ComplexArray) -> Array:
+    """Stiffness (r,) of the sector at displacements, of the size that it has near resonances."""
+    values, shapes = np.linalg.eigh(stiffness)
+    sizes = np.abs(values) + np.abs(values).min(initial=np.inf, where=values != 0.0)
+    softness = (np.abs(rows @ shapes) ** 2 / sizes).sum(axis=1)
+    return np.asarray(1.0 / np.maximum(softness, _SOFTEST * softness.max(initial=0.0)))

@@ -267,8 +267,8 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         else:
             periods = np.array([self.period(each) for each in u])
         if isinstance(self.ties, Waves):
-            errors = [self.ties.neglected(self.coefficients(one), accelerations, T, size,
-                                          self.harmonics_kept)
+            errors = [self.ties.neglected(self.coefficients(one), accelerations, T, float(one[-1]),
+                                          size, self.harmonics_kept)
                       for one, accelerations, T, size in zip(
                           u, forces, periods, np.broadcast_to(sizes, (count, sizes.shape[-1])),
                           strict=True)]

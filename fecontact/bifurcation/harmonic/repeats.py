@@ -87,14 +87,14 @@ class Ties:
         return np.zeros(0, dtype=np.int64)
 
     def residual(
-        self, coefficients: Array, found: Array, period: float, kept: Integers
+        self, coefficients: Array, found: Array, period: float, parameter: float, kept: Integers
     ) -> None:
         """Put what the others differ by into the rows of their modes of found (2 H + 1, b)."""
         for modes, shift in self.others:
             found[:, modes] = coefficients[:, modes] - shifted(coefficients[:, self.own], -shift)
 
     def derivatives(
-        self, matrix: Array, coefficients: Array, balance: Array, period: float,
+        self, matrix: Array, coefficients: Array, balance: Array, period: float, parameter: float,
         by_common: Array, kept: Integers,
     ) -> None:
         """Put the derivatives of :meth:`residual` into a matrix ((2 H + 1) b, columns)."""

@@ -79,7 +79,7 @@ def _ties_of(field: VectorField, method: HarmonicBalance) -> Ties | Waves | None
             raise InputError("HarmonicBalance: repeats are another wave than that of the field; "
                              "leave them out.")
         require_wave(method)
-        return Waves(field.waves)
+        return Waves(field.waves, field.unfolded)
     if isinstance(method.repeats, EngineOrder):
         raise InputError("HarmonicBalance: repeats=EngineOrder(...) needs the field of its wave; "
                          "make it by its method field.")

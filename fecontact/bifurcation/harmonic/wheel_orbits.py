@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.engine_order import WaveField, Waves
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.nonlinear_modes.linear_start import field_over_xi
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.read_only import read_only_arrays
@@ -108,25 +109,31 @@ class WheelMotion:
 def wheel_motion(field: WaveField, point: BranchPoint) -> WheelMotion:
     """The motion of the whole wheel at a point of a branch under engine order.
 
+    At a point of a nonlinear mode the field is any one of its wave and system.
+
     Raises
     ------
     InputError
         For a field that is not that of a wave, or a point of another field.
     """
     require_kind("wheel_motion", WaveField, field=field)
-    problem, u, _ = starts.restored(field, point)
+    own: ContactField = field
+    if _of_mode(point):
+        own = field_over_xi(field.waves.at_rest(field.system()), point.parameter, field.waves)
+    problem, u, _ = starts.restored(own, point)
     linearised, waves = problem.evaluate(u), problem.ties
     assert isinstance(waves, Waves)
     period, wheel = problem.period(u), field.waves.wheel
-    w, X, free = 2.0 * np.pi / period, problem.coefficients(u), linearised.free_balance
+    X, free = problem.coefficients(u), linearised.free_balance
     found = {0: X[0, : waves.means].astype(complex)}
     for h in problem.harmonics_kept:
         if h > 0:
-            q = X[2 * h - 1, waves.means :] - 1j * X[2 * h, waves.means :]
-            rows = free[2 * h - 1 : 2 * h + 1, waves.means :]
-            forces = -(rows[0] - 1j * rows[1]) - (h * w) ** 2 * q
-            found[int(h)] = waves.response(int(h), w, forces)
+            found[int(h)] = waves.amplitudes(int(h), X, free, period, float(u[-1]))
     return WheelMotion(wheel, field.waves.order, period, found)
+
+
+def _of_mode(point: BranchPoint) -> bool:
+    return "mode_number" in point.branch.attributes
 
 
 @read_only_arrays
@@ -170,10 +177,14 @@ def wheel_stability(
     Raises
     ------
     InputError
-        For a wheel that lacks diameters, loads that are not harmonic, and as :func:`wheel_motion`.
+        For a wheel that lacks diameters, loads that are not harmonic, points of nonlinear modes,
+        and as :func:`wheel_motion`.
     AnalysisError
         If the whole wheel has no orbit near the wave.
     """
+    if _of_mode(point):
+        raise InputError("wheel_stability: the negative damping of a nonlinear mode says nothing "
+                         "of the stability of the wheel; take a point of a response.")
     motion = wheel_motion(field, point)
     whole = WholeWheel(field.waves.wheel) if whole is None else whole
     require_kind("wheel_stability", WholeWheel, whole=whole)

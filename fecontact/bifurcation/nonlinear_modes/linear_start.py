@@ -8,13 +8,14 @@ import numpy as np
 
 from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium, steady_sliding
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
+from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
+from fecontact.bifurcation.harmonic.engine_order import EngineOrder, WaveField, Waves
 from fecontact.bifurcation.harmonic.response import rest_state
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ComplexArray
 from fecontact.laws.excitation import BOUNDARY_STRESSES, BoundaryLoad, Drive, Load
 from fecontact.laws.signals.base import Signal
 from fecontact.laws.signals.harmonic import Constant
-from fecontact.system.complex_modes import ComplexModes
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
 
@@ -111,10 +112,28 @@ def with_mass_damping(system: ContactSystem, xi: float) -> ContactSystem:
     return system.with_(basis=replace(basis, damping=basis.damping - xi * np.eye(basis.modes)))
 
 
+def field_over_xi(
+    system: ContactSystem, xi: float, wave: EngineOrder | None = None
+) -> ContactField:
+    """The system without excitation over xi; that of a wave in the coordinates of its sector."""
+    free = unforced(system if wave is None else wave.system(system))
+    if wave is None:
+        return contact_field(free, {XI: (xi, with_mass_damping)})
+    # The negative damping of all masses of the wheel stands in the equations of the wave.
+    return WaveField(ParametrisedSystem(free, {XI: (xi, _unchanged)}), wave, unfolded=True)
+
+
+def _unchanged(system: ContactSystem, xi: float) -> ContactSystem:
+    return system
+
+
 def linear_start(
-    system: ContactSystem, number: int, preloaded: Array | None = None
+    system: ContactSystem, number: int, preloaded: Array | None = None,
+    wave: EngineOrder | None = None,
 ) -> LinearStart:
     """The linear mode ``number``, from 1, of the system at rest under its constant loads.
+
+    Those of a travelling wave are the modes of its nodal diameter.
 
     Friction with memory sticks in it, with the deflections of the state ``preloaded`` (d,) or none.
     Modes are counted by their damped frequencies at xi = 0; xi is then the negative damping under
@@ -125,8 +144,8 @@ def linear_start(
     InputError
         If there is no such mode, or the ground shakes the system.
     """
-    free = unforced(system)
-    field = contact_field(free, {XI: (0.0, with_mass_damping)})
+    field = field_over_xi(system, 0.0, wave)
+    free = field.system()
     if field.forcing_period(field.values) is not None:
         raise InputError("Waves of the moving ground excite the system; nonlinear modes need flat "
                          "ground, or ground at rest.")
@@ -135,15 +154,23 @@ def linear_start(
              else _stuck(preloaded, free.basis.modes))
     state = _sliding_where_open(free, state)
     A = field.derivatives(np.zeros(1), state[None], field.values)[1][0]
-    m = free.basis.modes
+    b = free.basis.modes
+    # The mean of a wave is that of the diameter 0.
+    means = b if wave is None else wave.wheel.basis.modes
+    _, sizes, rows = np.linalg.svd(A[b : b + means, :means])
+    loose = np.pad(rows[sizes <= _LOOSE * means * sizes[0]], ((0, 0), (0, b - means)))
+    back: Array | ComplexArray = np.eye(len(A))
+    if wave is not None:
+        A, back = Waves(wave, unfolded=True).linearised(A)
+    m = b if wave is None else len(wave.wheel.of(wave.order).stiffness)
     slope = np.zeros_like(A)
     slope[m : 2 * m, m : 2 * m] = np.eye(m)
     value, shape, xi = _undamped(A, slope, _eigenvalue(A, number))
-    _, sizes, rows = np.linalg.svd(A[m : 2 * m, :m])
-    loose = rows[sizes <= _LOOSE * m * sizes[0]]
+    shape = back @ shape
     # The parameter's own scale is that of the mode.
-    field = contact_field(free, {XI: (xi, with_mass_damping)})
-    return LinearStart(field, field.values, 0, state, shape, value, xi, loose)
+    field = field_over_xi(system, xi, wave)
+    return LinearStart(field, field.values, 0, state, shape / np.linalg.norm(shape), value, xi,
+                       loose)
 
 
 def linear_start_of_field(
@@ -179,16 +206,18 @@ def linear_start_of_field(
                        np.zeros((0, field.dimension)))
 
 
-def _eigenvalue(A: Array, number: int) -> complex:
+def _eigenvalue(A: Array | ComplexArray, number: int) -> complex:
     """Eigenvalue of the mode ``number``, from 1; InputError if there is none."""
-    modes = ComplexModes.of(A, zero=_ZERO)
-    count = len(modes.eigenvalues)
+    values = np.linalg.eigvals(A)
+    found = values[values.imag > _ZERO * np.abs(values).max(initial=0.0)]
+    found = found[np.argsort(found.imag)]
+    count = len(found)
     if not (isinstance(number, int | np.integer) and not isinstance(number, bool)
             and 1 <= number <= count):
-        found = listed_frequencies(modes) if count else "none"
+        known = listed_frequencies(found.imag / (2.0 * np.pi)) if count else "none"
         raise InputError(f"mode = {number!r} must be the number of an oscillating mode, from 1 to "
-                         f"{count}; the frequencies at rest are: {found}.")
-    return complex(modes.eigenvalues[number - 1])
+                         f"{count}; the frequencies at rest are: {known}.")
+    return complex(found[number - 1])
 
 
 def _stuck(state: Array, modes: int) -> Array:
@@ -211,13 +240,15 @@ def _sliding_where_open(system: ContactSystem, state: Array) -> Array:
     return found
 
 
-def listed_frequencies(modes: ComplexModes) -> str:
-    """Frequencies of modes in words, for messages."""
-    shown = [f"{value:.5g}" for value in modes.frequencies_hz[:8]]
-    return ", ".join(shown) + (" ..." if len(modes.frequencies_hz) > 8 else "") + " Hz"
+def listed_frequencies(frequencies_hz: Array) -> str:
+    """Frequencies (r,) of modes in words, for messages."""
+    shown = [f"{value:.5g}" for value in frequencies_hz[:8]]
+    return ", ".join(shown) + (" ..." if len(frequencies_hz) > 8 else "") + " Hz"
 
 
-def _undamped(A: Array, E: Array, value: complex) -> tuple[float, ComplexArray, float]:
+def _undamped(
+    A: Array | ComplexArray, E: Array | ComplexArray, value: complex
+) -> tuple[float, ComplexArray, float]:
     """Frequency, shape and xi for which the eigenvalue followed from ``value`` is i w.
 
     The matrix is A + xi E, of the state [q, q', z] of a contact system with E = diag(0, I, 0);

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.bifurcation.harmonic.engine_order import Waves
 from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.observed import observed_values
 from fecontact.bifurcation.harmonic.problem import HarmonicLinearisation, HarmonicProblem
@@ -122,9 +123,17 @@ class ModeProblem(HarmonicProblem):
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, velocities, truncation errors, and what is observed."""
         T, X = self.period(u), self.coefficients(u)
-        error, residual = linearisation.neglected
-        found = {**motion_values(self.layout, X, T, self.row), "truncation_error": error,
-                 "residual": residual}
+        found = motion_values(self.layout, X, T, self.row)
+        if isinstance(self.ties, Waves):
+            forces, _ = linearisation._samples()
+            xi, kept = float(u[-1]), self.harmonics_kept
+            error, residual = self.ties.neglected(
+                X, forces, T, xi, self.scales[self.layout.columns], kept), float("nan")
+            found["mean_square_velocity"] = self.ties.mean_square_velocity(
+                X, linearisation.free_balance, T, xi, kept)
+        else:
+            error, residual = linearisation.neglected
+        found |= {"truncation_error": error, "residual": residual}
         if self.conservative and self.stability is not None:
             floquet = linearisation.floquet
             found |= {"multipliers": floquet.multipliers, "stable": none_grows(

@@ -15,9 +15,10 @@ from fecontact.bifurcation.continuation.problem import (
     ContinuationOptions,
     options_of,
 )
-from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
+from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches, starts
+from fecontact.bifurcation.harmonic.engine_order import EngineOrder
 from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
@@ -28,12 +29,10 @@ from fecontact.bifurcation.nonlinear_modes.by_shooting import (
     leaving_by_shooting,
 )
 from fecontact.bifurcation.nonlinear_modes.linear_start import (
-    XI,
     LinearStart,
+    field_over_xi,
     linear_start,
     linear_start_of_field,
-    unforced,
-    with_mass_damping,
 )
 from fecontact.bifurcation.nonlinear_modes.mode_problem import PERIOD_SCALE, ModeProblem
 from fecontact.bifurcation.orbit_methods import Shooting
@@ -127,7 +126,10 @@ class NonlinearMode(Summarised):
 
     @property
     def loss(self) -> Array:
-        """Energy (N,) lost in one period, xi times the integral of q'^T q' [J]."""
+        """Energy (N,) lost in one period, xi times the integral of q'^T q' [J].
+
+        That of one sector for a travelling wave, as :attr:`energy`.
+        """
         return np.asarray(self.xi * self.branch.column("period") * self._square)
 
     @property
@@ -157,6 +159,9 @@ class NonlinearMode(Summarised):
 
     def coordinates(self, k: int = 1) -> ComplexArray:
         """Complex harmonic (N, m) of the modal coordinates q, or of all states of a field.
+
+        Those of a travelling wave are modes of the diameter 0, for the mean, and displacements of
+        its contact nodes and points; :func:`fecontact.bifurcation.wheel_motion` has its modes.
 
         Raises
         ------
@@ -199,6 +204,9 @@ class NonlinearMode(Summarised):
             If the mode has no such amplitude or frequency, or has it several times.
         """
         _require_harmonics(self.branch, "at")
+        if "engine_order" in self.branch.attributes:
+            raise InputError("NonlinearMode.at: is not for travelling waves; take the points of "
+                             "the mode.")
         if not int(self.branch.attributes["displacements"]):
             raise InputError("NonlinearMode.at: is for modes of contact systems; take the points "
                              "of the mode.")
@@ -271,7 +279,10 @@ def nonlinear_mode(
         Displacement, half the range of which is the amplitude; see
         :func:`fecontact.bifurcation.frequency_response`.
     method : HarmonicBalance or Shooting, optional
-        Kinks need many samples. Shooting is for contact systems, friction without memory.
+        Kinks need many samples. Shooting is for contact systems, friction without memory. With
+        ``repeats=EngineOrder(wheel, m)`` the mode is a wave that travels as one under engine order
+        m does: sector s moves a time ``m s T / N`` later, orders m and N - m run against each
+        other, and modes are counted among those of the nodal diameter.
     options : ContinuationOptions, optional
         By default up to 2000 points, step 0.02, largest_step 0.06, longer with many modes: changes
         relative to amplitude, a fifth of the frequency, a damping ratio of 0.1. Without bounds.
@@ -295,7 +306,8 @@ def nonlinear_mode(
     require_kind("nonlinear_mode", (HarmonicBalance, Shooting, NoneType), method=method)
     require_kind("nonlinear_mode", (str, NoneType), unfolding=unfolding)
     low, high = _amplitudes(bounds)
-    start = _begun(system, mode, preload, unfolding)
+    chosen = method or HarmonicBalance()
+    start = _begun(system, mode, preload, unfolding, _wave_of(chosen))
     # Of proportional coordinates each adds to the length of a step.
     longer = max(1.0, np.sqrt(0.5 * start.displacements))
     given = options_of(options or ContinuationOptions(
@@ -304,7 +316,6 @@ def nonlinear_mode(
     ends = _between(given, low, high)
     further = {"observed": observed, "mode_number": int(mode), "rest": start.state[
         : start.displacements]}
-    chosen = method or HarmonicBalance()
     begin = (leaving_by_shooting(start, *_first_motion(start, row, observed, low), row,
                                  _lossless(start), chosen) if isinstance(chosen, Shooting)
              else _leaving(start, row, observed, low, chosen))
@@ -335,19 +346,35 @@ def _followed(
 def _begun(
     system: ContactSystem | VectorField, mode: int,
     preload: LoadHistory | RestState | Array | None, unfolding: str | None,
+    wave: EngineOrder | None,
 ) -> LinearStart:
-    """The linear mode of a system or field."""
+    """The linear mode of a system, of one of its travelling waves or of a field."""
     if isinstance(system, ContactSystem):
         if unfolding is not None:
             raise InputError("nonlinear_mode: unfolding is for vector fields; the negative damping "
                              "of a contact system is that of all its masses.")
-        return linear_start(system, mode,
-                            None if preload is None else initial_state(system, preload, 0.0))
+        held = None if preload is None else initial_state(system, preload, 0.0)
+        if wave is not None and held is not None:
+            held = wave.state(field_over_xi(system, 0.0, wave), held)
+        return linear_start(system, mode, held, wave)
+    if wave is not None:
+        raise InputError("nonlinear_mode: repeats=EngineOrder(...) is for contact systems, of the "
+                         "basis of its wheel.")
     if isinstance(system, ContactField):
         raise InputError("nonlinear_mode: give the contact system in place of its field.")
     if preload is not None:
         raise InputError("nonlinear_mode: preload is for contact systems.")
     return linear_start_of_field(system, unfolding, mode)
+
+
+def _wave_of(method: HarmonicBalance | Shooting) -> EngineOrder | None:
+    """The travelling wave that a method is for, if it is for one."""
+    if not isinstance(method, HarmonicBalance) or method.repeats is None:
+        return None
+    if not isinstance(method.repeats, EngineOrder):
+        raise InputError("nonlinear_mode: repeats must be an EngineOrder; nonlinear modes of "
+                         "bodies that repeat each other are not there.")
+    return method.repeats
 
 
 def continued_mode(
@@ -360,7 +387,7 @@ def continued_mode(
     while points[-1].kind is not None and len(points) > 1:
         points.pop()
     last = points[-1]
-    field = contact_field(unforced(system), {XI: (last.parameter, with_mass_damping)})
+    field = field_over_xi(system, last.parameter)
     plain, u, tangent = starts.restored(field, last)
     problem = _mode_problem(
         plain, row=observed_row(field, observe)[0], conservative=bool(known["conservative"]),
