@@ -268,7 +268,7 @@ def _read_large_deflections(group: Any, modes: int) -> tuple[LargeDeflectionForc
         coordinates = bounded(one, "coordinates", (None, modes))
         numbers = {name: float(one.attrs[name]) for name in (
             "largest_displacement", "largest_strain", "force_error", "displacement_error",
-            "stress_error")}
+            "stress_error", "other_load_error")}
         found.append(LargeDeflectionForces(
             str(one.attrs["group"]), quadratic, bounded(one, "cubic", (len(quadratic),)),
             coordinates, bounded(one, "ranges", (len(coordinates), 2)),

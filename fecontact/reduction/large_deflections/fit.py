@@ -32,6 +32,8 @@ from fecontact.reduction.large_deflections.samples import LoadedStates, Samples
 
 # Modes that are loaded at once, and random loads on which the fit is tried.
 _TOGETHER, _TRIALS = 3, 4
+# Part of the energy of a mode that a load of another shape has in trials.
+_OTHER = 0.05
 # Arcs between the fitted states and between those of trials, in the linear response to a load.
 _STEP, _TRIAL_STEP = 0.3, 0.43
 # Length of a field relative to the longest below which it is rounding or of no weight.
@@ -66,6 +68,10 @@ class CondensedBody:
         Largest errors in states that were not fitted: of the loads, relative to the largest one
         of each path, of the displacement, relative to ``largest_displacement``, and of the stress,
         relative to the largest one.
+    other_load_error : float
+        Larger of the errors of loads and displacements where a load of another shape, which the
+        modes do not see, acts beside theirs: of uniform acceleration, with a twentieth of their
+        energy.
     states : int
         Number of static solutions that were fitted.
     """
@@ -81,6 +87,7 @@ class CondensedBody:
     force_error: float
     displacement_error: float
     stress_error: float
+    other_load_error: float
     states: int
 
     def independent_fields(self, system: FreeSystem, kept: Array) -> Array:
@@ -127,16 +134,16 @@ def condensed_body(
                           geometric)
     while True:
         fit = _Fit(states, numbers)
-        if given.accuracy is None or max(fit.force_error, fit.displacement_error) <= (
-                given.accuracy):
+        errors = fit.force_error, fit.displacement_error, fit.other_load_error
+        if given.accuracy is None or max(errors) <= given.accuracy:
             break
         left = np.setdiff1d(np.arange(len(w)), numbers)
         if len(numbers) == MOST or not len(left):
             raise AnalysisError(
                 f"large_deflections: with the modes {', '.join(map(str, numbers))} the forces are "
-                f"off by {100.0 * fit.force_error:.2g} % and the displacements by "
-                f"{100.0 * fit.displacement_error:.2g} %, above accuracy = {given.accuracy:g}; "
-                f"lower largest_displacement" + (
+                f"off by {100.0 * errors[0]:.2g} % and the displacements by "
+                f"{100.0 * errors[1]:.2g} %, beside another load by {100.0 * errors[2]:.2g} %, "
+                f"above accuracy = {given.accuracy:g}; lower largest_displacement" + (
                     "." if len(numbers) == MOST else ", or ask for more modes of the basis."))
         numbers = np.append(numbers, left[fit.lacking[left].argmax()])
     for sentence in _resonances(states, fit, w):
@@ -170,6 +177,29 @@ class _Fit:
                 moved @ states.inertia).max(axis=0) * states.reach)
         self.force_error, self.displacement_error, off = map(float, np.max(errors, axis=0))
         self.stress_error = off / largest
+        self.other_load_error = max(self._other_load(loads[0], sign) for sign in (1.0, -1.0))
+
+    def _other_load(self, load: Array, sign: float) -> float:
+        """Larger error of loads and displacements beside a load of another shape.
+
+        The modes do not see it, but the quadratic displacements do: with ``p . u`` it has the
+        potential ``-p . theta q q / 2``.
+        """
+        states, modes = self.states, self.modes
+        forces, moved = (sign * one for one in states.other_load(modes, _OTHER))
+        tried = states.samples(modes, [load], _TRIAL_STEP, forces)
+        direction = load / np.abs(load).sum()
+        factors = tried.loads @ direction / (direction @ direction)
+        quadratic = _monomials(tried.q, 2)
+        fields = self.fields[: quadratic.shape[1]]
+        pull = _slopes(tried.q, (2,)) @ (fields @ forces * states.size)
+        off = (tried.q + _slopes(tried.q) @ self.potential
+               - factors[:, None] * pull / states.energy - tried.loads)
+        apart = quadratic @ fields + np.outer(factors, moved) / states.size - tried.rest
+        self.lacking = np.maximum(self.lacking, np.abs(
+            apart @ states.inertia).max(axis=0) * states.reach)
+        return float(max(np.linalg.norm(off, axis=1).max()
+                         / np.linalg.norm(tried.loads, axis=1).max(), np.abs(apart).max()))
 
     def condensed(self, w: Array) -> CondensedBody:
         """The fit in modal coordinates."""
@@ -185,7 +215,7 @@ class _Fit:
             stress.reshape(-1, components, len(powers)),
             np.stack([fitted.q.min(axis=0), fitted.q.max(axis=0)], axis=1) * unit[:, None],
             fitted.strain, self.force_error, self.displacement_error, self.stress_error,
-            len(fitted.q))
+            self.other_load_error, len(fitted.q))
 
 
 def _resonances(states: LoadedStates, fit: _Fit, w: Array) -> Iterator[str]:
@@ -231,10 +261,10 @@ def _monomials(q: Array, degree: int) -> Array:
     return np.asarray(np.prod(q[:, None] ** _powers(q.shape[1], degree), axis=2))
 
 
-def _slopes(q: Array) -> Array:
-    """Derivatives (n, d, k) of the monomials of degrees three and four."""
+def _slopes(q: Array, degrees: tuple[int, ...] = (3, 4)) -> Array:
+    """Derivatives (n, d, k) of the monomials of some degrees."""
     d = q.shape[1]
-    powers = np.concatenate([_powers(d, 3), _powers(d, 4)])
+    powers = np.concatenate([_powers(d, degree) for degree in degrees])
     lower = np.maximum(powers - np.eye(d, dtype=int)[:, None], 0)
     return np.asarray(np.prod(q[:, None, None] ** lower, axis=3) * powers.T)
 

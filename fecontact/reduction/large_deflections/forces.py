@@ -60,6 +60,9 @@ class LargeDeflectionForces(Summarised):
     force_error, displacement_error, stress_error : float
         Largest errors in static states that were not fitted, relative to the load, to the
         largest displacement and to the largest stress.
+    other_load_error : float
+        Larger of the errors of forces and displacements where a uniform acceleration acts beside
+        loads on the modes, which do not see it.
     states : int
         Number of static solutions that were fitted.
     """
@@ -74,6 +77,7 @@ class LargeDeflectionForces(Summarised):
     force_error: float
     displacement_error: float
     stress_error: float
+    other_load_error: float
     states: int
 
     def summary(self) -> list[tuple[str, str]]:
@@ -85,6 +89,7 @@ class LargeDeflectionForces(Summarised):
             ("error of forces", f"{100.0 * self.force_error:.2g} %"),
             ("error of displacements", f"{100.0 * self.displacement_error:.2g} %"),
             ("error of stresses", f"{100.0 * self.stress_error:.2g} %"),
+            ("error beside another load", f"{100.0 * self.other_load_error:.2g} %"),
             ("springs", f"{len(self.quadratic)}"),
         ]
 
@@ -176,7 +181,7 @@ def large_deflection_forces(
     found = LargeDeflectionForces(
         GROUP, np.array([one[1] for one in kept]), np.array([one[2] for one in kept]),
         np.eye(m)[modes], fitted.ranges, size, fitted.largest_strain, fitted.force_error,
-        fitted.displacement_error, fitted.stress_error, fitted.states)
+        fitted.displacement_error, fitted.stress_error, fitted.other_load_error, fitted.states)
     return found, np.array([one[0] for one in kept])
 
 

@@ -28,9 +28,9 @@ class LargeDeflections:
         damping they keep ringing at frequencies far above those of the modes, which runs have to
         resolve; 0.1 takes the ringing away and hardly changes the motion of the modes.
     accuracy : float, optional
-        Largest errors of forces and displacements, relative, in states that were not fitted. Modes
-        of the basis are added to ``modes`` until they are met, first the one that lacks most of
-        the displacement.
+        Largest errors of forces and displacements, relative, in states that were not fitted, also
+        those under loads of another shape. Modes of the basis are added to ``modes`` until they are
+        met, first the one that lacks most of the displacement.
 
     Raises
     ------

@@ -11,6 +11,7 @@ import numpy as np
 
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, Integers
+from fecontact.fem.body_forces import inertia_forces
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import stress_of
 from fecontact.fem.finite_strain import FiniteStrainModel
@@ -76,18 +77,26 @@ class LoadedStates:
         size: float, geometric: Any = None,
     ) -> None:
         self.model, self.shapes, self.size = FiniteStrainModel(body, geometric), shapes, size
+        self.system = system
         self.inertia = np.asarray(system.mass @ shapes)
         whole = np.asarray(body.expansion @ shapes)
         moved = whole.reshape(-1, body.dimension, len(w))
         self.reach = np.linalg.norm(moved, axis=1).max(axis=0)
         self.unit = size / self.reach[first] * w[first] / w
         self.force = w**2 * self.unit
+        self.energy = float(self.force[first] * self.unit[first])
         self.linear_stress = stress_of(body, whole).reshape(-1, len(w))
         self._paths: dict[tuple[object, ...], _Path] = {}
 
-    def samples(self, modes: Integers, loads: list[Array], step: float) -> Samples:
-        """States under loads (d,) on modes (d,) and their multiples, ``step`` of arc apart."""
-        paths = [self._path(modes, load, step) for load in loads]
+    def samples(
+        self, modes: Integers, loads: list[Array], step: float, further: Array | None = None
+    ) -> Samples:
+        """States under loads (d,) on modes (d,) and their multiples, ``step`` of arc apart.
+
+        ``further`` are forces (f,) beside the loads, whose absolute values have the sum one.
+        """
+        paths = [self._path(modes, load, step) if further is None else
+                 self._followed(modes, load / np.abs(load).sum(), step, further) for load in loads]
         u = np.concatenate([one.u for one in paths])
         q = u @ self.inertia[:, modes]
         stress = np.concatenate([one.stress for one in paths])
@@ -105,11 +114,30 @@ class LoadedStates:
             self._paths[key] = self._followed(modes, load / np.abs(load).sum(), step)
         return self._paths[key]
 
-    def _followed(self, modes: Integers, direction: Array, step: float) -> _Path:
+    def other_load(self, modes: Integers, share: float) -> tuple[Array, Array]:
+        """Forces (f,) that leave modes (d,) alone, and the linear displacement (f,) under them.
+
+        Those of a uniform acceleration along the most compliant axis, without their part on the
+        modes, with a ``share`` of the energy that the first of the modes has at the coordinate one.
+        """
+        body = self.model.body
+        forces = np.asarray(body.expansion.T @ inertia_forces(body))
+        forces = forces - self.inertia[:, modes] @ (self.shapes[:, modes].T @ forces)
+        moved = self.system.deflection(forces)
+        energies = (forces * moved).sum(axis=0)
+        axis = int(energies.argmax())
+        scale = np.sqrt(share * self.energy / energies[axis])
+        return scale * forces[:, axis], scale * moved[:, axis]
+
+    def _followed(
+        self, modes: Integers, direction: Array, step: float, further: Array | None = None
+    ) -> _Path:
         free, unit = len(self.shapes), self.unit[modes]
         forces = np.zeros(self.model.expansion.shape[1])
         inertia = self.inertia[:, modes]
         forces[:free] = inertia @ (self.force[modes] * direction)
+        if further is not None:
+            forces[:free] += further
 
         def far(q: Array) -> bool:
             return bool(np.abs(inertia.T @ q[:free] / unit).sum() >= 1.0)
