@@ -11,6 +11,7 @@ import eigenfrequencies
 import friction_cases
 import friction_section
 import impact_section
+import large_deflections_section
 import line_contact_section
 import normal_contact
 import responses_section
@@ -45,6 +46,7 @@ def main() -> None:
                        ("solids", lambda: solids_section.section(images)),
                        ("sliding solids", lambda: sliding_solids_section.section(images)),
                        ("bodies that turn or repeat", turning_section.section),
+                       ("large deflections", large_deflections_section.section),
                        ("continuation", continuation_cases.section),
                        ("frequency responses", lambda: responses_section.section(images)),
                        ("section 4.2", lambda: impact_section.section(images)),

@@ -27,7 +27,12 @@ from fecontact import (
     simulate,
 )
 from fecontact.analysis import DeflectionSteps, deflection_path
-from fecontact.bifurcation import HarmonicBalance, nonlinear_mode
+from fecontact.bifurcation import (
+    HarmonicBalance,
+    contact_field,
+    equilibrium_branch,
+    nonlinear_mode,
+)
 from fecontact.output.files.hdf5 import read_basis, write_basis
 from fecontact.reduction import LargeDeflections
 from fecontact.reduction.large_deflections.fit import CondensedBody
@@ -293,12 +298,9 @@ def test_run_keeps_its_energy_and_watches_its_range():
         simulate(system, 0.5 / basis.frequencies_hz[0], initial=1.5 * start)
 
 
-def test_two_wells_of_a_shallow_arch():
-    """With the rise a = 5 radii of gyration it rests at b = 5 and, beyond b = -1, at b = -4.
-
-    Runs with damping end in the well in which they start.
-    """
-    h, a = 0.01, 5.0
+@cache
+def arch(a, h=0.01):
+    """Half of a shallow sinusoidal arch between hinges, whose rise is a radii of gyration."""
     radius = h / np.sqrt(12.0)
 
     def warp(at):
@@ -307,8 +309,40 @@ def test_two_wells_of_a_shallow_arch():
     mesh = grid(np.linspace(0.0, 0.5 * L, 17), np.linspace(-0.5 * h, 0.5 * h, 3), warp=warp,
                 points={"end": (0.0, 0.0)})
     body = ElasticBody(mesh, STEEL, fixed={"end": "xy", "right": "x"}, thickness=B)
-    basis = modal_basis(body, 1, contact=(), points={"middle": "right"}, damping=0.2,
-                        large_deflections=LargeDeflections(2.4 * a * radius))
+    return modal_basis(body, 1, contact=(), points={"middle": "right"}, damping=0.2,
+                       large_deflections=LargeDeflections(2.4 * a * radius)), radius
+
+
+def test_snap_through_of_a_reduced_arch():
+    """Limit loads of Fung and Kaplan (NACA TN 2840, 1952), along the branch of its rest states.
+
+    p = (a - b) + b (a^2 - b^2) / 4 in units of EI r (pi / L)^4 at b^2 = (a^2 - 4) / 3; uniform
+    gravity has the sinusoidal part 4 / pi.
+    """
+    a, h = 5.0, 0.01
+    basis, radius = arch(a)
+    unit = E * B * h**3 / 12.0 * radius * (np.pi / L)**4
+    per_gravity = 4.0 / np.pi * 7800.0 * B * h / unit
+    system = ContactSystem(basis, load=Load(gravity=(0.0, -1.0)))
+    field = contact_field(system, {"g": (0.0, lambda given, value: given.with_(
+        load=Load(gravity=(0.0, -value / per_gravity))))})
+    turning = np.sqrt((a**2 - 4.0) / 3.0)
+    limits = [(a - b) + b * (a**2 - b**2) / 4.0 for b in (turning, -turning)]
+    branch = equilibrium_branch(field, np.zeros(system.size), "g", bounds=(-8.0, 25.0))
+    folds = branch.of_kind("fold")
+    assert [one.parameter for one in folds] == pytest.approx(limits, rel=0.02)
+    moved = [basis.point_row("middle", "y") @ one.values["state"][: basis.modes] / radius
+             for one in folds]
+    assert moved == pytest.approx([turning - a, -turning - a], rel=0.02)
+
+
+def test_two_wells_of_a_shallow_arch():
+    """With the rise a = 5 radii of gyration it rests at b = 5 and, beyond b = -1, at b = -4.
+
+    Runs with damping end in the well in which they start.
+    """
+    a = 5.0
+    basis, radius = arch(a)
     row = basis.point_row("middle", "y")
     # (a - b) + b (a^2 - b^2) / 4 = 0 has the roots b = a and b^2 + a b + 4 = 0.
     other = 0.5 * (-a - np.sqrt(a**2 - 16.0))
