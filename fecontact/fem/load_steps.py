@@ -36,6 +36,22 @@ class Equations(Protocol):
         """Energy, forces and tangent at free unknowns."""
 
 
+@dataclass(frozen=True, eq=False)
+class FreeMotion:
+    """Rigid modes of a body that nothing holds, which its equilibria leave out.
+
+    Attributes
+    ----------
+    shapes : (f, r) array
+        Mass-normalised rigid modes Phi over the free unknowns.
+    inertia : (f, r) array
+        M Phi: displacements u obey ``(M Phi)^T u = 0``, and forces M Phi mu balance the loads.
+    """
+
+    shapes: Array
+    inertia: Array
+
+
 @dataclass(frozen=True)
 class DeflectionSteps:
     """Options of :func:`fecontact.analysis.deflection_path`.
@@ -111,7 +127,7 @@ class FollowedPath:
 
 def follow(
     model: Equations, loads: Loads, options: DeflectionSteps,
-    stop: Callable[[Array], bool] | None = None,
+    stop: Callable[[Array], bool] | None = None, free: FreeMotion | None = None,
 ) -> FollowedPath:
     """Follow the equilibria of a body from no load to the load factor 1, or until ``stop``.
 
@@ -125,9 +141,11 @@ def follow(
         Steps.
     stop : callable, optional
         True for free unknowns q with which the path ends, at whatever load factor.
+    free : FreeMotion, optional
+        Rigid modes of a body that nothing holds.
     """
     zero = np.zeros(model.expansion.shape[1])
-    newton = _Newton(model, loads, options)
+    newton = _Newton(model, loads, options, free)
     # Contacts may press without load.
     start = newton.at_load(zero, 0.0)
     if start is None:
@@ -178,25 +196,27 @@ class _Newton:
     Points are (q, factor); ``scale`` makes displacements comparable with the factor.
     """
 
-    def __init__(self, model: Equations, loads: Loads, options: DeflectionSteps) -> None:
-        self.model, self.loads, self.options = model, loads, options
+    def __init__(
+        self, model: Equations, loads: Loads, options: DeflectionSteps, free: FreeMotion | None
+    ) -> None:
+        self.model, self.loads, self.options, self.free = model, loads, options, free
         zero = np.zeros(model.expansion.shape[1])
         self.scale = 1.0
         load, state = loads(zero)[0], model.state(zero)
         self.loaded = bool(load.any())
         self.size = float(np.linalg.norm(load if self.loaded else state.force)) or 1.0
-        self.linear = np.append(_factors(state.tangent).solve(load), 1.0)
+        self.linear = np.append(self._factors(state.tangent).solve(load), 1.0)
 
     def point(self, q: Array, factor: float) -> PathPoint:
         """The equilibrium (q, factor) with its tangent."""
         state = self.model.state(q)
         K = self._matrix(state, factor, self.loads(q)[1])
-        return PathPoint(q, factor, state, _negative(_factors(K)))
+        return PathPoint(q, factor, state, _negative(self._factors(K)))
 
     def tangent(self, here: PathPoint, heading: Array) -> Array:
         """Direction (f + 1,) of the path with unit length, on the side of ``heading``."""
         force, slope = self.loads(here.q)
-        response = _factors(self._matrix(here.state, here.factor, slope)).solve(force)
+        response = self._factors(self._matrix(here.state, here.factor, slope)).solve(force)
         found = np.append(response, 1.0)
         found *= np.sign(self._product(found, heading)) or 1.0
         return found / np.sqrt(self._product(found, found))
@@ -224,8 +244,10 @@ class _Newton:
             state = self.model.state(q)
             force, slope = self.loads(q)
             residual = factor * force - state.force
+            if self.free is not None:
+                residual = residual - self.free.inertia @ (self.free.shapes.T @ residual)
             error = float(np.linalg.norm(residual)) / self.size
-            factors = _factors(self._matrix(state, factor, slope))
+            factors = self._factors(self._matrix(state, factor, slope))
             if error <= self.options.tolerance:
                 return PathPoint(q, factor, state, _negative(factors)), iteration - 1
             change, shift = factors.solve(residual), 0.0
@@ -245,8 +267,44 @@ class _Newton:
     def _product(self, a: Array, b: Array) -> float:
         return float(a[:-1] @ b[:-1] / self.scale**2 + a[-1] * b[-1])
 
+    def _factors(self, matrix: Any) -> Any:
+        return _factors(matrix) if self.free is None else _FreeFactors(matrix, self.free)
+
     def _matrix(self, state: StrainState, factor: float, slope: Any) -> Any:
         return state.tangent if slope is None else (state.tangent - factor * slope).tocsc()
+
+
+class _FreeFactors:
+    """Factors of a tangent K with displacements without rigid part.
+
+    ``[K, M Phi; (M Phi)^T, 0] [u; mu] = [p; 0]``. Springs at r unknowns hold the body for the
+    factors; a small system takes their forces away again. ``U`` is that of the held body.
+    """
+
+    def __init__(self, matrix: Any, free: FreeMotion) -> None:
+        import scipy.sparse as sp
+        from scipy.linalg import qr
+
+        size, count = free.shapes.shape
+        pins = qr(free.shapes.T, mode="r", pivoting=True)[1][:count]
+        spring = float(abs(matrix.diagonal()).mean())
+        held = np.zeros(size)
+        held[pins] = spring
+        factors = _factors((matrix + sp.diags_array(held)).tocsc())
+        self.U, self._solve, self._pins = factors.U, factors.solve, pins
+        self._inertia = free.inertia
+        columns = np.zeros((size, 2 * count))
+        columns[:, :count] = free.inertia
+        columns[pins, np.arange(count, 2 * count)] = spring
+        self._columns = factors.solve(columns)
+        self._small = np.vstack([free.inertia.T @ self._columns, self._columns[pins]])
+        self._small[count:, count:] -= np.eye(count)
+
+    def solve(self, force: Array) -> Array:
+        """Displacement (f,) under forces (f,)."""
+        u = self._solve(force)
+        known = np.append(self._inertia.T @ u, u[self._pins])
+        return np.asarray(u - self._columns @ np.linalg.solve(self._small, known))
 
 
 def _factors(matrix: Any) -> Any:

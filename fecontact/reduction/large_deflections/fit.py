@@ -114,7 +114,7 @@ def condensed_body(
     Raises
     ------
     InputError
-        For a body that can move without strain, or modes that the basis does not have.
+        For modes that the basis does not have, and rigid ones.
     AnalysisError
         If the statics do not reach the largest displacement, or the fit not its accuracy.
 
@@ -123,10 +123,11 @@ def condensed_body(
     ModelWarning
         For modes left out whose frequencies and displacements are those of an internal resonance.
     """
-    if system.rigid.shape[1]:
-        raise InputError("large_deflections is for bodies that supports hold against all rigid "
-                         "motions; support the body with fixed.")
-    numbers = np.array(given.numbers)
+    rigid = system.rigid.shape[1]
+    numbers = np.array(given.numbers) + (rigid if isinstance(given.modes, int) else 0)
+    if numbers.min() < rigid:
+        raise InputError(f"large_deflections: mode {numbers.min()} is a rigid motion; name modes "
+                         f"from {rigid}.")
     if numbers.max() >= len(w):
         raise InputError(f"large_deflections: mode {numbers.max()} is not among the {len(w)} modes "
                          f"of the basis, which count from 0; ask for more modes.")
@@ -137,7 +138,7 @@ def condensed_body(
         errors = fit.force_error, fit.displacement_error, fit.other_load_error
         if given.accuracy is None or max(errors) <= given.accuracy:
             break
-        left = np.setdiff1d(np.arange(len(w)), numbers)
+        left = np.setdiff1d(np.arange(rigid, len(w)), numbers)
         if len(numbers) == MOST or not len(left):
             raise AnalysisError(
                 f"large_deflections: with the modes {', '.join(map(str, numbers))} the forces are "
@@ -222,7 +223,7 @@ def _resonances(states: LoadedStates, fit: _Fit, w: Array) -> Iterator[str]:
     """Sentences about internal resonances of modes with large deflections and others."""
     powers = np.concatenate([_powers(len(fit.modes), 2), _powers(len(fit.modes), 3)])
     moved = np.abs(fit.fields @ states.inertia) * states.reach
-    for k in np.setdiff1d(np.arange(len(w)), fit.modes):
+    for k in np.setdiff1d(np.flatnonzero(w), fit.modes):
         for part, exponents in zip(moved[:, k], powers, strict=True):
             if part < _COUPLED:
                 continue

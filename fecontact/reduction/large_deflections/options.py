@@ -21,7 +21,8 @@ class LargeDeflections:
         thickness of a clamped plate, a third of the length of a cantilever, twice the rise of an
         arch [m]. Other modes are deflected with the same energy at most.
     modes : int or sequence of int
-        Number of modes with large deflections, lowest first, or their numbers from 0; six at most.
+        Number of modes with large deflections, lowest elastic one first, or their numbers from 0,
+        rigid ones counted; six at most.
         All other coordinates of the basis stay linear beside them.
     stretching_damping : float
         Least damping ratio of the vectors that complete the modes, from zero to below 1. Without

@@ -15,7 +15,7 @@ from fecontact.fem.body_forces import inertia_forces
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import stress_of
 from fecontact.fem.finite_strain import FiniteStrainModel
-from fecontact.fem.load_steps import DeflectionSteps, follow
+from fecontact.fem.load_steps import DeflectionSteps, FreeMotion, follow
 from fecontact.reduction.eigenmodes import FreeSystem
 
 
@@ -59,7 +59,7 @@ class LoadedStates:
     Parameters
     ----------
     body : ElasticBody
-        Supported body.
+        The body. If nothing holds it, its states have no part of rigid modes.
     system : FreeSystem
         Its free unknowns.
     w, shapes : (m,) and (f, m) arrays
@@ -82,10 +82,13 @@ class LoadedStates:
         whole = np.asarray(body.expansion @ shapes)
         moved = whole.reshape(-1, body.dimension, len(w))
         self.reach = np.linalg.norm(moved, axis=1).max(axis=0)
-        self.unit = size / self.reach[first] * w[first] / w
+        self.unit = size / self.reach[first] * w[first] / np.where(w > 0.0, w, w[first])
         self.force = w**2 * self.unit
         self.energy = float(self.force[first] * self.unit[first])
         self.linear_stress = stress_of(body, whole).reshape(-1, len(w))
+        more = self.model.expansion.shape[1] - len(shapes)
+        self.free = None if not system.rigid.shape[1] else FreeMotion(*(
+            np.pad(one, ((0, more), (0, 0))) for one in (system.rigid, system.inertia)))
         self._paths: dict[tuple[object, ...], _Path] = {}
 
     def samples(
@@ -117,12 +120,20 @@ class LoadedStates:
     def other_load(self, modes: Integers, share: float) -> tuple[Array, Array]:
         """Forces (f,) that leave modes (d,) alone, and the linear displacement (f,) under them.
 
-        Those of a uniform acceleration along the most compliant axis, without their part on the
+        Those of a uniform acceleration along the most compliant axis, of a body that nothing holds
+        of one that grows with the square of its longest coordinate, without their part on the
         modes, with a ``share`` of the energy that the first of the modes has at the coordinate one.
         """
         body = self.model.body
-        forces = np.asarray(body.expansion.T @ inertia_forces(body))
+        accelerations = inertia_forces(body)
+        rigid, inertia = self.system.rigid, self.system.inertia
+        if rigid.shape[1]:
+            away = body.nodes - body.nodes.mean(axis=0)
+            square = away[:, np.ptp(away, axis=0).argmax()] ** 2
+            accelerations = accelerations * np.repeat(square, body.dimension)[:, None]
+        forces = np.asarray(body.expansion.T @ accelerations)
         forces = forces - self.inertia[:, modes] @ (self.shapes[:, modes].T @ forces)
+        forces = forces - inertia @ (rigid.T @ forces)
         moved = self.system.deflection(forces)
         energies = (forces * moved).sum(axis=0)
         axis = int(energies.argmax())
@@ -143,7 +154,7 @@ class LoadedStates:
             return bool(np.abs(inertia.T @ q[:free] / unit).sum() >= 1.0)
 
         options = DeflectionSteps("arc", first=step, largest=step, most=400)
-        found = follow(self.model, lambda q: (forces, None), options, far)
+        found = follow(self.model, lambda q: (forces, None), options, far, self.free)
         if not found.reached:
             raise AnalysisError(f"large_deflections: the statics under the loads of the modes do "
                                 f"not reach largest_displacement = {self.size:g} m. "
