@@ -21,6 +21,7 @@ from fecontact import (
     load_history,
     modal_basis,
     simulate,
+    sweep,
 )
 from fecontact.analysis import DeflectionSteps, complex_modes, deflection_path, prestressed_modes
 from fecontact.analysis.summaries import largest_displacement, peak_normal_force
@@ -132,8 +133,8 @@ large_deflections = { largest_displacement = 2e-3 }
 """
 
 
-def test_study():
-    """The study has the basis that Python makes, with the same forces."""
+def test_study(tmp_path):
+    """The study has the basis that Python makes, with the same forces; sweeps run it."""
     study = Study.from_toml(STUDY)
     basis = study.modal_basis()
     made = modal_basis(study.elastic_body(), 1, contact=(), C="",
@@ -146,6 +147,12 @@ def test_study():
     moved = np.abs(run.displacement("middle")).max()
     assert largest_displacement(run) == pytest.approx(moved, rel=1e-9)
     assert peak_normal_force(run) == 0.0
+    table = sweep(study, {"load.gravity.1": [-9.81, -30.0]}, summaries=["largest_displacement"],
+                  folder=tmp_path, workers=1)
+    first, second = table.values["largest_displacement"]
+    assert first == pytest.approx(moved, rel=1e-9)
+    # Hardening: less than in proportion.
+    assert 1.2 * first < second < 0.98 * 30.0 / 9.81 * first
     with pytest.raises(InputError, match="would stress the body twice"):
         Study.from_toml(STUDY.replace("modes = 1", "modes = 1\nprestress = true"))
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from meshes_for_tests import joined, rectangle
+from meshes_for_tests import grid, joined, rectangle
 from scipy.integrate import quad, solve_bvp
 from scipy.optimize import brentq
 from solid_blocks import block_mesh
@@ -217,3 +217,36 @@ def test_a_coupling_carries_the_force_of_a_stretched_beam(kind):
     exact = middle_of_a_stretched_beam(force)
     assert exact > H
     assert path.displacement("hub")[-1, 1] == pytest.approx(exact, rel=0.01)
+
+
+def test_an_arch_snaps_onto_the_ground():
+    """Along the arc, past both limit points of Fung and Kaplan (NACA TN 2840, 1952), to a stop.
+
+    Of rise a it carries (a - b) + b (a^2 - b^2) / 4 in units of EI r (pi / L)^4 at the rise b,
+    in radii of gyration, with limits at b^2 = (a^2 - 4) / 3, until it touches at b = a - 8.
+    """
+    a, h = 5.0, 0.01
+    r = h / np.sqrt(12.0)
+
+    def warp(at):
+        return at + np.column_stack([0.0 * at[:, 0], a * r * np.sin(np.pi * at[:, 0] / L)])
+
+    mesh = grid(np.linspace(0.0, 0.5 * L, 25), np.linspace(-0.5 * h, 0.5 * h, 3), warp=warp,
+                points={"end": (0.0, 0.0)})
+    body = ElasticBody(mesh, STEEL, fixed={"end": "xy", "right": "x"}, thickness=B)
+    line = E * B * h**3 / 12.0 * r * (np.pi / L)**4
+    whole = 16.0
+    # A uniform load has the sinusoidal part 4 / pi.
+    load = Load(boundaries=(BoundaryLoad("top", pressure=whole * line / B * np.pi / 4.0),))
+    path = deflection_path(body, load, contact="bottom", contact_nodes=24, gap=8.0 * r,
+                           normal=LinearContact(1e7), steps=DeflectionSteps("arc", largest=0.3))
+    assert path.reached
+    b = a + path.displacement("right")[:, 1] / r
+    carried, touches = whole * path.load_factors, path.normal_force.sum(axis=1) > 0.0
+    turning = np.sqrt((a**2 - 4.0) / 3.0)
+    limits = [(a - at) + at * (a**2 - at**2) / 4.0 for at in (turning, -turning)]
+    assert [carried[~touches].max(), carried[~touches].min()] == pytest.approx(limits, rel=0.06)
+    assert (path.unstable[np.abs(b) < 0.9 * turning] == 1).all()
+    assert (path.unstable[touches & (b < -1.1 * turning)] == 0).all()
+    assert b[touches] == pytest.approx(np.full(touches.sum(), a - 8.0), abs=0.15)
+    assert (np.diff(path.normal_force[touches].sum(axis=1)) > 0.0).all()
