@@ -22,8 +22,10 @@ from fecontact import (
 )
 from fecontact.analysis import DeflectionSteps, deflection_path
 from fecontact.fem import Coupling, Tie
-from fecontact.laws import Frictionless, LinearContact
+from fecontact.fem.finite_strain import FiniteStrainModel
+from fecontact.laws import Frictionless, LinearContact, PowerContact
 from fecontact.reduction import LargeDeflections
+from fecontact.system.statics.ground_contact import GroundContact, GroundedModel
 
 E, L, H, B = 2e11, 1.0, 1.0 / 250.0, 0.01
 STEEL = Material(E, 0.0, 7800.0)
@@ -80,6 +82,33 @@ def test_energy_is_the_work_of_the_load_on_a_stop():
     work = line * L * np.trapezoid(path.load_factors, moved)
     assert path.normal_force[-1, -1] > 0.1 * line * L
     assert path.energies[-1] == pytest.approx(work, rel=2e-3)
+
+
+def test_contact_forces_are_derivatives_of_the_stored_energy():
+    """Of nodes on a face that a coupling turns, with a law that is not linear, by differences."""
+    mesh = block_mesh((3, 2, 2), (0.1, 0.04, 0.03))
+    body = ElasticBody(Mesh(mesh.nodes, mesh.cells, mesh.boundaries, constraints=(
+        Coupling("contact", "hub", (0.05, 0.01, 0.0)),)), STEEL, fixed={"top": "xyz"}, degree=1)
+    law, model = PowerContact(3e12, 1.5), FiniteStrainModel(body)
+    rng = np.random.default_rng(4)
+    q, v = rng.normal(size=(2, model.expansion.shape[1]))
+    turn = body.motion_rows("hub")[3:] @ (body.expansion @ q)
+    q *= 0.3 / np.linalg.norm(turn)
+    moved = GroundContact.of(body, "contact", (3, 2), law, 0.0).penetration(
+        model.displacement(q).ravel())
+    ground = GroundContact.of(body, "contact", (3, 2), law, float(np.median(moved)))
+    both, depth = GroundedModel(model, ground), moved - np.median(moved)
+    assert 0 < (depth > 0.0).sum() < len(depth)
+    h = 1e-6 * np.linalg.norm(q) / np.linalg.norm(v)
+    state, ahead, behind = ([one.state(at) for one in (both, model)]
+                            for at in (q, q + h * v, q - h * v))
+    energies = [one[0].energy - one[1].energy for one in (state, ahead, behind)]
+    forces = [one[0].force - one[1].force for one in (state, ahead, behind)]
+    assert energies[0] > 0.0
+    assert forces[0] @ v == pytest.approx((energies[1] - energies[2]) / (2.0 * h), rel=1e-5)
+    slope = (forces[1] - forces[2]) / (2.0 * h)
+    found = (state[0].tangent - state[1].tangent) @ v
+    assert found == pytest.approx(slope, abs=1e-4 * np.abs(slope).max())
 
 
 def clamped(kind):
