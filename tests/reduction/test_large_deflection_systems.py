@@ -99,6 +99,16 @@ def test_branches_watch_the_range():
                        method=HarmonicBalance(2, stability=None))
 
 
+def test_statics_watch_the_range():
+    """Rest states and loading beyond the fitted deflections say so."""
+    system = ContactSystem(beams.bent("hinged", 0.6 * H), load=Load(
+        forces=(PointLoad("middle", "y", signal=-30.0),)))
+    with pytest.warns(ModelWarning, match=r"In equilibrium .* times the range in which"):
+        equilibrium(system)
+    with pytest.warns(ModelWarning, match=r"Along the path of loads .* times the range in which"):
+        load_history(system, LoadPath(load_scale=(0.0, 1.0)))
+
+
 def test_response_peaks_on_the_backbone():
     """At the peak of the forced response the amplitude is that of the nonlinear mode."""
     basis = beams.bent("hinged", 0.7 * H, damping=0.005)
