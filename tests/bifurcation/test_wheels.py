@@ -19,6 +19,7 @@ from fecontact import (
     Rayleigh,
     basis_from_matrices,
     modal_basis,
+    static_solution,
 )
 from fecontact.bifurcation import (
     ContinuationOptions,
@@ -372,6 +373,55 @@ def test_stress_of_a_static_state_stiffens_as_that_of_the_rotation(sector):
                                for each in (stressed, turning, softer))
         assert one == pytest.approx(other, rel=1e-8)
         assert (other > without * 1.0001).any()
+
+
+def test_heat_and_rotation_are_those_of_the_whole_wheel(sector):
+    """Displacement and stress, and frequencies with this stress; few modes suffice for the load."""
+    warm = Material(2.1e11, thermal_expansion=1.2e-5)
+    plain = Rotation(2000.0, stress_stiffening=False)
+    options = {"thickness": 0.02, "degree": 1, "fixed": {"root": "xy"}}
+    body = ElasticBody(sector.mesh, warm, **options)
+    whole = ElasticBody(whole_wheel(sector.mesh, SYMMETRY), warm, **options)
+
+    def heat(x, y):
+        return 300.0 * np.hypot(x, y) ** 2
+
+    def made(modes, **given):
+        return cyclic_basis({"s": body}, SYMMETRY, {"shroud": shroud(body)}, modes=modes,
+                            rotation=plain, temperature={"s": heat}, **given)
+
+    few = made(2)
+    # The load of the wheel without deflections, as in static_solution.
+    state = few.fields(few.basis.constant_load / few.basis.angular_frequencies**2, "s")
+    expected = static_solution(whole, Load(), rotation=plain, temperature=heat)
+    nodes = np.linalg.norm(body.nodes[:, None] - whole.nodes[None], axis=2).argmin(axis=1)
+    size = np.abs(expected.displacement).max()
+    assert state.displacement == pytest.approx(expected.displacement[nodes], abs=1e-8 * size)
+    assert state.temperature == pytest.approx(expected.temperature[nodes])
+    # At the boundaries the mean over adjacent cells lacks those of the neighbours.
+    inside = np.setdiff1d(np.arange(len(nodes)), np.concatenate([
+        sector.mesh.boundary(name).ravel() for name in ("low", "high")]))
+    size = np.abs(expected.stress).max()
+    assert state.stress[inside] == pytest.approx(expected.stress[nodes][inside], abs=1e-7 * size)
+    stressed = made(1000, prestress={"s": state})
+    found = np.sort(np.concatenate([
+        np.repeat(np.linalg.eigvalsh(one.stiffness), 1 if SYMMETRY.is_real(one.diameter) else 2)
+        for one in stressed.diameters]))
+    turning = modal_basis(whole, whole.expansion.shape[1], contact=(), rotation=plain,
+                          prestress=expected)
+    assert found[:12] == pytest.approx(np.linalg.eigvalsh(turning.stiffness)[:12], rel=1e-7)
+    cold = np.sort(np.concatenate([
+        np.repeat(np.linalg.eigvalsh(one.stiffness), 1 if SYMMETRY.is_real(one.diameter) else 2)
+        for one in made(1000).diameters]))
+    assert np.abs(found[:12] / cold[:12] - 1.0).max() > 1e-3
+
+
+def test_temperatures_that_do_nothing_are_refused(sector):
+    for given, message in (({"b": 10.0}, "temperature names the body 'b'"),
+                           ({"s": 10.0}, "Body 's': temperature acts through the thermal"),
+                           (10.0, "temperature")):
+        with pytest.raises(InputError, match=message):
+            cyclic_basis({"s": sector}, SYMMETRY, temperature=given)
 
 
 @pytest.mark.parametrize("stiffening", [True, False])

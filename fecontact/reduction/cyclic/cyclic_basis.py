@@ -15,7 +15,7 @@ such interface each, so that forces f at its nodes load the motion y with the co
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -32,8 +32,10 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.fields import BodyFields, body_elements, stress_of
 from fecontact.fem.pairing import Pairing
 from fecontact.fem.points import Place
-from fecontact.fem.rotation import Rotation, centrifugal_force, coriolis_matrix
-from fecontact.reduction.cyclic.sector_rows import SectorRows, owned
+from fecontact.fem.rotation import Rotation, coriolis_matrix
+from fecontact.fem.thermal import Temperature, held_stress
+from fecontact.reduction.cyclic.constant_forces import constant_forces, warmed, with_constant
+from fecontact.reduction.cyclic.sector_rows import SectorRows, known_bodies, owned
 from fecontact.reduction.damping import Damping, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, free_modes, frequencies_of
 from fecontact.reduction.modal_basis import ModalBasis
@@ -100,11 +102,13 @@ class CyclicBasis(Summarised):
         Of the nodal diameters, ascending from 0.
     basis : ModalBasis
         That of the diameter 0, in which all sectors move alike: for preload and equilibria. Its
-        link load is the centrifugal force.
+        constant load is the centrifugal force and that of a change of temperature.
     gaps : (n,) array
         Initial gaps of the contact nodes [m].
     loads : tuple of str
         Boundaries ``body.boundary`` on which loads may vary in time.
+    temperature : mapping of name to (N,) array
+        Changes of temperature at the nodes of bodies [K].
     """
 
     symmetry: CyclicSymmetry
@@ -113,6 +117,7 @@ class CyclicBasis(Summarised):
     basis: ModalBasis
     gaps: Array
     loads: tuple[str, ...] = ()
+    temperature: Mapping[str, Array] = field(default_factory=dict)
 
     def summary(self) -> list[tuple[str, str]]:
         """Sectors, bodies, nodal diameters and frequencies."""
@@ -154,8 +159,10 @@ class CyclicBasis(Summarised):
                              f"bodies are {choices(self.bodies)}.")
         one = self.bodies[body]
         moved = (self.of(0).shapes[body] @ np.asarray(q)).real
-        stress = stress_of(one, moved.reshape(-1, 1))[:, :, 0]
-        return BodyFields(one.nodes, body_elements(one), moved, stress)
+        stress, warm = stress_of(one, moved.reshape(-1, 1))[:, :, 0], self.temperature.get(body)
+        if warm is not None:
+            stress = stress + held_stress(one, warm)
+        return BodyFields(one.nodes, body_elements(one), moved, stress, warm)
 
 
 def cyclic_basis(
@@ -171,10 +178,12 @@ def cyclic_basis(
     diameters: Iterable[int] | str = "all",
     rotation: Rotation | None = None,
     prestress: Mapping[str, BodyFields] | None = None,
+    temperature: Mapping[str, Temperature] | None = None,
 ) -> CyclicBasis:
     """Modes of one sector by nodal diameters, with its contact to itself and to the next sector.
 
-    Residual vectors make static responses to forces at contact nodes and points exact.
+    Residual vectors make static responses to forces at contact nodes and points, to the centrifugal
+    force and to changes of temperature exact.
 
     Parameters
     ----------
@@ -202,6 +211,9 @@ def cyclic_basis(
         switch it off and give the common state as ``prestress``.
     prestress : mapping of body to BodyFields, optional
         Whose stress stiffens the bodies; see :meth:`CyclicBasis.fields`.
+    temperature : mapping of body to float, (N,) array or function of the coordinates
+        Change of temperature [K] from the state without stress, the same in all sectors: a constant
+        load of the diameter 0. Its stress stiffens the modes only as ``prestress``.
 
     Raises
     ------
@@ -216,8 +228,11 @@ def cyclic_basis(
     require_kind(_OWNER, Mapping, bodies=bodies)
     require_kind(_OWNER, CyclicSymmetry, symmetry=symmetry)
     pairings, points, prestress = dict(pairings or {}), dict(points or {}), dict(prestress or {})
-    rigid = _known("rigid", rigid, bodies)
-    _known("prestress", prestress, bodies)
+    rigid = known_bodies("rigid", rigid, bodies)
+    known_bodies("prestress", prestress, bodies)
+    warm = warmed(bodies, {} if temperature is None else temperature, rigid)
+    constant = {name: constant_forces(body, rotation, warm.get(name))
+                for name, body in bodies.items()}
     counts = modes if isinstance(modes, Mapping) else dict.fromkeys(bodies, modes)
     for name, body in bodies.items():
         require_kind(f"cyclic_basis: body '{name}'", ElasticBody, body=body)
@@ -242,7 +257,8 @@ def cyclic_basis(
             given = _Terms.of(body, symmetry, rotation, prestress.get(name),
                               name in separate)
             parts[name] = {k: _modes_of_body(
-                body, symmetry, given, k, counts[name], nodes.loaded(name, k),
+                body, symmetry, given, k, counts[name],
+                with_constant(nodes.loaded(name, k), None if k else constant[name]),
                 name in separate, name in rigid) for k in chosen}
         if name not in separate:
             _warn_beyond_divergence(name, parts[name])
@@ -251,10 +267,8 @@ def cyclic_basis(
                             damping, loaded) for k in chosen)
     first = found[0]
     m, w = len(first.stiffness), np.concatenate([one[0].w for one in parts.values()])
-    load = np.concatenate([
-        parts[name][0].shapes.real.T @ centrifugal_force(body, rotation)
-        * rotation.speed**2 if rotation is not None and rotation.centrifugal_load
-        else np.zeros(len(parts[name][0].w)) for name, body in bodies.items()])
+    load = np.concatenate([parts[name][0].shapes.real.T @ forces
+                           for name, forces in constant.items()])
     boundaries = {f"{name}.{boundary}": boundary_forces(body, boundary)
                   for name, body in bodies.items() for boundary in body.mesh.boundaries}
     rows = [np.zeros((0, nodes.dimension, m))]
@@ -272,7 +286,7 @@ def cyclic_basis(
         stiffness=None if not (rotation or prestress) else first.stiffness.real,
         contact_normals=nodes.normals, on_ground=nodes.on_ground,
         constant_load=load if load.any() else None, parts=_parts(parts))
-    return CyclicBasis(symmetry, dict(bodies), found, basis, nodes.gaps, tuple(loads))
+    return CyclicBasis(symmetry, dict(bodies), found, basis, nodes.gaps, tuple(loads), warm)
 
 
 def _without_boundaries(
@@ -296,16 +310,6 @@ def _warn_beyond_divergence(name: str, modes: Mapping[int, "_BodyModes"]) -> Non
         warnings.warn(f"Body '{name}': at the nodal diameters {listed(beyond)} the stiffness with "
                       f"rotation and stress is not positive, as beyond divergence or buckling; "
                       f"lower the speed or the load.", ModelWarning, stacklevel=3)
-
-
-def _known(what: str, names: Iterable[str], bodies: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of bodies; InputError for unknown ones."""
-    found = as_texts(names, f"cyclic_basis: {what}")
-    for name in found:
-        if name not in bodies:
-            raise InputError(f"cyclic_basis: {what} names the body '{name}'"
-                             f"{nearest(name, bodies)}; the bodies are {choices(bodies)}.")
-    return tuple(found)
 
 
 def _loaded(

@@ -1,13 +1,13 @@
 """Contact nodes and points of one sector of a wheel: their rows over the nodes of its bodies."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, choices
+from fecontact.core.checks import as_texts, require_kind
+from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array, ComplexArray
 from fecontact.fem.cyclic_symmetry import NEXT, CyclicSymmetry
 from fecontact.fem.elastic_body import ElasticBody
@@ -130,3 +130,13 @@ class SectorRows:
                     first += one.shape[1]
             found.append(block)
         return np.concatenate(found).reshape(-1, each, m)
+
+
+def known_bodies(what: str, names: Iterable[str], bodies: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of bodies; InputError for unknown ones."""
+    found = as_texts(names, f"cyclic_basis: {what}")
+    for name in found:
+        if name not in bodies:
+            raise InputError(f"cyclic_basis: {what} names the body '{name}'"
+                             f"{nearest(name, bodies)}; the bodies are {choices(bodies)}.")
+    return tuple(found)
