@@ -264,8 +264,7 @@ def nonlinear_mode(
 
     with :math:`\Omega` and :math:`\xi` unknown; :math:`\xi / (2 \Omega)` is the damping ratio.
     Without losses xi is zero. The branch starts with the linear mode about the static deflection,
-    friction with memory sticking, and follows internal resonances. The mean is an unknown too.
-    Drives and loads in time are left out.
+    friction with memory sticking. Drives and loads in time are left out.
 
     Parameters
     ----------
@@ -274,18 +273,16 @@ def nonlinear_mode(
     bounds : (float, float)
         Amplitudes at which the mode begins and ends [m, rad for a rotation].
     mode : int
-        Number of the linear mode, from 1, in the order of frequencies.
+        Number of the linear mode, from 1, by frequency.
     observe : (point, component) or (d,) sequence
-        Displacement, half the range of which is the amplitude; see
-        :func:`fecontact.bifurcation.frequency_response`.
+        Displacement, half the range of which is the amplitude, as for responses.
     method : HarmonicBalance or Shooting, optional
         Kinks need many samples. Shooting is for contact systems, friction without memory. With
-        ``repeats=EngineOrder(wheel, m)`` the mode is a wave that travels as one under engine order
-        m does: sector s moves a time ``m s T / N`` later, orders m and N - m run against each
-        other, and modes are counted among those of the nodal diameter.
+        ``repeats=EngineOrder(wheel, m)`` a travelling wave as under engine order m, counted among
+        the modes of its nodal diameter.
     options : ContinuationOptions, optional
         By default up to 2000 points, step 0.02, largest_step 0.06, longer with many modes: changes
-        relative to amplitude, a fifth of the frequency, a damping ratio of 0.1. Without bounds.
+        relative to amplitude, a fifth of the frequency, a damping ratio of 0.1.
     preload : LoadHistory, RestState or (d,) array, optional
         As for responses.
     unfolding : str, optional

@@ -182,8 +182,8 @@ def cyclic_basis(
 ) -> CyclicBasis:
     """Modes of one sector by nodal diameters, with its contact to itself and to the next sector.
 
-    Residual vectors make static responses to forces at contact nodes and points, to the centrifugal
-    force and to changes of temperature exact.
+    Static responses to forces at contact nodes and points, rotation and heat are exact. A speed or
+    stress beyond divergence or buckling warns (``ModelWarning``).
 
     Parameters
     ----------
@@ -209,21 +209,15 @@ def cyclic_basis(
     rotation : Rotation, optional
         With the stress of each body under its supports alone; where bodies press on each other
         switch it off and give the common state as ``prestress``.
-    prestress : mapping of body to BodyFields, optional
+    prestress : mapping of body to BodyFields
         Whose stress stiffens the bodies; see :meth:`CyclicBasis.fields`.
     temperature : mapping of body to float, (N,) array or function of the coordinates
-        Change of temperature [K] from the state without stress, the same in all sectors: a constant
-        load of the diameter 0. Its stress stiffens the modes only as ``prestress``.
+        Change [K] from the state without stress, in all sectors alike; stiffens by ``prestress``.
 
     Raises
     ------
     InputError, MeshError
         For unknown names, faces or pairings that do not match.
-
-    Warns
-    -----
-    ModelWarning
-        Of a speed or stress beyond divergence or buckling: a body's stiffness is not positive.
     """
     require_kind(_OWNER, Mapping, bodies=bodies)
     require_kind(_OWNER, CyclicSymmetry, symmetry=symmetry)
