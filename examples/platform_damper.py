@@ -7,13 +7,17 @@ One sector stands for all: modes by nodal diameters, contact of the damper with 
 own blade and with that of the next one. Each of the two faces carries the normal force
 P / (2 cos(a)), with the angle a between its normal and the radius.
 
-With a small load the damper slides all the time, with a large one it sticks and stiffens the wheel:
-in between friction takes most energy.
+With a large load the damper sticks and stiffens the wheel, with a smaller one it slides and takes
+energy. Below some 20 N here the centrifugal force no longer holds the wedge between the platforms:
+contact opens, the branch of harmonic balance turns at corners, and beside small waves there are
+large irregular motions, up to those of a wheel without dampers: its limit for a vanishing load.
+``transient`` runs all sectors from rest.
 
 Usage: python examples/platform_damper.py [FOLDER] [--quick]
 """
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -26,11 +30,12 @@ from fecontact.bifurcation import (
     contact_field,
     frequency_response,
     wheel_motion,
+    wheel_system,
 )
 from fecontact.fem import CyclicSymmetry, pair_faces
 from fecontact.laws import Harmonic, JenkinsFriction, LinearContact
 from fecontact.plot import COLOURS, new_figure, render_wheel
-from fecontact.reduction import CyclicBasis, cyclic_basis
+from fecontact.reduction import CyclicBasis, WholeWheel, cyclic_basis
 
 N, ORDER = 12, 3  # sectors, engine order
 ALPHA, SPLIT = 2.0 * np.pi / N, 2e-5  # rad; of the gap between platforms
@@ -109,8 +114,11 @@ def damper_mesh() -> fc.Mesh:
                    {"left": [[0, 3]], "right": [[3, 2]]}, {"middle": 1})
 
 
-def wheel(modes: int = 8, damper: str = "rigid") -> CyclicBasis:
-    """Modes of the sector with its damper, 'rigid' or 'elastic'."""
+def wheel(
+    modes: int = 8, damper: str = "rigid", diameters: Iterable[int] | None = None
+) -> CyclicBasis:
+    """Modes of the sector with its damper, 'rigid' or 'elastic'; diameters of the wave alone."""
+    waves = sorted({min(h * ORDER % N, -h * ORDER % N) for h in (0, 1, 3)})
     symmetry = CyclicSymmetry("low", "high", N)
     bodies = {"blade": fc.ElasticBody(blade_mesh(), thickness=0.03, fixed={"bore": "xy"}),
               "damper": fc.ElasticBody(damper_mesh(), thickness=0.03)}
@@ -122,7 +130,7 @@ def wheel(modes: int = 8, damper: str = "rigid") -> CyclicBasis:
         bodies, symmetry, faces, modes={"blade": modes, "damper": 3},
         rigid=["damper"] if damper == "rigid" else (), damping=RATIO,
         points={"blade.tip": "tip", "damper.middle": "middle"},
-        diameters=sorted({min(h * ORDER % N, -h * ORDER % N) for h in (0, 1, 3)}))
+        diameters=waves if diameters is None else diameters)
 
 
 def system(basis: CyclicBasis, load: float, frequency_hz: float) -> fc.ContactSystem:
@@ -156,6 +164,22 @@ def linear(basis: CyclicBasis, *, stuck: bool) -> tuple[float, float]:
     return float(w) / (2.0 * np.pi), FORCE * abs(tip @ np.linalg.solve(dynamic, tip.conj()))
 
 
+def transient(
+    load: float | None, frequency_hz: float, periods: int, modes: int = 2
+) -> np.ndarray:
+    """Displacement (n,) of a tip of the whole wheel that starts at rest, 20 times a period.
+
+    With None for the load the dampers are too far away to touch.
+    """
+    basis = wheel(modes, diameters=range(N // 2 + 1))
+    sector = system(basis, load or 0.0, frequency_hz)
+    if load is None:
+        sector = sector.with_(gap=(np.asarray(basis.gaps) + 1.0).tolist())
+    found = fc.simulate(wheel_system(sector, WholeWheel(basis), ORDER), periods / frequency_hz,
+                        outputs=20 * periods + 1, rtol=1e-5)
+    return np.asarray(found.displacement("0.blade.tip"))[:, 1]
+
+
 def _shares(basis: CyclicBasis) -> np.ndarray:
     """Share of each contact node in the stiffness of its face."""
     lengths = basis.basis.tributary.reshape(2, -1)
@@ -170,7 +194,7 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
     bounds = (0.99 * free, 1.015 * stuck)
     print(f"no damper: {1e6 * without:.2f} um at {free:.2f} Hz; "
           f"stuck: {1e6 * sticking:.2f} um at {stuck:.2f} Hz")
-    loads = [100.0, 1000.0] if quick else [20.0, 30.0, 100.0, 150.0, 600.0, 1000.0]
+    loads = [100.0, 3000.0] if quick else [20.0, 30.0, 100.0, 300.0, 1000.0, 3000.0]
     wave, peaks = EngineOrder(basis, ORDER), []
     with new_figure(10.0, 4.4, folder / "platform_damper.png") as figure:
         left, right = figure.subplots(1, 2)

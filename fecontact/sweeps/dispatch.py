@@ -8,16 +8,18 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from fecontact.core.errors import AnalysisError, FecontactError
-from fecontact.sweeps.batch import Batch
 from fecontact.sweeps.executors import Pool
 
 
 @dataclass(frozen=True)
 class Job:
-    """A function and its batch; ``breaks`` is 1 if the job may have crashed a worker."""
+    """A function and its batch; ``breaks`` is 1 if the job may have crashed a worker.
 
-    function: Callable[[Batch], Any]
-    batch: Batch
+    The batch is a dataclass with a tuple of ``cases``, such as :class:`Batch`.
+    """
+
+    function: Callable[[Any], Any]
+    batch: Any
     breaks: int = 0
 
 

@@ -1,22 +1,26 @@
 """Statistics of mistuned wheels: amplification over random deviations of the blades."""
 
+import hashlib
 from collections import deque
 from concurrent.futures import Executor
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from fecontact.analysis.mistuning import Excitation, whitehead_bound
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, require_positive
+from fecontact.core.errors import AnalysisError, InputError, require_positive
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, span
 from fecontact.reduction.cyclic.cyclic_basis import CyclicBasis
 from fecontact.reduction.cyclic.whole_wheel import WholeWheel
+from fecontact.sweeps.case import Row
+from fecontact.sweeps.dispatch import Job, LostError, results
 from fecontact.sweeps.executors import opened
 from fecontact.sweeps.statistics import Estimate, statistics
+from fecontact.sweeps.store import Store
 
 # Samples of one call of a worker.
 _BATCH = 25
@@ -60,28 +64,65 @@ class MistuningSweep(Summarised):
 
 @dataclass(frozen=True, eq=False)
 class _Wheels:
-    """Mistuned wheels on a worker: excitation, tuned stiffness, and that of each sector's cells."""
+    """Mistuned wheels on a worker: excitation, tuned stiffness, and that of each sector's cells.
+
+    The cases are deviations (N,) of wheels by their keys.
+    """
 
     excitation: Excitation
     tuned: Array
     sectors: Array
     band: tuple[float, float]
+    cases: tuple[tuple[str, Array], ...] = ()
 
-    def largest(self, deviations: Array) -> list[float]:
-        """Largest displacements of wheels with deviations (n, N) [m/N]."""
-        return [self.excitation.largest(
-            self.tuned + np.tensordot(one, self.sectors, axes=1), self.band)[0]
-            for one in deviations]
+    def of(self, deviations: Array) -> "_Wheels":
+        """The wheels with deviations (n, N); keys tell them from any others."""
+        same = hashlib.sha256(repr(self.band).encode())
+        for part in (self.excitation.force, self.excitation.rows, self.excitation.damping,
+                     self.tuned, self.sectors):
+            same.update(np.ascontiguousarray(part).tobytes())
+        return replace(self, cases=tuple(
+            (hashlib.sha256(same.digest() + one.tobytes()).hexdigest()[:24], one)
+            for one in deviations))
 
 
-def _batch(given: tuple[_Wheels, Array]) -> list[float]:
-    return given[0].largest(given[1])
+def _largest(wheels: _Wheels) -> list[Row]:
+    """Largest displacement of any sector of each wheel [m/N]."""
+    return [Row(case=key, values={"displacement": wheels.excitation.largest(
+        wheels.tuned + np.tensordot(one, wheels.sectors, axes=1), wheels.band)[0]}, reason="")
+        for key, one in wheels.cases]
+
+
+def _compute(
+    wheels: _Wheels, rows: dict[str, Row], store: Store | None, executor: Executor | None,
+    workers: int | None,
+) -> None:
+    """Add the wheels that are missing in the rows to them, and to the store."""
+    missing = [case for case in wheels.cases if case[0] not in rows]
+    batches = [replace(wheels, cases=tuple(missing[first : first + _BATCH]))
+               for first in range(0, len(missing), _BATCH)]
+
+    def take(found: list[Row]) -> None:
+        rows.update({row["case"]: row for row in found})
+        if store is not None:
+            store.add(found)
+
+    if workers == 1 and executor is None:
+        for batch in batches:
+            take(_largest(batch))
+    elif batches:
+        with opened(executor, workers) as pool:
+            for _, found in results(deque(Job(_largest, batch) for batch in batches), pool):
+                if isinstance(found, LostError):
+                    raise AnalysisError(f"mistuning_sweep: a wheel was not computed: {found}")
+                take(found)
 
 
 def mistuning_sweep(
     wheel: CyclicBasis, group: str, spread: float, order: int, band_hz: tuple[float, float],
     force: tuple[str, str], *, observe: tuple[str, str] | None = None, samples: int = 200,
     seed: int = 0, workers: int | None = 1, executor: Executor | None = None,
+    folder: str | Path | None = None, resume: bool = False, overwrite: bool = False,
 ) -> MistuningSweep:
     """Amplification of the linear response over random deviations of the blades' stiffness.
 
@@ -110,6 +151,10 @@ def mistuning_sweep(
         Processes, 1 for this one alone, None for one per core.
     executor : Executor, optional
         Another executor, as for sweeps.
+    folder : path, optional
+        Where finished wheels are kept, also after an interruption; by default nowhere.
+    resume, overwrite : bool
+        Go on with the wheels in the folder, or remove them; otherwise they are an error.
 
     Raises
     ------
@@ -124,16 +169,18 @@ def mistuning_sweep(
     whole = WholeWheel(wheel, np.zeros(wheel.symmetry.sectors), group)
     excitation = Excitation.of(whole, order, force, observe)
     band = (2.0 * np.pi * float(band_hz[0]), 2.0 * np.pi * float(band_hz[1]))
-    wheels = _Wheels(excitation, whole.stiffness, np.array(
-        [whole.sector_stiffness(s) for s in range(whole.sectors)]), band)
     tuned = excitation.largest(whole.stiffness, band)[0]
     deviations = np.clip(spread * np.random.default_rng(seed).standard_normal(
         (samples, whole.sectors)), -0.9, None)
-    batches = deque((wheels, deviations[first : first + _BATCH])
-                    for first in range(0, samples, _BATCH))
-    if workers == 1 and executor is None:
-        found: list[Any] = [_batch(one) for one in batches]
+    wheels = _Wheels(excitation, whole.stiffness, np.array(
+        [whole.sector_stiffness(s) for s in range(whole.sectors)]), band).of(deviations)
+    rows: dict[str, Row] = {}
+    if folder is None:
+        _compute(wheels, rows, None, executor, workers)
     else:
-        with opened(executor, workers) as pool:
-            found = [one.result() for one in [pool.submit(_batch, batch) for batch in batches]]
-    return MistuningSweep(deviations, np.concatenate(found) / tuned, tuned)
+        store = Store(Path(folder))
+        with store.begun(resume=resume, overwrite=overwrite):
+            rows = store.rows()
+            _compute(wheels, rows, store, executor, workers)
+    found = np.array([rows[key]["values"]["displacement"] for key, _ in wheels.cases])
+    return MistuningSweep(deviations, found / tuned, tuned)

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fecontact.core.files.atomic_write import clear_leftovers, replaced
+from fecontact.core.errors import InputError
+from fecontact.core.files.atomic_write import clear_leftovers, output_folder, replaced
 from fecontact.core.files.locks import locked
 from fecontact.core.files.stored import DamagedError, from_json, reading
 from fecontact.study.bodies_section import Reduced
@@ -116,6 +117,33 @@ class Store:
         busy = (f"Another sweep is at work in {self.folder}; wait for it, or choose another "
                 f"folder.")
         with locked(self.folder / ".lock", busy, keep=True):
+            yield
+
+
+    @contextlib.contextmanager
+    def begun(self, *, resume: bool, overwrite: bool) -> Iterator[None]:
+        """Make and lock the folder; with ``overwrite`` remove what a sweep has left there.
+
+        Raises
+        ------
+        InputError
+            If it holds a sweep that is neither to go on nor to be removed, or another sweep is
+            running in it.
+        """
+        with output_folder(self.folder), self.locked():
+            self.tidy()
+            if overwrite:
+                for what in ("shards", "cases", "bases"):
+                    for path in self.kept(what):
+                        path.unlink(missing_ok=True)
+            elif (table := self.folder / "index.csv").exists() and not (
+                    self.kept("shards") or (self.folder / "sweep.toml").exists()):
+                raise InputError(f"{table} is of no sweep; choose another folder, or replace it "
+                                 f"with --overwrite (overwrite=True).")
+            elif not resume and self.kept("shards"):
+                raise InputError(f"{self.folder} holds a sweep; go on with --resume (resume=True), "
+                                 f"begin anew with --overwrite (overwrite=True), or choose another "
+                                 f"folder.")
             yield
 
 

@@ -110,8 +110,7 @@ def sweep(
             study.path.exists() and described.samefile(study.path)):
         raise InputError(f"The sweep would write {described} in the place of its study; choose "
                          f"another folder, or another name for the study.")
-    with _folder(place), store.locked():
-        _clear_or_refuse(store, resume=resume, overwrite=overwrite)
+    with store.begun(resume=resume, overwrite=overwrite):
         write_whole(described, replace(study, sweep=wanted).to_toml())
         rows = store.rows()
         work.require_points(rows)
@@ -225,29 +224,6 @@ def _settings(
     if table.get("strobe") is not None and "summaries" not in changes:
         table["summaries"] = ("periods",)
     return from_table(SweepSettings, flat_axes(table), "[sweep]")
-
-
-@contextlib.contextmanager
-def _folder(folder: Path) -> Iterator[None]:
-    from fecontact.core.files.atomic_write import output_folder
-
-    with output_folder(folder):
-        yield
-
-
-def _clear_or_refuse(store: Store, *, resume: bool, overwrite: bool) -> None:
-    store.tidy()
-    if overwrite:
-        for what in ("shards", "cases", "bases"):
-            for path in store.kept(what):
-                path.unlink(missing_ok=True)
-    elif (table := store.folder / "index.csv").exists() and not (
-            store.kept("shards") or (store.folder / "sweep.toml").exists()):
-        raise InputError(f"{table} is of no sweep; choose another folder, or replace it with "
-                         f"--overwrite (overwrite=True).")
-    elif not resume and store.kept("shards"):
-        raise InputError(f"{store.folder} holds a sweep; go on with --resume (resume=True), begin "
-                         f"anew with --overwrite (overwrite=True), or choose another folder.")
 
 
 def _compute(

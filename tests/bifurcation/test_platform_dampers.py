@@ -42,6 +42,35 @@ def test_stuck_dampers_are_springs(wheel):
     assert found.amplitude()[0] == pytest.approx(amplitude, rel=1e-6)
 
 
+def test_responses_tend_to_the_stuck_limit(wheel):
+    """Amplitudes at the peak over the load, from sliding to stuck."""
+    stuck_hz, stuck = example.linear(wheel, stuck=True)
+    found = []
+    for load in (1000.0, 3000.0):
+        response = frequency_response(
+            example.system(wheel, load, 0.98 * stuck_hz), (0.98 * stuck_hz, 1.01 * stuck_hz),
+            example.NAME, observe=("blade.tip", "y"),
+            options=ContinuationOptions(points=400, largest_step=0.2),
+            method=HarmonicBalance([0, 1, 3], 96, stability=None,
+                                   repeats=EngineOrder(wheel, example.ORDER)))
+        assert response.peak_reached()
+        found.append(response.amplitude().max() / stuck)
+    assert found[1] == pytest.approx(1.0, rel=5e-3)
+    assert 0.2 < found[0] < 0.6
+
+
+@pytest.mark.slow
+def test_a_vanishing_load_leaves_the_wheel_free():
+    """All sectors from rest: the build-up at resonance is that without dampers, and linear."""
+    hertz, amplitude = example.linear(example.wheel(2), stuck=False)
+    free, little = (example.transient(load, hertz, 6) for load in (None, 0.02))
+    ends = [np.abs(one[-41:]).max() for one in (free, little)]
+    # One mode that builds up from rest, A (1 - exp(-D w t)); others start too.
+    assert ends[0] == pytest.approx(amplitude * (1.0 - np.exp(-12e-3 * np.pi)), rel=0.06)
+    assert ends[1] == pytest.approx(ends[0], rel=0.03)
+    assert np.abs(little - free).max() < 0.1 * np.abs(free).max()
+
+
 def test_elastic_damper_is_softer(wheel):
     """A wedge of steel is nearly rigid beside its contacts, and softer."""
     rigid = example.linear(wheel, stuck=True)[0]

@@ -11,7 +11,7 @@ from fecontact.analysis import amplification, mistuned_response, whitehead_bound
 from fecontact.fem import CyclicSymmetry
 from fecontact.fem.points import place_rows
 from fecontact.reduction import WholeWheel, cyclic_basis
-from fecontact.sweeps import mistuning_sweep
+from fecontact.sweeps import mistuning, mistuning_sweep
 
 N = 5
 SYMMETRY = CyclicSymmetry("low", "high", N)
@@ -89,6 +89,35 @@ def test_equal_blades_are_not_amplified(complete):
         mistuned_response(equal, 6, 1850.0, TIP)
     with pytest.raises(InputError, match="samples = 2 must be three or more"):
         mistuning_sweep(complete, "s.blade", 0.01, 1, (1500.0, 2100.0), TIP, samples=2)
+
+
+def test_an_interrupted_sweep_goes_on(tmp_path, monkeypatch):
+    """Finished wheels are kept and not computed again; other ones do not count."""
+    basis, computed = wheel_of(1), []
+    largest = mistuning._largest
+
+    def counted(wheels):
+        if len(computed) == 1:
+            computed.append(0)
+            raise KeyboardInterrupt
+        computed.append(len(wheels.cases))
+        return largest(wheels)
+
+    def swept(spread=0.01, **options):
+        return mistuning_sweep(basis, "s.blade", spread, 2, (1500.0, 2100.0), TIP, samples=60,
+                               folder=tmp_path / "wheels", **options)
+
+    monkeypatch.setattr(mistuning, "_largest", counted)
+    with pytest.raises(KeyboardInterrupt):
+        swept()
+    with pytest.raises(InputError, match="holds a sweep; go on with"):
+        swept()
+    found = swept(resume=True)
+    assert sum(computed) == 60
+    plain = mistuning_sweep(basis, "s.blade", 0.01, 2, (1500.0, 2100.0), TIP, samples=60)
+    assert (found.amplifications == plain.amplifications).all()
+    other = swept(spread=0.02, resume=True)
+    assert (other.amplifications != plain.amplifications).all()
 
 
 def test_workers_find_the_same():
