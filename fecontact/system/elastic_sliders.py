@@ -13,6 +13,7 @@ import numpy as np
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.core.types import Array, Integers
+from fecontact.laws.friction.planar import along_slip
 from fecontact.laws.signatures import friction_law, ground_at
 from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import (
@@ -197,10 +198,11 @@ def no_friction(v, F, p):
 
 
 def without_elements(arrays: SystemArrays) -> SystemArrays:
-    """Arrays of a system of plane bodies whose nodes feel no friction, with its parameters."""
+    """Arrays of a system whose nodes feel no friction, with its parameters."""
     return arrays._replace(
         memory=np.zeros_like(arrays.memory),
         friction=np.full_like(arrays.friction, no_friction.address),
+        planar=np.full_like(arrays.planar, along_slip.address if len(arrays.planar) else 0),
         bristle_stiffness=np.zeros((2, len(arrays.memory), 0)))
 
 

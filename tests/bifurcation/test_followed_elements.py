@@ -12,6 +12,7 @@ from fecontact.bifurcation.harmonic.elements import follow_elements
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated, series
 from fecontact.bifurcation.harmonic.starts import corrected, problem_for
 from fecontact.laws import IwanFriction, JenkinsFriction, LinearContact, PrescribedForce
+from fecontact.system.elastic_sliders import without_elements
 
 T, H = 5.0, 3
 CONSTANT, PRESSED = PrescribedForce(1.0), LinearContact(3.0, 0.4, preload=2.5)
@@ -34,6 +35,31 @@ def plane(case):
         frequency_hz=1.3 / TURN), **parts)
 
 
+ONE = JenkinsFriction(0.5, 0.5)
+
+
+def in_space(friction=ONE, normal=CONSTANT, **parts):
+    """A mass with a node that moves along both tangents and its normal, driven along all three."""
+    rows = np.eye(6, 3)
+    basis = fc.basis_from_matrices(
+        np.eye(3), np.array([[0.3, 0.1, 0.0], [0.1, 0.2, 0.1], [0.0, 0.1, 4.0]]),
+        {"contact": rows[None], "B": rows, "C": rows}, dimension=3, damping=0.1 * np.eye(3))
+    return fc.ContactSystem(basis, normal=normal, friction=friction, drive=fc.Drive(
+        stiffness_x=1.0, stiffness_y=0.8, stiffness_z=1.0, damping_x=0.05, damping_y=0.6,
+        amplitude_x=1.2, amplitude_y=1.5, amplitude_z=0.5, frequency_hz=1.3 / TURN), **parts)
+
+
+IN_SPACE = {
+    "one": (in_space, "drive.frequency_hz"),
+    "several": (lambda: in_space(IwanFriction(0.5, 0.5, elements=3)), "friction.stiffness"),
+    "normal force": (lambda: in_space(normal=LinearContact(3.0, 0.4, preload=1.5)),
+                     "drive.frequency_hz"),
+    "open at times": (lambda: in_space(normal=LinearContact(3.0, 0.4), gap=0.1),
+                      "drive.amplitude_z"),
+    "ground": (lambda: in_space(ground=fc.Ground(speed=0.03)), "ground.speed"),
+}
+
+
 def coefficients(seed=0):
     """Motions that slide to and fro, along the normal too."""
     size = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0])
@@ -45,7 +71,7 @@ def followed(system, X, samples, offsets=None):
     count = system.friction.memory
     r, z = np.zeros((1, samples)), np.zeros((samples, count))
     rows = np.zeros((1, samples, 2 * len(X)))
-    assert follow_elements(X, T, system.arrays, np.array([count]),
+    assert follow_elements(X, T, without_elements(system.arrays), system.arrays, np.array([count]),
                            np.zeros(count) if offsets is None else offsets,
                            series(H, samples).values, True, r, z, rows)
     return r[0], z, rows[0]
@@ -113,6 +139,35 @@ def test_derivatives_of_the_equations_are_differences(case, name, compiled, monk
         (problem.linearise(u + move).residual - problem.linearise(u - move).residual) / (2.0 * h)
         for move in h * np.eye(len(u))], axis=1)
     assert here == pytest.approx(differences, abs=3e-6 * np.abs(differences).max())
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("case", IN_SPACE)
+def test_derivatives_in_two_directions_are_differences(case, compiled, monkeypatch):
+    if not compiled:
+        monkeypatch.setattr(CompiledBalance, "of", lambda problem: None)
+    make, name = IN_SPACE[case]
+    field = contact_field(make(), [name])
+    problem, u = start(field, 2, 24)
+    u[:-1] = 0.8 * np.random.default_rng(5).normal(size=problem.size)
+    here = problem.linearise(u)
+    assert here.memory.any()
+    differences = np.stack([
+        (problem.linearise(u + h).residual - problem.linearise(u - h).residual) / 2e-6
+        for h in 1e-6 * np.eye(len(u))], axis=1)
+    assert here.condensed == pytest.approx(differences, abs=2e-6 * np.abs(differences).max())
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_work_grows_with_the_number_of_elements_alone(dimension):
+    """No array of compiled code has the square of their number."""
+    system = (plane("several") if dimension == 2 else in_space()).with_(
+        friction=IwanFriction(2.0, 0.8, elements=40))
+    problem, u = start(contact_field(system, ["drive.frequency_hz"]), 2, 32)
+    room = problem.equations(float(u[-1])).room
+    assert room.J.shape == (32, 2 * dimension, 2 * dimension)
+    assert room.z.shape == (32, 40 * (dimension - 1))
+    assert room.by_node.shape == (dimension - 1, 32, 5 * dimension)
 
 
 def test_derivatives_to_an_unknown_period():

@@ -9,11 +9,18 @@ import fecontact as fc
 from fecontact.bifurcation import (
     BranchStatus,
     ContinuationOptions,
+    HarmonicBalance,
     Shooting,
     frequency_response,
 )
 from fecontact.integrate import EventDriven, SetValued
-from fecontact.laws import ConstantFriction, Harmonic, LinearContact, PrescribedForce
+from fecontact.laws import (
+    ConstantFriction,
+    Harmonic,
+    JenkinsFriction,
+    LinearContact,
+    PrescribedForce,
+)
 
 FREQUENCY = "load.forces.0.signal.frequency_hz"
 
@@ -41,6 +48,24 @@ def test_dry_friction_of_den_hartog():
     exact = np.sqrt((1.0 - r * r)**-2 - (friction * U)**2)
     assert branch.column("observed_amplitude") == pytest.approx(exact, rel=1e-5)
     assert branch.column("stable").all()
+
+
+def test_a_stiff_element_stands_for_dry_friction_in_harmonic_balance():
+    """With an error of the order of 1 / H, that of any series of a force which jumps."""
+    friction, r = 0.4, 0.75
+    system = oscillator("x", normal=PrescribedForce(1.0), friction=JenkinsFriction(1e4, friction))
+    U = np.sin(np.pi / r) / (r * (1.0 + np.cos(np.pi / r)))
+    exact = np.sqrt((1.0 - r * r)**-2 - (friction * U)**2)
+    off = []
+    for harmonics in (5, 15, 45):
+        branch = frequency_response(
+            system, (r / TURN, 1.01 * r / TURN), FREQUENCY,
+            method=HarmonicBalance(harmonics, 512, stability=None),
+            options=ContinuationOptions(points=1)).branches[0]
+        off.append(abs(float(branch.points[0].values["observed_amplitude"]) / exact - 1.0))
+    assert off[0] < 2.5e-2
+    assert off[2] < 5.5e-3
+    assert off[2] < 0.6 * off[1] < 0.36 * off[0]
 
 
 def impacts(w, loss, restitution):

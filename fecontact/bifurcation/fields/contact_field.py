@@ -84,7 +84,7 @@ class ContactField(VectorField):
         return without_elements(found) if self._bare else found
 
     def without_elements(self) -> "ContactField":
-        """The field of the states [q, q'] of plane bodies that feel no friction.
+        """The field of the states [q, q'] of bodies that feel no friction.
 
         It has the same parameters, those of friction too.
         """

@@ -24,6 +24,7 @@ from fecontact.bifurcation.harmonic.series import (
 )
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, Integers
+from fecontact.system.elastic_sliders import without_elements
 from fecontact.system.fields.vector_field import VectorField
 
 # Relative step of differences in a parameter that changes the period.
@@ -41,8 +42,8 @@ class Balance:
     velocities follow from q. The residuals q'' - f_v and y' - f_y, at N samples a period, have no
     part in the harmonics 0..H (alternating frequency and time). Internal variables z of friction
     are marched around the period, see :mod:`fecontact.bifurcation.harmonic.memory`; elastic Coulomb
-    elements of plane bodies are followed exactly, see
-    :mod:`fecontact.bifurcation.harmonic.elements`, and f is that without them. If f does not
+    elements are followed one by one, see :mod:`fecontact.bifurcation.harmonic.elements`, and f is
+    that without them. If f does not
     depend on t, T is an unknown and the phase is fixed by int <x, y'> = 0 with the orbit y before;
     else T is ``periods`` times the period of the forcing.
 
@@ -188,22 +189,23 @@ class Balance:
 
     @cached_property
     def bare(self) -> VectorField:
-        """The field without elements that are followed exactly."""
+        """The field without elements that are followed one by one."""
         if not self.kept.exact:
             return self.field
         assert isinstance(self.field, ContactField)
         return self.field.without_elements()
 
     def bare_states(self, states: Array) -> Array:
-        """States (N, d) without elements that are followed exactly."""
+        """States (N, d) without elements that are followed one by one."""
         return np.ascontiguousarray(states[:, : self.bare.dimension])
 
     def followed(
         self, u: Array, period: float, derivatives: bool = True
     ) -> tuple[Array, Array, Array]:
-        """Friction (n, N) of elements at the samples, deflections (N, c), and derivatives.
+        """Friction (t n, N) of elements at the samples, deflections (N, c), and derivatives.
 
-        The latter (n, N, 4 H + 2) are those to coefficients along tangent and normal.
+        The latter (t n, N, d (2 H + 1)) are those to coefficients along the d axes of a node, of
+        which t are tangents.
 
         Raises
         ------
@@ -211,13 +213,13 @@ class Balance:
             If elements do not come to repeat.
         """
         assert isinstance(self.field, ContactField)
-        n, N = len(self.kept.elements), self.samples
-        r, z = np.zeros((n, N)), np.zeros((N, self.layout.memory))
-        rows = np.zeros((n, N, 4 * self.harmonics + 2) if derivatives else (0, 0, 0))
+        laws, N = self.field.arrays(self.parameters(u)), self.samples
+        n, d, _ = laws.rows.shape
+        r, z = np.zeros(((d - 1) * n, N)), np.zeros((N, self.layout.memory))
+        rows = np.zeros((len(r), N, d * (2 * self.harmonics + 1)) if derivatives else (0, 0, 0))
         X = np.ascontiguousarray(self.coefficients(u)[:, : self.layout.displacements])
-        if not follow_elements(X, period, self.field.arrays(self.parameters(u)),
-                               self.kept.elements, self.kept.offsets, self.series.values,
-                               derivatives, r, z, rows):
+        if not follow_elements(X, period, without_elements(laws), laws, self.kept.elements,
+                               self.kept.offsets, self.series.values, derivatives, r, z, rows):
             raise AnalysisError(UNREPEATED)
         return r, z, rows
 
@@ -315,9 +317,10 @@ class Linearised:
 
     @cached_property
     def tangents(self) -> Array:
-        """Rows (n, m) of the displacements of nodes along their tangents."""
+        """Rows (t n, m) of the displacements of nodes along their tangents."""
         assert isinstance(self.problem.field, ContactField)
-        return self.problem.field.arrays(self.problem.parameters(self.u)).rows[:, 0]
+        rows = self.problem.field.arrays(self.problem.parameters(self.u)).rows
+        return np.asarray(rows[:, ::2].reshape(-1, rows.shape[2]))
 
     @cached_property
     def memory(self) -> Array:
@@ -336,7 +339,7 @@ class Linearised:
 
     @cached_property
     def rates(self) -> Array:
-        """Rates f (N, d) at the samples, without those of elements that are followed exactly."""
+        """Rates f (N, d) at the samples, without those of elements that are followed one by one."""
         if "derivatives" in self.__dict__:
             found = self.derivatives[0]
         else:
@@ -516,11 +519,12 @@ class Linearised:
         assert isinstance(problem.field, ContactField)
         L, n = len(problem.reference), problem.size
         change = problem.series.projection @ self.elements[2]
-        both = problem.field.arrays(problem.parameters(u)).rows
-        within = found[:n, :n].reshape(L, -1, L, both.shape[2])
-        for axis in range(2):
+        axes = problem.field.arrays(problem.parameters(u)).rows
+        within = found[:n, :n].reshape(L, -1, L, axes.shape[2])
+        for axis in range(axes.shape[1]):
+            along = np.repeat(axes[:, axis], axes.shape[1] - 1, axis=0)
             within += np.einsum("jqk,ji,jo->qiko", change[:, :, axis * L : (axis + 1) * L], rows,
-                                both[:, axis], optimize=True)
+                                along, optimize=True)
         for column in range(-problem.common, 0):
             h = _DIFFERENCE * max(abs(float(u[column])), 1e-3)
             sides = []

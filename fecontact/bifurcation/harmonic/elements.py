@@ -1,14 +1,14 @@
-r"""Elastic Coulomb elements of plane bodies in harmonic balance, exact between samples too.
+r"""Elastic Coulomb elements in harmonic balance, one by one; those of plane bodies exactly.
 
-The slip path s of a node is a Fourier series, known at all times. The deflection z of an element
-follows it within its limit l = mu P / k under the pressing force P: from where slip ends, at s_e,
-the element sticks with
+Along one tangent, the slip path s of a node is a Fourier series, known at all times. The deflection
+z of an element follows it within its limit l = mu P / k under the pressing force P: from where slip
+ends, at s_e, the element sticks with
 
 .. math:: z = s - s_e \pm l_e,
 
-until z meets a limit again, and slides with z = +-l then. Both places are located: slip ends where
-s' falls to the rate of the limit, and begins where z crosses the limit. P goes through its samples
-as a cubic spline of Catmull and Rom.
+until z meets a limit again, and slides with z = +-l then. Both places are located, between samples
+too: slip ends where s' falls to the rate of the limit, and begins where z crosses the limit. P goes
+through its samples as a cubic spline of Catmull and Rom.
 
 z(T) as a function of z(0) is a translation between two ends, those of motions that begin far on
 either side. It repeats between these ends, as near to the deflection that was kept as they allow,
@@ -23,6 +23,9 @@ y_+^p / p! less this itself.
 Derivatives are those of these equations. They follow one node's own coefficients, whatever the
 number of modes, and change from sample to sample only where an element begins or ceases to slide:
 the work hardly grows with the number of elements.
+
+Elements along two tangents are marched, see :mod:`fecontact.bifurcation.harmonic.memory`, each by
+itself, with derivatives to the coefficients of the node.
 """
 
 import math
@@ -30,15 +33,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fecontact.bifurcation.harmonic.memory import (
+    LEAK,
+    element_law,
+    march_block,
+    solve_around,
+    take_element,
+)
 from fecontact.core.compiled import borrowing, helper, kernel, routine
 from fecontact.core.records import Block, IntegerVector, Matrix, Vector
-from fecontact.system.elastic_sliders import limit_of
-from fecontact.system.kernels import normal_gradients
+from fecontact.system.elastic_sliders import limit_of, pressing_on
+from fecontact.system.kernels import node_gradients
 from fecontact.system.nodes import (
     NodeMotion,
     SystemArrays,
+    force_room,
     ground_motion,
-    node_contact,
+    ground_moved,
 )
 
 # Largest number of periods after which elements repeat, and relative change that is none.
@@ -483,102 +494,191 @@ def _follow(path, count, ratio, spring, kept, return_time, s, z, r, sums, rows, 
 
 
 @routine
-def _path_of(j, X, T, values, s, derivatives):
-    """Slip path of node j for coefficients X (L, m) of the displacements, with its pieces."""
+def _pressing_of(j, X, T, values, s, derivatives, series, moved, pressing, slopes):
+    """Fill series and motion of node j, the force that presses it, and its derivatives.
+
+    X (L, m) are coefficients of the displacements, those of the node along its d axes are
+    ``series`` (d, L); its places and velocities at the samples are ``moved`` (N, 2 d). Returns
+    whether ``pressing`` (N,) varies, or may vary, and whether this or the slip depend on T for
+    given coefficients; ``slopes`` are (N, d L).
+    """
     N, L = values.shape
-    m = X.shape[1]
-    series, rates = np.zeros((2, L)), np.zeros((2, L))
-    for axis in range(2):
+    d, m = len(series), X.shape[1]
+    series[:, :] = 0.0
+    for axis in range(d):
         for k in range(L):
             for i in range(m):
                 series[axis, k] += s.rows[j, axis, i] * X[k, i]
-        for k in range(1, L // 2 + 1):
-            w = 2.0 * math.pi * k / T
-            rates[axis, 2 * k - 1] = w * series[axis, 2 * k]
-            rates[axis, 2 * k] = -w * series[axis, 2 * k - 1]
-    pressing, slopes, gradients = np.empty(N), np.zeros((N, 2 * L)), np.empty((3, 4))
-    varies = False
+    force, rates = force_room(s)
+    gradients, nothing = np.empty((d + 1, 2 * d)), np.empty(0)
+    varies, timed = False, False
     for n in range(N):
-        moved = np.zeros(4)
-        for k in range(L):
-            for axis in range(2):
-                moved[axis] += values[n, k] * series[axis, k]
-                moved[2 + axis] += values[n, k] * rates[axis, k]
-        contact = node_contact(j, NodeMotion(moved[0], moved[1], moved[2], moved[3], 0.0, 0.0),
-                               ground_motion(n * T / N, s), s)
-        _, pressing[n] = normal_gradients(j, contact, s, gradients)
+        for axis in range(d):
+            place, speed = series[axis, 0], 0.0
+            for k in range(1, L // 2 + 1):
+                w, c, e = 2.0 * math.pi * k / T, values[n, 2 * k - 1], values[n, 2 * k]
+                one, other = series[axis, 2 * k - 1], series[axis, 2 * k]
+                place += one * c + other * e
+                speed += w * (other * c - one * e)
+            moved[n, axis], moved[n, d + axis] = place, speed
+        here = moved[n]
+        motion = (NodeMotion(here[0], here[1], here[3], here[4], here[2], here[5]) if d > 2 else
+                  NodeMotion(here[0], here[1], here[2], here[3], 0.0, 0.0))
+        ground = ground_motion(n * T / N, s)
+        F, _, contact = node_gradients(j, motion, ground, nothing, s, force, rates, gradients)
+        for axis in range(0, d, 2):
+            timed = timed or ground_moved(axis, j, ground.speed, ground.second_speed, s) != 0.0
+        pressing[n] = pressing_on(j, contact, F, s)
         varies = varies or pressing[n] != pressing[0]
-        for axis in range(2):
-            place, speed = gradients[2, axis], gradients[2, 2 + axis]
+        for axis in range(d):
+            place, speed = gradients[d, axis], gradients[d, d + axis]
             varies = varies or place != 0.0 or speed != 0.0
+            timed = timed or speed != 0.0
             if derivatives:
                 slopes[n, axis * L] = place
                 for k in range(1, L // 2 + 1):
-                    w = 2.0 * math.pi * k / T
-                    c, d = values[n, 2 * k - 1], values[n, 2 * k]
-                    slopes[n, axis * L + 2 * k - 1] = place * c - speed * w * d
-                    slopes[n, axis * L + 2 * k] = place * d + speed * w * c
-    most = 3 * N
-    path = Path(series[0], pressing, slopes if varies else slopes[:0],
-                np.empty(most, dtype=np.int64), np.empty(most), np.empty(most), np.empty(most),
-                np.empty(most), np.empty(most), np.empty(most), s.sliding[j], T)
-    return path, _cut(path, s)
+                    w, c, e = 2.0 * math.pi * k / T, values[n, 2 * k - 1], values[n, 2 * k]
+                    slopes[n, axis * L + 2 * k - 1] = place * c - speed * w * e
+                    slopes[n, axis * L + 2 * k] = place * e + speed * w * c
+    return varies, timed
 
 
 @routine
-def element_forces(X, T, s, elements, offsets, values, derivatives, r, z, rows):
-    """Fill r (n, N) with the friction of the elements of all nodes at the samples.
-
-    X (L, m) are coefficients of the displacements, T the period [s], ``elements`` (n,) numbers of
-    elements, ``offsets`` (c,) deflections less displacements of those that never slide, ``values``
-    (N, L) the series at the samples. Also fills the deflections z (N, c) and, with derivatives,
-    rows (n, N, 2 L) of those of r to the coefficients of a node along its tangent and its normal.
-    Returns 0 where an element does not come to repeat, else 1.
-    """
+def _along_one_tangent(j, X, T, s, count, offsets, values, derivatives, r, z, rows):
+    """As :func:`element_forces`, for the ``count`` elements of a node of a plane body."""
     N, L = values.shape
-    states = len(offsets) // len(elements)
+    series, moved, pressing = np.empty((2, L)), np.empty((N, 4)), np.empty(N)
+    slopes, nothing = np.zeros((N, 2 * L)), np.empty((0, 2 * L))
+    varies, timed = _pressing_of(j, X, T, values, s, derivatives, series, moved, pressing, slopes)
+    most = 3 * N
+    path = Path(series[0], pressing, slopes if varies else nothing,
+                np.empty(most, dtype=np.int64), np.empty(most), np.empty(most), np.empty(most),
+                np.empty(most), np.empty(most), np.empty(most), s.sliding[j], T)
+    pieces = _cut(path, s)
+    own = rows[0] if derivatives else nothing
+    own[:, :] = 0.0
+    room, p, done = np.empty((5, 2 * L)), s.friction_parameters[j], 1
+    held, sliding = np.zeros(N), np.zeros(N)
+    turned = np.zeros((N if derivatives else 0, 2 * L))
+    start = _moved_at(path, 0, 0.0, s)[0] + path.slides * ground_motion(0.0, s).travel
+    for i in range(count):
+        if not _follow(path, pieces, limit_of(j, i, count, 1.0, s), p[1 + i], start + offsets[i],
+                       p[0], s, z[:, i], r[0], (held, sliding, turned), own, room):
+            done = 0
+    if not derivatives:
+        return done, timed
+    stiffness, limits, kept = 0.0, 0.0, room[0]
+    kept[:] = 0.0
+    for n in range(N):
+        stiffness += held[n]
+        limits += sliding[n]
+        for k in range(2 * L):
+            kept[k] += turned[n, k]
+            own[n, k] += kept[k]
+        for k in range(L):
+            own[n, k] += stiffness * values[n, k]
+        if varies:
+            for k in range(2 * L):
+                own[n, k] += limits * slopes[n, k]
+    return done, timed
+
+
+@routine
+def _along_two_tangents(j, X, T, s, count, offsets, values, derivatives, r, z, rows):
+    """As :func:`element_forces`, for the ``count`` elements of a node in space, marched."""
+    N, L = values.shape
+    series, moved, pressing = np.empty((3, L)), np.empty((N, 6)), np.empty(N)
+    slopes = np.zeros((N, 3 * L))
+    _, timed = _pressing_of(j, X, T, values, s, derivatives, series, moved, pressing, slopes)
+    rate, leak = N / T, LEAK / T
+    slip, target, path = np.empty((N, 3)), np.empty((N, 2)), np.empty((N, 2))
+    p, force, rates, nothing = np.empty(3), np.empty(12), np.empty((2, 6)), np.empty((0, 0))
+    times, blocks = np.empty(N), np.array([2])
+    by_z, change = np.empty((N, 1, 2, 2)), np.empty((N if derivatives else 0, 2, 3 * L))
+    by_pair = np.empty((N, 2, 3))
+    for n in range(N):
+        ground = ground_motion(n * T / N, s)
+        times[n], slip[n, 2] = n * T / N, pressing[n]
+        for c in range(2):
+            slip[n, c] = rate * (1.5 * moved[n, 2 * c] - 2.0 * moved[n - 1, 2 * c]
+                                 + 0.5 * moved[n - 2, 2 * c]) - ground_moved(
+                                     2 * c, j, ground.speed, ground.second_speed, s)
+    rows[:, :, :] = 0.0
     done = 1
-    held, sliding, turned = np.empty(N), np.empty(N), np.empty((N if derivatives else 0, 2 * L))
-    room, nothing = np.empty((5, 2 * L)), np.empty((0, 2 * L))
-    sums = held, sliding, turned
-    for j in range(len(elements)):
+    for i in range(count):
+        take_element(j, i, count, s, p)
         for n in range(N):
-            r[j, n], held[n], sliding[n] = 0.0, 0.0, 0.0
-        if elements[j] == 0:
-            continue
-        path, count = _path_of(j, X, T, values, s, derivatives)
-        own = rows[j] if derivatives else nothing
-        own[:, :] = 0.0
-        turned[:, :] = 0.0
-        p = s.friction_parameters[j]
-        start = _moved_at(path, 0, 0.0, s)[0] + path.slides * ground_motion(0.0, s).travel
-        for i in range(elements[j]):
-            place = j * states + i
-            if not _follow(path, count, limit_of(j, i, elements[j], 1.0, s), p[1 + i],
-                           start + offsets[place], p[0], s, z[:, place], r[j], sums, own, room):
-                done = 0
+            for c in range(2):
+                target[n, c] = moved[n, 2 * c] + offsets[2 * i + c]
+        if march_block(j, True, times, nothing, s, T, slip, p, target, force, rates, path) == 0:
+            done = 0
+        for n in range(N):
+            element_law(j, slip[n], path[n], s, p, force, rates)
+            for c in range(2):
+                z[n, 2 * i + c] = path[n, c]
+                r[c, n] += force[6 * c]
+                for k in range(2):
+                    by_z[n, 0, c, k] = rates[c, 3 + k]
+                    by_pair[n, c, k] = force[6 * c + 3 + k]
+                by_pair[n, c, 2] = force[6 * c + 2]
+                if not derivatives:
+                    continue
+                for k in range(3 * L):
+                    change[n, c, k] = rates[c, 2] * slopes[n, k]
+                for k in range(L):
+                    speed = rate * (1.5 * values[n, k] - 2.0 * values[n - 1, k]
+                                    + 0.5 * values[n - 2, k])
+                    change[n, c, k] += rates[c, 1] * speed
+                    change[n, c, 2 * L + k] += rates[c, 5] * speed
+                    change[n, c, 2 * L * c + k] += leak * values[n, k]
         if not derivatives:
             continue
-        stiffness, limits, kept = 0.0, 0.0, room[0]
-        kept[:] = 0.0
+        solve_around(by_z, T, blocks, change)
         for n in range(N):
-            stiffness += held[n]
-            limits += sliding[n]
-            for k in range(2 * L):
-                kept[k] += turned[n, k]
-                own[n, k] += kept[k]
-            for k in range(L):
-                own[n, k] += stiffness * values[n, k]
-            if len(path.slopes) > 0:
-                for k in range(2 * L):
-                    own[n, k] += limits * path.slopes[n, k]
-    return done
+            for c in range(2):
+                for k in range(3 * L):
+                    rows[c, n, k] += (by_pair[n, c, 0] * change[n, 0, k]
+                                      + by_pair[n, c, 1] * change[n, 1, k]
+                                      + by_pair[n, c, 2] * slopes[n, k])
+    return done, timed
+
+
+@routine
+def element_forces(X, T, s, laws, elements, offsets, values, derivatives, r, z, rows):
+    """Fill r (t n, N) with the friction of the elements of n nodes along their t tangents.
+
+    X (L, m) are coefficients of the displacements, T the period [s], s the system without elements
+    and ``laws`` with them, ``elements`` (n,) their numbers, ``offsets`` (c,) deflections less
+    displacements of those that never slide, ``values`` (N, L) the series at the samples. Also fills
+    the deflections z (N, c) and, with derivatives, rows (t n, N, d L) of those of r to the
+    coefficients of a node along its d axes. Returns 0 where an element does not come to repeat,
+    else 1, or 2 if r depends on T for given X.
+    """
+    tangents = s.rows.shape[1] - 1
+    states = len(offsets) // len(elements)
+    done, by_period = 1, False
+    r[:, :] = 0.0
+    for j in range(len(elements)):
+        if elements[j] == 0:
+            continue
+        first, at = tangents * j, j * states
+        own = rows[first : first + tangents] if derivatives else rows
+        if tangents == 1:
+            found, timed = _along_one_tangent(
+                j, X, T, s, elements[j], offsets[at : at + states], values, derivatives,
+                r[first : first + 1], z[:, at : at + states], own)
+        else:
+            found, timed = _along_two_tangents(
+                j, X, T, laws, elements[j], offsets[at : at + states], values, derivatives,
+                r[first : first + 2], z[:, at : at + states], own)
+        done, by_period = min(done, found), by_period or timed
+    return 2 * done if by_period else done
 
 
 @kernel
 def follow_elements(
-    X: Matrix, T: float, s: SystemArrays, elements: IntegerVector, offsets: Vector, values: Matrix,
-    derivatives: int, r: Matrix, z: Matrix, rows: Block,
+    X: Matrix, T: float, s: SystemArrays, laws: SystemArrays, elements: IntegerVector,
+    offsets: Vector, values: Matrix, derivatives: int, r: Matrix, z: Matrix, rows: Block,
 ) -> int:
     """:func:`element_forces` for Python; ``rows`` may be empty without derivatives."""
-    return element_forces(X, T, s, elements, offsets, values, derivatives != 0, r, z, rows)
+    return element_forces(X, T, s, laws, elements, offsets, values, derivatives != 0, r, z, rows)

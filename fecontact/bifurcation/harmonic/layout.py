@@ -92,16 +92,14 @@ def memory_blocks(field: VectorField, layout: Layout) -> Integers:
 
 
 def element_counts(field: VectorField, layout: Layout) -> Integers:
-    """Numbers (n,) of elements of the nodes, followed exactly; zero for all where there are others.
-
-    Others are internal variables that are no elements, and elements in two directions.
-    """
+    """Numbers (n,) of elements of the nodes; zero for all where other internal variables exist."""
     if not (layout.memory and isinstance(field, ContactField)):
         return np.zeros(layout.nodes, dtype=np.int64)
     system = field.system()
     counts = slider_counts(system)
-    exact = system.basis.dimension == 2 and np.array_equal(counts, system.arrays.memory)
-    return counts if exact else np.zeros_like(counts)
+    tangents = system.basis.dimension - 1
+    alone = np.array_equal(tangents * counts, system.arrays.memory)
+    return counts if alone else np.zeros_like(counts)
 
 
 def filled(layout: Layout, X: Array, z: Array, period: float, values: Array) -> Array:

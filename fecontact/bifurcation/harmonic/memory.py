@@ -12,20 +12,29 @@ the part that it slid back then (:class:`Kept`). One that slides a little gives 
 it must. What is found repeats, so that its derivatives are those of these equations, cyclic, node
 by node and element by element.
 
-Elastic Coulomb elements of plane bodies are marched only beside other internal variables, see
-:mod:`fecontact.bifurcation.harmonic.elements`.
+Elastic Coulomb elements are marched so along two tangents, and beside other internal variables;
+see :mod:`fecontact.bifurcation.harmonic.elements`.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from fecontact.core.compiled import helper, kernel
+from fecontact.core.compiled import borrowing, helper, kernel
 from fecontact.core.dense_lu import factorise, solve, solve_rows
 from fecontact.core.records import Array4, Block, IntegerVector, Matrix, Vector
 from fecontact.core.types import Array, Integers
+from fecontact.laws.signatures import memory_at, planar_at
+from fecontact.system.elastic_sliders import pressing_on
 from fecontact.system.kernels import node_forces
-from fecontact.system.nodes import SystemArrays, force_room, ground_motion, node_motion
+from fecontact.system.nodes import (
+    TOLD,
+    SystemArrays,
+    force_room,
+    ground_motion,
+    in_space,
+    node_motion,
+)
 
 LEAK = 1e-6
 # Largest number of rounds, of Newton steps at a sample, and relative changes that end both.
@@ -47,7 +56,7 @@ class Kept:
         How many internal variables of each node act on each other: those of an element, and all of
         others, 0.
     elements : (n,) array
-        Numbers of elements of each node that are followed exactly, see
+        Numbers of elements of each node that are followed one by one, see
         :mod:`fecontact.bifurcation.harmonic.elements`; none or all are.
     """
 
@@ -58,7 +67,7 @@ class Kept:
 
     @property
     def exact(self) -> bool:
-        """Whether all internal variables are those of elements that are followed exactly."""
+        """Whether all internal variables are those of elements that are followed one by one."""
         return bool(self.elements.any())
 
     def at(self, q: Array) -> Array:
@@ -180,13 +189,131 @@ def _keep_within(start, brackets):
 
 
 @helper
-def _take_block(first, rates, diagonal, a):
-    """Fill a (b, b) with the derivatives of the equations of b variables of a node at a sample."""
+def _take_block(rates, diagonal, a):
+    """Fill a (b, b) with the derivatives of the equations of b variables at a sample."""
     b = len(a)
     for i in range(b):
         for c in range(b):
-            a[i, c] = -rates[first + i, 3 + first + c]
+            a[i, c] = -rates[i, 3 + c]
         a[i, i] += diagonal
+
+
+@helper
+def element_law(j, slip, z, s, p, force, rates):
+    """Fill ``force`` and ``rates`` with what an element of node j alone says.
+
+    ``slip`` (3,) are the slip velocities and the pressing force, z the deflections, p (3,) the
+    return time, the stiffness and the coefficient.
+    """
+    if in_space(s):
+        planar_at(s.planar[j])(s.friction[j], slip[0], slip[1], slip[2], z, p, force, rates)
+    else:
+        memory_at(s.friction[j])(slip[0], slip[2], z, p, force, rates)
+
+
+@helper
+def take_element(j, i, count, s, p):
+    """Fill p (3,) with the parameters of element i of the ``count`` of node j."""
+    own = s.friction_parameters[j]
+    p[0], p[1], p[2] = own[0], own[1 + i], own[1 + count + i]
+
+
+@borrowing
+def _take_slip(j, t, y, s, slip):
+    """Fill slip (N, 3) with slip velocities of node j and its pressing force; y (N, d)."""
+    force = np.empty(8 + TOLD if in_space(s) else 3)
+    rates, nothing = np.empty((0, 4 if in_space(s) else 3)), np.empty(0)
+    for n in range(len(t)):
+        F, _, contact = node_forces(j, node_motion(j, y[n], s), ground_motion(t[n], s), nothing, s,
+                                    force, rates)
+        slip[n, 0], slip[n, 1] = contact.slip, contact.slip_across
+        slip[n, 2] = pressing_on(j, contact, F, s)
+
+
+@borrowing
+def march_block(j, alone, t, y, s, T, slip, p, target, force, rates, path):
+    """Fill path (N, b) with variables of node j that repeat; 1 if they do, else 0.
+
+    ``alone`` is for one element with parameters p (3,), under ``slip`` (N, 3); otherwise these are
+    all variables of the node. The deflections to which they leak are ``target`` (N, b).
+    """
+    N, b = path.shape
+    rate, leak = N / T, LEAK / T
+    turned, part = np.empty((N, b, 2 * b)), np.empty(2 * b)
+    a, pivots = np.empty((b, b)), np.empty(b, dtype=np.int64)
+    ring, ring_pivots = np.empty((2 * b, 2 * b)), np.empty(2 * b, dtype=np.int64)
+    start, off, step = np.zeros(2 * b), np.empty(2 * b), np.empty(b)
+    last_round, brackets, largest = np.empty(b), np.zeros((5, 2 * b)), 0.0
+    for turn in range(_ROUNDS):
+        alike = 0
+        for place in range(N):
+            here = path[place]
+            for i in range(b):
+                last_round[i] = here[i]
+                here[i] = path[place - 1, i] if place > 0 else start[i]
+            for _ in range(_STEPS):
+                if alone:
+                    element_law(j, slip[place], here, s, p, force, rates)
+                else:
+                    node_forces(j, node_motion(j, y[place], s), ground_motion(t[place], s), here, s,
+                                force, rates)
+                for i in range(b):
+                    one = path[place - 1, i] if place > 0 else start[i]
+                    two = (path[place - 2, i] if place > 1 else
+                           start[i] if place == 1 else start[b + i])
+                    step[i] = (rates[i, 0] - leak * (here[i] - target[place, i])
+                               - rate * (1.5 * here[i] - 2.0 * one + 0.5 * two))
+                _take_block(rates, 1.5 * rate + leak, a)
+                factorise(a, b, pivots)
+                solve(a, pivots, step)
+                change, size = 0.0, 0.0
+                for i in range(b):
+                    here[i] += step[i]
+                    change, size = max(change, abs(step[i])), max(size, abs(here[i]))
+                largest = max(largest, size)
+                if not change > _SOLVED * largest:
+                    break
+            for i in range(b):
+                for c in range(2 * b):
+                    one = turned[place - 1, i, c] if place > 0 else (1.0 if c == i else 0.0)
+                    two = turned[place - 2, i, c] if place > 1 else (
+                        (1.0 if c == i else 0.0) if place == 1 else
+                        (1.0 if c == b + i else 0.0))
+                    turned[place, i, c] = rate * (2.0 * one - 0.5 * two)
+            _take_block(rates, 1.5 * rate + leak, a)
+            factorise(a, b, pivots)
+            solve_rows(a, pivots, turned[place])
+            # Where two samples are those of the last round, all behind them are.
+            if turn > 0:
+                moved_by = 0.0
+                for i in range(b):
+                    moved_by = max(moved_by, abs(here[i] - last_round[i]))
+                alike = alike + 1 if moved_by <= _SOLVED * largest else 0
+                if alike == 2:
+                    break
+        gap = 0.0
+        for i in range(b):
+            for last in range(2):
+                off[last * b + i] = path[N - 1 - last, i] - start[last * b + i]
+                gap = max(gap, abs(off[last * b + i]))
+        if gap <= _REPEATS * largest:
+            return 1
+        if turn > 0:
+            _bracket(turn, start, off, brackets)
+            for last in range(2):
+                for i in range(b):
+                    row = last * b + i
+                    part[row] = off[row]
+                    for c in range(2 * b):
+                        ring[row, c] = (1.0 if c == row else 0.0) - turned[N - 1 - last, i, c]
+            factorise(ring, 2 * b, ring_pivots)
+            solve(ring, ring_pivots, part)
+            for row in range(2 * b):
+                off[row] = part[row]
+        for i in range(2 * b):
+            start[i] += off[i]
+        _keep_within(start, brackets)
+    return 0
 
 
 @kernel
@@ -202,101 +329,27 @@ def march(
     without deflection; after two of them, Newton's method finds the start that repeats. Returns 1
     if every node has come to that, 0 if one has not.
     """
-    N, n = len(t), len(s.rows)
-    states = s.memory.max()
-    force, rates = force_room(s)
-    rate, leak = N / T, LEAK / T
-    path = np.empty((N, states))
+    N, n, states = len(t), len(s.rows), s.memory.max()
+    slip, p = np.empty((N, 3)), np.empty(3)
     z[:, :] = 0.0
     done = 1
     for j in range(n):
         k = s.memory[j]
-        if k == 0:
-            continue
         b = blocks[j] if blocks[j] > 0 else k
-        turned, part = np.empty((N, k, 2 * b)), np.empty(2 * b)
-        a, pivots = np.empty((b, b)), np.empty(b, dtype=np.int64)
-        ring, ring_pivots = np.empty((2 * b, 2 * b)), np.empty(2 * b, dtype=np.int64)
-        start, off, step = np.zeros(2 * k), np.empty(2 * k), np.empty(k)
-        last_round = np.empty(k)
-        repeats, largest = False, 0.0
-        brackets = np.zeros((5, 2 * k))
-        for turn in range(_ROUNDS):
-            alike = 0
+        if k > 0 and blocks[j] > 0:
+            _take_slip(j, t, y, s, slip)
+        for first in range(0, k, max(b, 1)):
+            alone = blocks[j] > 0
+            force, rates = force_room(s)
+            if alone:
+                take_element(j, first // b, k // b, s, p)
+                force, rates = np.empty(2 * (4 + b)), np.empty((b, 4 + b))
+            path = np.empty((N, b))
+            at = j * states + first
+            if march_block(j, alone, t, y, s, T, slip, p, target[:, at : at + b], force, rates,
+                            path) == 0:
+                done = 0
             for place in range(N):
-                motion, moved = node_motion(j, y[place], s), ground_motion(t[place], s)
-                here = path[place, :k]
-                for i in range(k):
-                    last_round[i] = here[i]
-                    here[i] = path[place - 1, i] if place > 0 else start[i]
-                for _ in range(_STEPS):
-                    node_forces(j, motion, moved, here, s, force, rates)
-                    for i in range(k):
-                        one = path[place - 1, i] if place > 0 else start[i]
-                        two = (path[place - 2, i] if place > 1 else
-                               start[i] if place == 1 else start[k + i])
-                        step[i] = (rates[i, 0] - leak * (here[i] - target[place, j * states + i])
-                                   - rate * (1.5 * here[i] - 2.0 * one + 0.5 * two))
-                    for first in range(0, k, b):
-                        _take_block(first, rates, 1.5 * rate + leak, a)
-                        factorise(a, b, pivots)
-                        solve(a, pivots, step[first : first + b])
-                    change, size = 0.0, 0.0
-                    for i in range(k):
-                        here[i] += step[i]
-                        change, size = max(change, abs(step[i])), max(size, abs(here[i]))
-                    largest = max(largest, size)
-                    if not change > _SOLVED * largest:
-                        break
-                for first in range(0, k, b):
-                    for i in range(b):
-                        for c in range(2 * b):
-                            one = (turned[place - 1, first + i, c] if place > 0 else
-                                   (1.0 if c == i else 0.0))
-                            two = turned[place - 2, first + i, c] if place > 1 else (
-                                (1.0 if c == i else 0.0) if place == 1 else
-                                (1.0 if c == b + i else 0.0))
-                            turned[place, first + i, c] = rate * (2.0 * one - 0.5 * two)
-                    _take_block(first, rates, 1.5 * rate + leak, a)
-                    factorise(a, b, pivots)
-                    solve_rows(a, pivots, turned[place, first : first + b])
-                # Where two samples are those of the last round, all behind them are.
-                if turn > 0:
-                    moved_by = 0.0
-                    for i in range(k):
-                        moved_by = max(moved_by, abs(here[i] - last_round[i]))
-                    alike = alike + 1 if moved_by <= _SOLVED * largest else 0
-                    if alike == 2:
-                        break
-            gap = 0.0
-            for i in range(k):
-                for last in range(2):
-                    off[last * k + i] = path[N - 1 - last, i] - start[last * k + i]
-                    gap = max(gap, abs(off[last * k + i]))
-            repeats = gap <= _REPEATS * largest
-            if repeats:
-                break
-            if turn > 0:
-                _bracket(turn, start, off, brackets)
-                for first in range(0, k, b):
-                    for last in range(2):
-                        for i in range(b):
-                            row = last * b + i
-                            part[row] = off[last * k + first + i]
-                            for c in range(2 * b):
-                                ring[row, c] = ((1.0 if c == row else 0.0)
-                                                - turned[N - 1 - last, first + i, c])
-                    factorise(ring, 2 * b, ring_pivots)
-                    solve(ring, ring_pivots, part)
-                    for last in range(2):
-                        for i in range(b):
-                            off[last * k + first + i] = part[last * b + i]
-            for i in range(2 * k):
-                start[i] += off[i]
-            _keep_within(start, brackets)
-        if not repeats:
-            done = 0
-        for place in range(N):
-            for i in range(k):
-                z[place, j * states + i] = path[place, i]
+                for i in range(b):
+                    z[place, at + i] = path[place, i]
     return done

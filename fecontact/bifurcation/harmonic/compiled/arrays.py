@@ -20,9 +20,9 @@ class Room(NamedTuple):
     in the last row. Plain contact forces are found row by row over the samples: ``motion`` (2 m, N)
     displacements and velocities, ``pushes`` (m, N) forces, ``node`` (9, N) what belongs to a
     node; ``widths`` (m, N) is what kinks add, see
-    :func:`fecontact.bifurcation.harmonic.compiled.kinks.add_kinks`. ``friction`` (3, n, N) is that
-    of elements which are followed exactly, with what it is beside the parameter; ``by_node``
-    (n, N, 4 H + 2) are its derivatives, ``left`` (N, c) room for deflections.
+    :func:`fecontact.bifurcation.harmonic.compiled.kinks.add_kinks`. ``friction`` (3, t n, N) is
+    that of elements which are followed one by one, with what it is beside the parameter;
+    ``by_node`` (t n, N, d (2 H + 1)) are its derivatives, ``left`` (N, c) room for deflections.
     """
 
     t: Vector
@@ -72,7 +72,7 @@ class Equations(NamedTuple):
     m) at the samples, with the harmonics ``pulls`` (2, 2 H + 1, m). Otherwise ``contact`` is the
     whole system and these are zero. ``springs`` (c, m) and ``offsets`` (c,) give the deflections to
     which internal variables return, ``blocks`` (n,) how many of a node act on each other; these are
-    none where all are elements that are followed exactly, ``elements`` (n,) numbers of which with
+    none where all are elements that are followed one by one, ``elements`` (n,) their numbers, with
     ``kept_offsets`` (c,) of those that never slide. Then ``contact`` is without them, ``whole``
     with them. ``onsets`` (k, n) the penetrations at which normal forces have kinks. Numbers are the
     period times p or 0, the period, least and largest p for which this holds, whether contact
@@ -80,9 +80,10 @@ class Equations(NamedTuple):
     plane alone, bounds of the branch, tolerance, largest step, largest turn, Newton's rounding,
     whether folds are located, whether all forces at rest have no mean; and of Newton's method the
     size of a second step over the square of the first, negative if unknown, with the number of
-    times it was relied on; and whether contact forces may have kinks. ``limits`` (m,) bound the
-    scales of the displacements; ``nodes`` have internal variables. ``kept`` are the rows of the
-    coefficients (2 H + 1, m) that are unknown, the others are zero.
+    times it was relied on; and whether contact forces may have kinks; and what
+    :func:`fecontact.bifurcation.harmonic.elements.element_forces` returned last. ``limits`` (m,)
+    bound the scales of the displacements; ``nodes`` have internal variables. ``kept`` are the rows
+    of the coefficients (2 H + 1, m) that are unknown, the others are zero.
     """
 
     contact: SystemArrays
@@ -112,7 +113,7 @@ class Equations(NamedTuple):
 
 
 (TURN, PERIOD, LOW, HIGH, STEADY, PLAIN, FIRST_BOUND, LAST_BOUND, TOLERANCE, LARGEST_STEP,
- LARGEST_TURN, ROUNDING, FOLDS, RESTS, SQUARE, TRUSTED, KINKS) = range(17)
+ LARGEST_TURN, ROUNDING, FOLDS, RESTS, SQUARE, TRUSTED, KINKS, TIMED) = range(18)
 
 class Reached(NamedTuple):
     """Points that were reached, K at most.
@@ -135,14 +136,14 @@ class Reached(NamedTuple):
 
 def room_for(
     harmonics: int, samples: int, modes: int, memory: int, nodes: int, coupled: int,
-    exact: bool,
+    exact: bool, axes: int,
 ) -> Room:
     """Room for a system of so many modes and internal variables, on so many nodes.
 
     At most ``coupled`` modes are solved for together. Internal variables that are ``exact`` are
-    those of elements that are followed exactly.
+    those of elements that are followed one by one; nodes move along so many ``axes``.
     """
-    deflections, followed = memory, nodes if exact else 0
+    deflections, followed = memory, nodes * (axes - 1) if exact else 0
     memory = 0 if exact else memory
     L, N, m, c = 2 * harmonics + 1, samples, modes, memory
     n, d, k = L * m, 2 * m + c, L * coupled
@@ -159,5 +160,5 @@ def room_for(
         np.array([coupled]), np.empty((2, m)), np.empty((3, m, 2 * m)), np.empty((2, m, m)),
         np.empty(n), np.empty(n), np.empty(n), np.empty(n + 1), np.empty((16, n + 1)),
         np.empty((d - c, N)), np.empty((m, N)), np.empty((9, N)), np.zeros((m, N)),
-        np.empty((3, followed, N)), np.empty((followed, N, 2 * L)),
+        np.empty((3, followed, N)), np.empty((followed, N, axes * L)),
         np.empty((N, deflections if exact else 0)))

@@ -99,7 +99,7 @@ class CompiledBalance:
     ) -> arrays.Equations:
         layout, series = problem.layout, problem.series
         m, L = layout.displacements, 2 * problem.harmonics + 1
-        numbers = np.zeros(arrays.KINKS + 1)
+        numbers = np.zeros(arrays.TIMED + 1)
         numbers[arrays.KINKS] = self.kinked
         if problem.turn is not None:
             numbers[arrays.TURN] = problem.periods * problem.turn
@@ -108,7 +108,7 @@ class CompiledBalance:
         numbers[arrays.LOW], numbers[arrays.HIGH] = near.low, near.high
         most = m if problem.size <= MOST_UNKNOWNS else max(1, MOST_UNKNOWNS // L)
         room = arrays.room_for(problem.harmonics, problem.samples, m, layout.memory, layout.nodes,
-                               most, problem.kept.exact)
+                               most, problem.kept.exact, near.arrays.rows.shape[1])
         contact, kept = near.arrays, problem.kept
         body, given = np.zeros((4, m, m)), np.zeros((2, problem.samples, m))
         found = self._without_contact(problem, near)

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from fecontact.bifurcation.harmonic.compiled.arrays import PERIOD, PLAIN, STEADY, TURN
+from fecontact.bifurcation.harmonic.compiled.arrays import PERIOD, PLAIN, STEADY, TIMED, TURN
 from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks
 from fecontact.bifurcation.harmonic.compiled.plain_forces import combine, plain_forces, project
 from fecontact.bifurcation.harmonic.elements import element_forces
@@ -124,10 +124,10 @@ def balance(u, T, loads, e, out):
 
 @helper
 def _follow(u, T, derivatives, e, friction, z):
-    """Fill friction (n, N) of elements that are followed exactly; 0 if they do not repeat."""
+    """Fill friction (t n, N) of elements along their tangents; 0 if they do not repeat."""
     m, L = e.springs.shape[1], e.values.shape[1]
-    return element_forces(u[: L * m].reshape((L, m)), T, e.contact, e.elements, e.kept_offsets,
-                          e.values, derivatives, friction, z, e.room.by_node)
+    return element_forces(u[: L * m].reshape((L, m)), T, e.contact, e.whole, e.elements,
+                          e.kept_offsets, e.values, derivatives, friction, z, e.room.by_node)
 
 
 @helper
@@ -135,15 +135,24 @@ def _add_friction(e):
     """Add the friction of elements that was found to the rows of the forces, or to the rates."""
     room, plain = e.room, e.numbers[PLAIN] != 0.0
     m, rows = e.springs.shape[1], e.contact.rows
-    for j in range(len(e.elements)):
-        friction = room.friction[0, j]
+    tangents = rows.shape[1] - 1
+    for r in range(tangents * len(e.elements)):
+        friction = room.friction[0, r]
         for i in range(m):
-            factor = rows[j, 0, i]
+            factor = rows[r // tangents, 2 * (r % tangents), i]
             for n in range(len(friction)):
                 if plain:
                     room.pushes[i, n] -= factor * friction[n]
                 else:
                     room.f[n, m + i] -= factor * friction[n]
+
+
+@helper
+def _friction_at(u, T, derivatives, e):
+    """Find and add the friction of elements; 0 if they do not repeat."""
+    e.numbers[TIMED] = _follow(u, T, derivatives, e, e.room.friction[0], e.room.z)
+    _add_friction(e)
+    return e.numbers[TIMED]
 
 
 @routine
@@ -158,10 +167,8 @@ def evaluate_at(u, derivatives, e):
     if e.numbers[PLAIN] != 0.0:
         take_motion(u, T, e)
         plain_forces(derivatives, T / len(e.tau), e)
-        if len(e.elements) > 0:
-            if _follow(u, T, derivatives, e, room.friction[0], room.z) == 0:
-                return 0.0
-            _add_friction(e)
+        if len(e.elements) > 0 and _friction_at(u, T, derivatives, e) == 0.0:
+            return 0.0
         balance(u, T, 1.0, e, room.residual)
         return T
     take_states(u, T, e, room.x)
@@ -183,10 +190,8 @@ def evaluate_at(u, derivatives, e):
         batch_rates(room.t, room.x, e.contact, room.f)
     add_kinks(room.t, room.x, e.contact, e.onsets, T / len(e.tau), derivatives, room.f, room.J,
               room.widths)
-    if len(e.elements) > 0:
-        if _follow(u, T, derivatives, e, room.friction[0], room.z) == 0:
-            return 0.0
-        _add_friction(e)
+    if len(e.elements) > 0 and _friction_at(u, T, derivatives, e) == 0.0:
+        return 0.0
     take_pushes(room.f, e)
     balance(u, T, 1.0, e, room.residual)
     return T
@@ -297,7 +302,7 @@ def _by_parameter(u, T, e):
 def _beside(u, central, e, followed):
     """Fill ``column``, and the last columns of ``followed``, by differences.
 
-    z is held, and so is the friction of elements that are followed exactly.
+    z is held, and so is the friction of elements that are followed one by one.
     """
     room = e.room
     n, p = len(room.residual), u[len(u) - 1]
@@ -394,30 +399,34 @@ def _add_memory(T, e):
 
 @helper
 def _add_by_elements(u, T, central, e):
-    """Add what elements that are followed exactly contribute to ``square`` and ``column``.
+    """Add what elements that are followed one by one contribute to ``square`` and ``column``.
 
     They give the derivatives to the parameter by differences.
     """
     room, rows = e.room, e.contact.rows
     m, L, N = e.springs.shape[1], e.values.shape[1], len(e.tau)
     square = room.square[: L * m * L * m].reshape((L, m, L, m))
-    spectrum = np.empty((L, 2 * L))
-    for j in range(len(e.elements)):
+    axes = rows.shape[1]
+    tangents, spectrum = axes - 1, np.empty((L, axes * L))
+    for r in range(tangents * len(e.elements)):
+        j, tangent = r // tangents, 2 * (r % tangents)
         spectrum[:, :] = 0.0
         for q in range(L):
             row = spectrum[q]
             for n in range(N):
-                factor, change = e.projection[q, n], room.by_node[j, n]
-                for k in range(2 * L):
+                factor, change = e.projection[q, n], room.by_node[r, n]
+                for k in range(axes * L):
                     row[k] += factor * change[k]
         for q in range(L):
             for i in range(m):
-                along = rows[j, 0, room.order[i]]
-                for k in range(L):
-                    for o in range(m):
-                        square[q, i, k, o] += along * (
-                            rows[j, 0, room.order[o]] * spectrum[q, k]
-                            + rows[j, 1, room.order[o]] * spectrum[q, L + k])
+                along = rows[j, tangent, room.order[i]]
+                for axis in range(axes):
+                    for k in range(L):
+                        for o in range(m):
+                            square[q, i, k, o] += (along * rows[j, axis, room.order[o]]
+                                                   * spectrum[q, axis * L + k])
+    if e.numbers[STEADY] != 0.0 and e.numbers[TIMED] < 2.0:
+        return
     n, p = L * m, u[len(u) - 1]
     h = (_CENTRAL if central else _ONE_SIDED) * max(abs(p), 1e-3)
     there, width = room.vectors[7], 2.0 * h if central else h
@@ -428,14 +437,15 @@ def _add_by_elements(u, T, central, e):
         _follow(there, take_parameter(there[n], e), False, e, room.friction[1 + side], room.left)
     take_parameter(p, e)
     change, pushed = room.node[0], room.along[:L]
-    for j in range(len(e.elements)):
-        above, below = room.friction[1, j], room.friction[2 if central else 0, j]
+    for r in range(tangents * len(e.elements)):
+        j, tangent = r // tangents, 2 * (r % tangents)
+        above, below = room.friction[1, r], room.friction[2 if central else 0, r]
         for i in range(N):
             change[i] = (above[i] - below[i]) / width
         project(e.projection, change, pushed)
         for q in range(L):
             for i in range(m):
-                room.column[q * m + i] += rows[j, 0, i] * pushed[q]
+                room.column[q * m + i] += rows[j, tangent, i] * pushed[q]
 
 
 @routine
