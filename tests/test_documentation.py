@@ -357,7 +357,8 @@ def check_frequency_responses(names, printed, folder):
     sliding, sticking = 1.0 / (2.0 * np.pi), np.sqrt(1.5) / (2.0 * np.pi)
     assert all(sliding < hz < sticking for _, hz, _ in peaks[:2])
     assert [amplitude for amplitude, *_ in held] == [2.0, 6.0]
-    assert all(sliding < hz < sticking for _, hz, _ in held)
+    # An amplitude of 2 is that up to which it sticks; the point of the smallest force lies nearby.
+    assert all(sliding < hz < 1.001 * sticking for _, hz, _ in held)
     # A force of 1 N moves it by 6.23 m at most.
     assert held[0][2] < held[1][2] < 1.0
     stuck, slides, ratio = peaks[2]

@@ -33,6 +33,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fecontact.bifurcation.harmonic.compiled.kinks import kernel_integrals
 from fecontact.bifurcation.harmonic.memory import (
     LEAK,
     element_law,
@@ -325,16 +326,7 @@ def _repeated(path, count, ratio, kept, s):
 @helper
 def _means(y):
     """G_0, G_1 and G_2 at a distance of y samples behind a jump."""
-    step, ramp, curve = 0.0, 0.0, 0.0
-    factor = 1.0
-    for i in range(5):
-        r = y + 2.0 - i
-        if r > 0.0:
-            q = r * r
-            step += factor * q * (q / 24.0 - 1.0 / 12.0)
-            ramp += factor * q * r * (q / 120.0 - 1.0 / 36.0)
-            curve += factor * q * q * (q / 720.0 - 1.0 / 144.0)
-        factor *= -(4.0 - i) / (i + 1.0)
+    _, step, ramp, curve = kernel_integrals(y)
     if y > 0.0:
         step, ramp, curve = step - 1.0, ramp - y, curve - 0.5 * y * y
     return step, ramp, curve

@@ -51,10 +51,10 @@ _MOST_KNOWN = 100
 
 
 @helper
-def _mean_of_step(y):
-    """Integrals of K up to y: of first and second order, with K itself."""
+def kernel_integrals(y):
+    """K at y, and its integrals up to there, once, twice and three times."""
     # Signed binomials of the fourth difference.
-    first, second, value = 0.0, 0.0, 0.0
+    value, first, second, third = 0.0, 0.0, 0.0, 0.0
     factor = 1.0
     for i in range(5):
         r = y + 2.0 - i
@@ -63,8 +63,9 @@ def _mean_of_step(y):
             value += factor * r * (square - 1.0) / 6.0
             first += factor * square * (square / 24.0 - 1.0 / 12.0)
             second += factor * square * r * (square / 120.0 - 1.0 / 36.0)
+            third += factor * square * square * (square / 720.0 - 1.0 / 144.0)
         factor *= -(4.0 - i) / (i + 1.0)
-    return second, first, value
+    return value, first, second, third
 
 
 @helper
@@ -79,7 +80,7 @@ def kink_change(u, v, b, h, law, p):
     above, above_u, above_v = normal_at(law)(b + off, v, p)
     below, below_u, below_v = normal_at(law)(b - off, v, p)
     jump, bend, jump_v = above - below, above_u - below_u, above_v - below_v
-    second, first, value = _mean_of_step(x / w)
+    value, first, second, _ = kernel_integrals(x / w)
     past = 1.0 if x > 0.0 else 0.0
     change = jump * (first - past) + bend * (w * second - past * x)
     change_u = jump * value / w + bend * (first - past)
