@@ -198,9 +198,9 @@ A column between hinges with Timoshenko's shear, and a warm one that touches a s
 (alpha DT h - gap) / (1 / k + h / (E A)). The frequencies of the cantilever are over
 sqrt(E I / (m L^4)), as is its speed. The disc's number is a bound from below. The ring of sectors
 is inextensional: w_n^2 = E I n^2 (n^2 - 1)^2 / (rho A R^4 (n^2 + 1)). The friction ring has 24
-masses with Jenkins elements between them, of which one is computed. Deviations of the stiffness of five
-blades are searched for the largest amplification; residual vectors add to the one mode of each blade,
-for which the bound (1 + sqrt(N)) / 2 holds. More cases stand at the ends
+masses with Jenkins elements between them, of which one is computed. Deviations of the stiffness of
+five blades are searched for the largest amplification; residual vectors add to the one mode of each
+blade, for which the bound (1 + sqrt(N)) / 2 holds. More cases stand at the ends
 of [rotation](rotation.md), [stressed bodies](stressed-bodies.md) and
 [cyclic symmetry](cyclic-symmetry.md).
 

@@ -250,10 +250,25 @@ def test_waves_that_run_against_each_other_are_one_mode(wheel):
     assert np.interp(4e-7, second.amplitude, second.frequency_hz) == pytest.approx(at, rel=1e-3)
 
 
+def test_mode_of_a_wave_at_an_amplitude_and_a_frequency(wheel):
+    """Between two points of the mode, beside which both are the same solution."""
+    mode, wave = mode_of(wheel, 1, (1e-7, 2e-6)), EngineOrder(wheel, 1)
+    system = system_of(wheel, 1.0)
+    found = mode.at(system, amplitude=7e-7, wave=wave)
+    assert found.amplitude[0] == pytest.approx(7e-7, rel=1e-6)
+    place = int(np.searchsorted(mode.amplitude, 7e-7))
+    ends = mode.frequency_hz[place - 1 : place + 1]
+    assert ends[1] < found.frequency_hz[0] < ends[0]
+    again = mode.at(system, frequency_hz=found.frequency_hz[0], wave=wave)
+    assert again.amplitude[0] == pytest.approx(7e-7, rel=1e-4)
+
+
 def test_modes_of_waves_refuse_what_does_not_fit(sector, wheel):
     mode, wave = mode_of(wheel, 1, (1e-7, 2e-7)), EngineOrder(wheel, 1)
-    with pytest.raises(InputError, match="not for travelling waves"):
+    with pytest.raises(InputError, match=r"give wave=EngineOrder\(wheel, 1\)"):
         mode.at(system_of(wheel, 1.0), amplitude=1.5e-7)
+    with pytest.raises(InputError, match=r"give wave=EngineOrder\(wheel, 1\)"):
+        mode.at(system_of(wheel, 1.0), amplitude=1.5e-7, wave=EngineOrder(wheel, 3))
     field = wave.field(contact_field(system_of(wheel, 1.0), [NAME]))
     with pytest.raises(InputError, match="take a point of a response"):
         wheel_stability(field, mode.branch.points[0])

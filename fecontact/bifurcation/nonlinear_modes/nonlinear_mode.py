@@ -185,7 +185,7 @@ class NonlinearMode(Summarised):
 
     def at(
         self, system: ContactSystem, *, amplitude: float | None = None,
-        frequency_hz: float | None = None,
+        frequency_hz: float | None = None, wave: EngineOrder | None = None,
     ) -> "NonlinearMode":
         """The mode at one amplitude or one frequency: a mode of a single point, solved there.
 
@@ -197,6 +197,8 @@ class NonlinearMode(Summarised):
             Amplitude of the observed displacement, in its unit.
         frequency_hz : float, optional
             Frequency [Hz], in place of the amplitude.
+        wave : EngineOrder, optional
+            That of the mode, if it is a travelling wave.
 
         Raises
         ------
@@ -204,9 +206,14 @@ class NonlinearMode(Summarised):
             If the mode has no such amplitude or frequency, or has it several times.
         """
         _require_harmonics(self.branch, "at")
-        if "engine_order" in self.branch.attributes:
-            raise InputError("NonlinearMode.at: is not for travelling waves; take the points of "
-                             "the mode.")
+        require_kind("NonlinearMode.at", (EngineOrder, NoneType), wave=wave)
+        own, given = (self.branch.attributes.get("engine_order"),
+                      None if wave is None else wave.order)
+        if own != given:
+            raise InputError("NonlinearMode.at: wave is for modes of travelling waves; leave it "
+                             "out." if own is None else
+                             f"NonlinearMode.at: the mode is a wave of engine order {own}; give "
+                             f"wave=EngineOrder(wheel, {own}).")
         if not int(self.branch.attributes["displacements"]):
             raise InputError("NonlinearMode.at: is for modes of contact systems; take the points "
                              "of the mode.")
@@ -214,19 +221,20 @@ class NonlinearMode(Summarised):
             raise InputError("NonlinearMode.at: give either amplitude or frequency_hz.")
         if amplitude is not None:
             return _solved(self, system, _bracket("amplitude", self.amplitude, amplitude, ""),
-                           float(amplitude))
+                           float(amplitude), wave)
         assert frequency_hz is not None
         place = _bracket("frequency_hz", self.frequency_hz, frequency_hz, " Hz")
         ends, known = self.amplitude[place : place + 2], self.frequency_hz[place : place + 2]
         if frequency_hz in known.tolist():
-            return _solved(self, system, place, float(ends[int(known[1] == frequency_hz)]))
+            return _solved(self, system, place, float(ends[int(known[1] == frequency_hz)]), wave)
 
         def off(A: float) -> float:
-            return float(_solved(self, system, place, A).frequency_hz[0]) - float(frequency_hz)
+            found = _solved(self, system, place, A, wave)
+            return float(found.frequency_hz[0]) - float(frequency_hz)
 
         from scipy.optimize import brentq
 
-        return _solved(self, system, place, float(brentq(off, *ends, rtol=1e-12)))
+        return _solved(self, system, place, float(brentq(off, *ends, rtol=1e-12)), wave)
 
     @property
     def _square(self) -> Array:
@@ -377,6 +385,7 @@ def _wave_of(method: HarmonicBalance | Shooting) -> EngineOrder | None:
 def continued_mode(
     system: ContactSystem, mode: NonlinearMode, bounds: tuple[float, float],
     observe: tuple[str | int, str], options: ContinuationOptions,
+    wave: EngineOrder | None = None,
 ) -> NonlinearMode:
     """A mode that was interrupted, followed on from its last regular point."""
     low, high = _amplitudes(bounds)
@@ -384,7 +393,7 @@ def continued_mode(
     while points[-1].kind is not None and len(points) > 1:
         points.pop()
     last = points[-1]
-    field = field_over_xi(system, last.parameter)
+    field = field_over_xi(system, last.parameter, wave)
     plain, u, tangent = starts.restored(field, last)
     problem = _mode_problem(
         plain, row=observed_row(field, observe)[0], conservative=bool(known["conservative"]),
@@ -428,7 +437,8 @@ def _bracket(name: str, values: Array, wanted: float, unit: str) -> int:
 
 
 def _solved(
-    mode: NonlinearMode, system: ContactSystem, place: int, amplitude: float
+    mode: NonlinearMode, system: ContactSystem, place: int, amplitude: float,
+    wave: EngineOrder | None,
 ) -> NonlinearMode:
     """The mode at an amplitude between two neighbouring points."""
     points, A = mode.branch.points, mode.amplitude
@@ -443,7 +453,7 @@ def _solved(
     step = float(np.clip(abs(length), 1e-4, _STEP))
     found = continued_mode(
         system, known, bounds, (int(point) if point.isdigit() else point, component),
-        ContinuationOptions(points=place + _MOST_BETWEEN, step=step, largest_step=_LARGEST))
+        ContinuationOptions(points=place + _MOST_BETWEEN, step=step, largest_step=_LARGEST), wave)
     last = found.branch.points[-1]
     if abs(float(last.values["observed_amplitude"]) / amplitude - 1.0) > _MET:
         raise AnalysisError(f"The mode was not found at the amplitude {amplitude:g}; take its "
