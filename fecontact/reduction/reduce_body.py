@@ -117,10 +117,9 @@ def modal_basis(
         With both, displacements count from the stressed body, without the loads of the stress.
     temperature : float, (N,) array or function of the coordinates, optional
         Its change [K], a constant load that completes the modes; see :mod:`fecontact.fem.thermal`.
-    rows : sequence of sparse (k, d N) arrays
-        Further motions with forces; see :func:`fecontact.reduction.reduce_bodies`.
-    eigensolver : 'auto', 'direct' or 'iterative'
-        Of solids, see :func:`fecontact.reduction.eigenmodes.eigenmodes`.
+    rows, eigensolver : sequence of sparse (k, d N) arrays; 'auto', 'direct' or 'iterative'
+        Further motions with forces, see :func:`fecontact.reduction.reduce_bodies`; of solids, see
+        :func:`fecontact.reduction.eigenmodes.eigenmodes`.
 
     Raises
     ------

@@ -15,7 +15,8 @@ from fecontact.sweeps.executors import Pool
 class Job:
     """A function and its batch; ``breaks`` is 1 if the job may have crashed a worker.
 
-    The batch is a dataclass with a tuple of ``cases``, such as :class:`Batch`.
+    The batch is a dataclass with a tuple of ``cases``, such as
+    :class:`fecontact.sweeps.batch.Batch`.
     """
 
     function: Callable[[Any], Any]

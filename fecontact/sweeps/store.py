@@ -142,8 +142,8 @@ class Store:
                                  f"with --overwrite (overwrite=True).")
             elif not resume and self.kept("shards"):
                 raise InputError(f"{self.folder} holds a sweep; go on with --resume (resume=True), "
-                                 f"begin anew with --overwrite (overwrite=True), or choose another "
-                                 f"folder.")
+                                 f"start again with --overwrite (overwrite=True), or choose "
+                                 f"another folder.")
             yield
 
 

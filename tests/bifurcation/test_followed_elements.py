@@ -11,7 +11,13 @@ from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.elements import follow_elements
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated, series
 from fecontact.bifurcation.harmonic.starts import corrected, problem_for
-from fecontact.laws import IwanFriction, JenkinsFriction, LinearContact, PrescribedForce
+from fecontact.laws import (
+    Frictionless,
+    IwanFriction,
+    JenkinsFriction,
+    LinearContact,
+    PrescribedForce,
+)
 from fecontact.system.elastic_sliders import without_elements
 
 T, H = 5.0, 3
@@ -212,6 +218,24 @@ def start(field, harmonics, samples):
     problem = problem_for(field, field.values, 0, HarmonicBalance(harmonics, samples),
                           np.ones(field.dimension + 2))
     return problem, np.append(np.zeros(problem.size), field.values[0])
+
+
+def test_nodes_without_elements_have_no_deflection():
+    """Beside a node with two of them; whatever the room held before."""
+    rows = np.zeros((2, 3, 2))
+    rows[0, 0, 0] = rows[1, 0, 1] = 1.0
+    basis = fc.basis_from_matrices(np.eye(2), np.diag([1.0, 2.0]), {
+        "contact": {"one": rows[:1], "other": rows[1:]}, "B": rows[0], "C": rows[0]})
+    system = fc.ContactSystem(
+        basis, normal=CONSTANT, drive=fc.Drive(stiffness_x=1.0, amplitude_x=2.0,
+                                               frequency_hz=0.9 / TURN),
+        friction={"one": IwanFriction(0.5, 0.5, elements=2), "other": Frictionless()})
+    problem, u = start(contact_field(system, ["drive.frequency_hz"]), 2, 32)
+    problem.equations(float(u[-1])).room.z[:] = np.nan
+    z = problem.linearise(u).memory
+    assert z.shape == (32, 4)
+    assert np.isfinite(z).all()
+    assert not z[:, 2:].any()
 
 
 def test_multipliers_by_hills_matrix_know_the_elements():

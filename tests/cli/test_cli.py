@@ -420,7 +420,7 @@ def test_an_interrupted_run_is_resumed(cli, study, monkeypatch, tmp_path):
     kept = checkpoint.read_bytes()
     code, _, err = cli("run", study, *longer)
     assert (code, err) == (1, f"error: {checkpoint} holds an interrupted run; go on with --resume, "
-                              f"begin anew with --overwrite, or choose another folder with -o.\n")
+                              f"start again with --overwrite, or choose another folder with -o.\n")
     assert cli("run", study, "--resume", "--overwrite")[0] == 1
     assert checkpoint.read_bytes() == kept
     assert cli("run", study, *longer, "--resume")[0] == 0

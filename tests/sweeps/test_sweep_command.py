@@ -68,7 +68,7 @@ def test_a_sweep_of_a_study_file(cli, tmp_path):
         "amplitude_x.png", "stick_fraction.png", "own-py-failing.png"}
     code, out, err = cli("sweep", study, "--set", "simulation.t_end=0.05")
     assert code == 1
-    assert err == (f"error: {folder} holds a sweep; go on with --resume (resume=True), begin anew "
+    assert err == (f"error: {folder} holds a sweep; go on with --resume (resume=True), start again "
                    f"with --overwrite (overwrite=True), or choose another folder.\n")
     assert cli("sweep", study, "--set", "simulation.t_end=0.05", "--resume")[0] == 0
     assert len(read_table(folder / "index.csv")) == 24

@@ -198,6 +198,7 @@ def element_forces(X, T, s, laws, elements, offsets, values, derivatives, r, z, 
     states = len(offsets) // len(elements)
     done, by_period = 1, False
     r[:, :] = 0.0
+    z[:, :] = 0.0
     for j in range(len(elements)):
         if elements[j] == 0:
             continue

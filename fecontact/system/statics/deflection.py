@@ -141,10 +141,8 @@ def deflection_path(
     ----------
     body : ElasticBody
         With supports against all rigid motions.
-    load : Load
+    load, points, time : Load, mapping, float
         As of :func:`~fecontact.static_solution`. Forces keep their directions.
-    points, time : mapping, float
-        As of :func:`~fecontact.static_solution`.
     follower : bool
         True if pressures on boundaries act normal to the deformed outline, on its deformed size.
     steps : DeflectionSteps, optional
@@ -164,9 +162,8 @@ def deflection_path(
     Warns
     -----
     ModelWarning
-        If the whole load was not reached, for strains above 1 %, for distributing couplings that
-        turn by more than 0.1 rad, and for nodes of a hinge or kinematic coupling that turns and
-        that another constraint or support holds too.
+        If the whole load was not reached, for strains above 1 %, distributing couplings that turn
+        by more than 0.1 rad, and nodes of turning couplings that are held by something else too.
     """
     require_kind("deflection_path", ElasticBody, body=body)
     require_kind("deflection_path", Load, load=load)
