@@ -304,8 +304,8 @@ def run(
         if overwrite:
             checkpoint.unlink(missing_ok=True)
         elif checkpoint.exists() and not resume:
-            raise InputError(f"{checkpoint} holds an interrupted run; go on with --resume, begin "
-                             f"anew with --overwrite, or choose another folder with -o.")
+            raise InputError(f"{checkpoint} holds an interrupted run; go on with --resume, start "
+                             f"again with --overwrite, or choose another folder with -o.")
         elif resume and not checkpoint.exists():
             raise InputError(f"There is no interrupted run to go on with: {checkpoint} does not "
                              f"exist; run the study without --resume.")
