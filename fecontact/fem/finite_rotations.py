@@ -129,7 +129,7 @@ def _in_space_rows(rows: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class FiniteRotations:
-    """What finite rotations add to displacements that meet the linear equations of a body.
+    """Displacements by finite rotations beyond those of the linear equations of a body.
 
     Attributes
     ----------

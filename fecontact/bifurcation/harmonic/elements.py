@@ -84,7 +84,7 @@ def _pressing_of(j, X, T, values, s, derivatives, series, moved, pressing, slope
 
 @routine
 def _along_one_tangent(j, X, T, s, count, offsets, values, derivatives, r, z, rows):
-    """As :func:`element_forces`, for the ``count`` elements of a node of a plane body."""
+    """Forces of the ``count`` elements of a node of a plane body; see :func:`element_forces`."""
     N, L = values.shape
     series, moved, pressing = np.empty((2, L)), np.empty((N, 4)), np.empty(N)
     slopes, nothing = np.zeros((N, 2 * L)), np.empty((0, 2 * L))
@@ -125,7 +125,7 @@ def _along_one_tangent(j, X, T, s, count, offsets, values, derivatives, r, z, ro
 
 @routine
 def _along_two_tangents(j, X, T, s, count, offsets, values, derivatives, r, z, rows):
-    """As :func:`element_forces`, for the ``count`` elements of a node in space, marched."""
+    """Forces of the ``count`` elements of a node in space, marched; see :func:`element_forces`."""
     N, L = values.shape
     series, moved, pressing = np.empty((3, L)), np.empty((N, 6)), np.empty(N)
     slopes = np.zeros((N, 3 * L))
