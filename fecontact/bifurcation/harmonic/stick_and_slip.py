@@ -86,7 +86,7 @@ def _change(path, k, ratio, z, side, locate, s):
 
 @helper
 def _advance(path, k, ratio, z, side, locate, s):
-    """The same as :func:`_change`, without its call where nothing begins or ends."""
+    """Results of :func:`_change`, found at once where nothing begins or ends."""
     limit = ratio * path.end_pressing[k]
     if side == 0.0:
         ahead = z + path.moved[k]
