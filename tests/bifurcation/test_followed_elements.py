@@ -12,6 +12,7 @@ from fecontact.bifurcation.harmonic.elements import follow_elements
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated, series
 from fecontact.bifurcation.harmonic.starts import corrected, problem_for
 from fecontact.laws import (
+    DahlFriction,
     Frictionless,
     IwanFriction,
     JenkinsFriction,
@@ -236,6 +237,26 @@ def test_nodes_without_elements_have_no_deflection():
     assert z.shape == (32, 4)
     assert np.isfinite(z).all()
     assert not z[:, 2:].any()
+
+
+def test_nodes_with_elements_stand_beside_nodes_with_bristles():
+    """Both are marched then; against a run in time."""
+    rows = np.zeros((2, 3, 2))
+    rows[0, 0, 0] = rows[1, 0, 1] = 1.0
+    basis = fc.basis_from_matrices(np.eye(2), [[1.5, -0.5], [-0.5, 1.5]], {
+        "contact": {"one": rows[:1], "other": rows[1:]}, "B": rows[0], "C": rows[0]})
+    system = fc.ContactSystem(
+        basis, normal=CONSTANT,
+        friction={"one": DahlFriction(0.5, 1.0), "other": JenkinsFriction(0.5, 0.3)},
+        drive=fc.Drive(stiffness_x=1.0, damping_x=0.1, amplitude_x=2.0, frequency_hz=0.9 / TURN))
+    problem, u = corrected(*start(contact_field(system, ["drive.frequency_hz"]), 9, 512))
+    period = TURN / 0.9
+    settled = fc.simulate(system, 60.0 * period, rtol=1e-9, outputs=np.array([0.0, 60.0 * period]))
+    run = fc.simulate(system, period, initial=settled.states[-1], rtol=1e-9, outputs=513)
+    x = problem.linearise(u).states
+    assert x[:, :2] == pytest.approx(run.states[:-1, :2], abs=4e-3)
+    assert x[:, 4:] == pytest.approx(run.states[:-1, 4:], abs=2e-2)
+    assert np.ptp(x[:, 4:], axis=0).min() > 0.5
 
 
 def test_multipliers_by_hills_matrix_know_the_elements():

@@ -339,7 +339,7 @@ class Linearised:
 
     @cached_property
     def rates(self) -> Array:
-        """Rates f (N, d) at the samples, without those of elements that are followed one by one."""
+        """Rates f at the samples, with all friction; elements followed one by one have none."""
         if "derivatives" in self.__dict__:
             found = self.derivatives[0]
         else:
