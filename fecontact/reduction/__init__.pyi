@@ -17,9 +17,11 @@ from .eigenmodes import eigenfrequencies_hz
 from .from_modes import Normalisation, normalisation
 from .large_deflections.forces import LargeDeflectionForces
 from .large_deflections.options import LargeDeflections
+from .matrix_files.nastran import grid_places
 from .mode_shapes import BodyPart, ModeShapes, NonlinearStress, ReductionQuality
 from .point_masses import point_masses
 from .polynomial_stiffness import polynomial_stiffness
+from .recovery import Recovery
 from .reduce_body import reduce_bodies
 from .report import BasisReport
 from .restriction import rows_from_dofs
@@ -49,6 +51,7 @@ __all__ = [
     "PlaySpring",
     "PointPairing",
     "PolynomialSpring",
+    "Recovery",
     "ReductionQuality",
     "SectorModes",
     "SectorRotation",
@@ -61,6 +64,7 @@ __all__ = [
     "bodies_convergence",
     "cyclic_basis",
     "eigenfrequencies_hz",
+    "grid_places",
     "interface_compliance",
     "linked",
     "mode_convergence",

@@ -7,13 +7,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.checks import as_floats, require_flags
+from fecontact.core.checks import as_floats, require_flags, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, fixed_signs, free_modes
 from fecontact.reduction.matrix_files import AssembledMatrix
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.recovery import Recovery
 from fecontact.reduction.restriction import Restriction, stack_restriction
 from fecontact.reduction.static_modes.null_space import (
     lowest_vectors,
@@ -68,6 +69,7 @@ def basis_from_matrices(
     dimension: Literal[2, 3] = 2,
     contact_places: ArrayLike | None = None,
     symmetric: bool = True,
+    recovery: Recovery | None = None,
 ) -> ModalBasis:
     """Modal basis of given matrices, for bodies meshed elsewhere or chains of masses.
 
@@ -98,12 +100,12 @@ def basis_from_matrices(
     thickness : float, optional
         Out-of-plane thickness of the contact face [m], for pressures; not in space.
     translations : (2, d) array, in space (3, d), optional
-        The degrees of freedom in unit translations of the whole body, fixed ones too; needed for
-        gravity and base acceleration.
+        The degrees of freedom in unit translations, fixed ones too; for gravity and base motion.
     dimension : 2 or 3
-        3 for space.
     symmetric : bool
         False allows a stiffness with a skew (circulatory) part above 1e-10 of its largest entry.
+    recovery : Recovery, optional
+        Displacements of a body's nodes, where the points of the basis then lie, for pictures.
 
     Raises
     ------
@@ -119,6 +121,7 @@ def basis_from_matrices(
     C = _damping_matrix(damping, M)
     given = stack_restriction(rows, d, dimension)
     inertia = inertia_of(M.matrix, translations, dimension)
+    check_recovery(recovery, d, dimension)
     held = K.matrix.diagonal() >= _HELD
     if held.all():
         raise InputError(f"{K.name} holds every degree of freedom (entries of 1e35 or more).")
@@ -127,13 +130,14 @@ def basis_from_matrices(
         given = replace(given, restriction=given.restriction[:, ~held])
         C = None if C is None else C[~held][:, ~held]
         inertia = None if inertia is None else inertia[~held]
+        recovery = None if recovery is None else recovery.without(held)
         d = M.matrix.shape[0]
     M, (K, skew) = _symmetric(M), _parts(_symmetric(K, _DECLARE) if symmetric else K)
     _require_positive_mass(M)
     w, shapes = _modes(K, M, _count(modes, d), rigid)
     return basis_of_modes(
         w, shapes, given, contact_x=contact_x, contact_places=contact_places,
-        tributary=tributary, thickness=thickness, inertia=inertia,
+        tributary=tributary, thickness=thickness, inertia=inertia, recovery=recovery,
         stiffness=None if skew is None else np.diag(w**2) + shapes.T @ (skew @ shapes),
         damping=damping if C is None else np.asarray(shapes.T @ (C @ shapes)))
 
@@ -142,19 +146,21 @@ def basis_of_modes(
     w: Array, shapes: Array, rows: Restriction, *, damping: Damping, contact_x: ArrayLike | None,
     tributary: ArrayLike | None, thickness: float | None, inertia: Array | None = None,
     stiffness: Array | None = None, contact_places: ArrayLike | None = None,
+    recovery: Recovery | None = None,
 ) -> ModalBasis:
-    """Modal basis of modes (d, m) without geometry, from rows of the points.
+    """Modal basis of modes (d, m) from rows of the points, without geometry but for a recovery.
 
     ``inertia`` (d, 2) are forces of unit accelerations in x and y, in space (d, 3), see
     :func:`inertia_of`.
     """
     n, dimension = rows.contact_nodes, rows.dimension
     T = np.asarray(rows.restriction @ shapes).reshape(-1, 3 * (dimension - 1), len(w))
-    positions = np.zeros((len(T), dimension))
-    if contact_places is None:
-        positions[2 : 2 + n, 0] = _per_node("contact_x", 0.0 if contact_x is None else contact_x, n)
-    else:
+    positions = np.zeros((len(T), dimension)) if recovery is None else recovery.places(
+        rows.restriction)
+    if contact_places is not None:
         positions[2 : 2 + n] = _places(contact_places, contact_x, n, dimension)
+    elif recovery is None or contact_x is not None:
+        positions[2 : 2 + n, 0] = _per_node("contact_x", 0.0 if contact_x is None else contact_x, n)
     return ModalBasis(
         angular_frequencies=w,
         damping=modal_damping(damping, w),
@@ -162,11 +168,23 @@ def basis_of_modes(
         positions=positions,
         tributary=_per_node("tributary", 1.0 / max(n, 1) if tributary is None else tributary, n),
         extra=rows.extra,
+        mode_shapes=None if recovery is None else recovery.mode_shapes(shapes, rows.restriction),
         groups=rows.groups,
         thickness=thickness,
         inertia_rows=None if inertia is None else inertia.T @ shapes,
         stiffness=stiffness,
     )
+
+
+def check_recovery(recovery: Recovery | None, dofs: int, dimension: int) -> None:
+    """Raise InputError for a recovery of another number of degrees of freedom, or dimension."""
+    require_kind("recovery", (Recovery, type(None)), recovery=recovery)
+    if recovery is None:
+        return
+    recovery.require_columns(dofs)
+    if recovery.body.dimension != dimension:
+        raise InputError(f"The body of the recovery has {recovery.body.dimension} dimensions; give "
+                         f"dimension={recovery.body.dimension}.")
 
 
 def inertia_of(mass: Any, translations: ArrayLike | None, dimension: int = 2) -> Array | None:

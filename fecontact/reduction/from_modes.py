@@ -11,8 +11,14 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh
 from fecontact.reduction.eigenmodes import fixed_signs
-from fecontact.reduction.from_matrices import basis_of_modes, given_matrix, inertia_of
+from fecontact.reduction.from_matrices import (
+    basis_of_modes,
+    check_recovery,
+    given_matrix,
+    inertia_of,
+)
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.recovery import Recovery
 from fecontact.reduction.restriction import stack_restriction
 
 # Mode shapes are often written with five or six digits.
@@ -97,6 +103,7 @@ def basis_from_modes(
     translations: ArrayLike | None = None,
     dimension: Literal[2, 3] = 2,
     contact_places: ArrayLike | None = None,
+    recovery: Recovery | None = None,
 ) -> ModalBasis:
     """Modal basis from computed or measured mode shapes.
 
@@ -120,7 +127,7 @@ def basis_from_modes(
         damping matrix of the mass-normalised shapes [1/s].
     orthogonality : float
         Largest accepted product ``|s_i^T M s_j|`` of two mass-normalised shapes.
-    contact_x, tributary, thickness, dimension, contact_places : optional
+    contact_x, tributary, thickness, dimension, contact_places, recovery : optional
         As for :func:`~fecontact.basis_from_matrices`.
     translations : (2, d) array, in space (3, d), optional
         Likewise; needs the mass matrix.
@@ -132,6 +139,7 @@ def basis_from_modes(
     """
     S = _shapes(shapes)
     d, m = S.shape
+    check_recovery(recovery, d, dimension)
     w = _frequencies(frequencies_hz, angular_frequencies, m)
     if (mass is None) == (modal_mass is None):
         raise InputError("Give either mass, the mass matrix, or modal_mass, the modal masses of "
@@ -163,7 +171,8 @@ def basis_from_modes(
     return basis_of_modes(
         w[order], (S * signs)[:, order], stack_restriction(rows, d, dimension),
         contact_x=contact_x, contact_places=contact_places, tributary=tributary,
-        thickness=thickness, damping=_reordered(damping, order, signs), inertia=inertia)
+        thickness=thickness, damping=_reordered(damping, order, signs), inertia=inertia,
+        recovery=recovery)
 
 
 def _shapes(shapes: ArrayLike) -> Array:

@@ -112,7 +112,7 @@ PART = substructure(STIFFNESS, MASS)
     ("a.pch", dmig("K", STIFFNESS, 9), r"'K' is of the form '9'; real square \(1\) and symmetric"),
     ("a.pch", dmig("K", STIFFNESS).replace("       6       2", "       6       4"), r"is complex"),
     ("a.pch", dmig("K", STIFFNESS).replace("2.000000000D+04", "2.0000000X0D+04", 1),
-     r"Card of line 3: '2\.0000000X0D\+04' is not a number of a DMIG"),
+     r"Card of line 3: '2\.0000000X0D\+04' is not a number\."),
     ("a.pch", "DMIG,K,0,6,1,,,,2\nDMIG,K,x,1,,5,1,1.\n", r"Card of line 2: 'x' is no number of"),
     ("a.pch", "DMIG,K,0,6,1,,,,2\n", r"The matrix 'K' has no columns"),
     ("a.pch", "DMIG,K,0,1,1,,,,2\nDMIG,K,5,1,,5,1,1.,,\n+,5,1,2.\n", r"gives an entry a second"),

@@ -20,6 +20,14 @@ from fecontact.reduction.matrix_files.nastran import read_dmig, read_op2, read_o
 from fecontact.reduction.matrix_files.substructure import HEADING, read_substructure
 
 _BANNER = b"%%MatrixMarket"
+# Suffixes of files that hold matrices, but that no library reads, and what to do instead.
+_UNREAD = {
+    ".sub": "superelements of Ansys (.sub) are not read; write them as Matrix Market in Ansys, by "
+            "*DMAT,K,D,IMPORT,SUB,NAME.sub,STIFF and *EXPORT,K,MMF,K.mtx (and with MASS for the "
+            "mass), or read the equations of the whole part (.full).",
+    ".fil": "results files of Abaqus (.fil) are not read; write matrices as text, by *SUBSTRUCTURE "
+            "MATRIX OUTPUT, OUTPUT FILE=USER DEFINED.",
+}
 
 
 @read_only_arrays
@@ -30,10 +38,10 @@ class AssembledMatrix:
     Attributes
     ----------
     matrix : (d, d) array or sparse array
-        In the units of the file.
-    labels : (d, 2) integer array or None
-        Node and direction (1, 2, 3: displacements; 4, 5, 6: rotations) of each degree of freedom;
-        None where the file does not name them.
+        In the units of the file. Recovery matrices and mode shapes are (k, d).
+    labels : (d, 2) or (k, 2) integer array or None
+        Node and direction (1, 2, 3: displacements; 4, 5, 6: rotations) of each row; None where the
+        file does not name them.
     source : str
         The file, for messages.
     """
@@ -71,8 +79,9 @@ def read_matrix(path: str | Path, name: str | None = None) -> AssembledMatrix:
     INPUT and of ``*SUBSTRUCTURE MATRIX OUTPUT`` (named STIFFNESS, MASS), and DMIG of Nastran's
     punch files (.pch, .dmig); the format of a .mtx file is found from its content. One triangle of
     a symmetric matrix suffices. By pyYeti (``fecontact[nastran]``) OUTPUT4 and OUTPUT2 of Nastran
-    (.op4, .op2): an external superelement (EXTSEOUT) has KXX and MXX in its OUTPUT4, and labels
-    if the punch file of the same name, .pch or .asm, lies beside it. By PyMAPDL's reader
+    (.op4, .op2): an external superelement (EXTSEOUT) has KXX and MXX in its OUTPUT4, in MUG1 the
+    displacements of the points that were asked for (see :class:`~fecontact.reduction.Recovery`),
+    and labels if the punch file of the same name, .pch or .asm, lies beside it. By PyMAPDL's reader
     (``fecontact[ansys]``) the equations of Ansys (.full; named STIFFNESS, MASS), without the
     degrees of freedom that are held.
 
@@ -94,6 +103,8 @@ def read_matrix(path: str | Path, name: str | None = None) -> AssembledMatrix:
     readers = {".mtx": _read_mtx, ".mm": _read_mtx, ".mat": _read_mat, ".npz": _read_npz,
                ".npy": _read_npy, ".pch": read_dmig, ".dmig": read_dmig, ".op4": read_op4,
                ".op2": read_op2, ".full": read_full}
+    if path.suffix.lower() in _UNREAD:
+        raise InputError(f"{path}: {_UNREAD[path.suffix.lower()]}")
     if path.suffix.lower() not in readers:
         raise InputError(f"{path}: matrices are not read from files of this kind; the suffixes "
                          f"that are: {', '.join(sorted(readers))}.")

@@ -7,7 +7,9 @@ are 8 or, after ``*``, 16 characters wide, or parted by commas.
 
 Files of OUTPUT4 (.op4) and OUTPUT2 (.op2) are read by pyYeti. They do not name the degrees of
 freedom; those of an external superelement are named by the card EXTRN of the file that Nastran
-punches beside it: points, each with digits of its components, 0 for scalar points.
+punches beside it: points, each with digits of its components, 0 for scalar points. Record 2 of the
+table DTI, TUG1 there names the rows of MUG1, which recovers displacements: type, point, number of
+components and first row, in turn.
 """
 
 from collections.abc import Iterator
@@ -16,9 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError
+from fecontact.core.checks import as_path, require_regular_file
+from fecontact.core.errors import InputError, require_positive
 from fecontact.core.extras import optional
-from fecontact.core.types import Integers
+from fecontact.core.types import Array, Integers
 from fecontact.reduction.matrix_files.names import chosen_name
 
 _SYMMETRIC, _SQUARE = "6", "1"
@@ -75,7 +78,7 @@ def read_dmig(path: Path, name: str | None) -> tuple[Any, Integers]:
 
 
 def read_op4(path: Path, name: str | None) -> tuple[Any, Integers | None]:
-    """Sparse matrix, and the labels (d, 2) of its degrees of freedom if a file beside has them.
+    """Sparse matrix, and the labels of its rows (k, 2) if a file beside has them.
 
     Raises
     ------
@@ -86,11 +89,17 @@ def read_op4(path: Path, name: str | None) -> tuple[Any, Integers | None]:
     """
     op4 = optional("pyyeti.nastran.op4", "Reading OUTPUT4 of Nastran")
     found = {key.upper(): matrix for key, matrix in op4.read(str(path), sparse=True).items()}
-    matrix = found[chosen_name(found, None if name is None else name.upper())]
+    chosen = chosen_name(found, None if name is None else name.upper())
+    matrix = found[chosen]
     for suffix in _PUNCHED:
         beside = path.with_suffix(suffix)
-        labels = _external(beside) if beside.is_file() else None
-        if labels is not None and matrix.shape == (len(labels), len(labels)):
+        if not beside.is_file():
+            continue
+        square = matrix.shape[0] == matrix.shape[1]
+        labels = _external(beside) if square else None
+        if labels is None or len(labels) != matrix.shape[0]:
+            labels = _recovered(beside, f"T{chosen[1:]}")
+        if labels is not None and len(labels) == matrix.shape[0]:
             return matrix, labels
     return matrix, None
 
@@ -114,6 +123,75 @@ def _external(path: Path) -> Integers | None:
                                                                      strict=True)
                          for digit in digits], np.int64)
     return None
+
+
+def _recovered(path: Path, table: str) -> Integers | None:
+    """Points and components (k, 2) of the rows of a recovery matrix; None without its table."""
+    for line, fields in _cards(path, "DTI"):
+        if [fields[0].upper(), fields[1]] != [table, "2"]:
+            continue
+        words = [word for word in fields[2:] if word]
+        words = [word for word in words if word not in ("TYPE", "ID", "COMP", "ROW", "ENDREC")]
+        if len(words) % 4:
+            raise InputError(f"Card DTI, {table}, 2 of line {line} of {path} has no groups of "
+                             f"type, point, components and row.")
+        numbers = np.array([_whole(line, word) for word in words], np.int64).reshape(-1, 4)
+        labels = [(point, one + 1) for _, point, count, _ in numbers.tolist()
+                  for one in range(count)]
+        starts = np.concatenate([[0], np.cumsum(numbers[:, 2])])[:-1] + 1
+        if (numbers[:, 3] != starts).any():
+            raise InputError(f"Card DTI, {table}, 2 of line {line} of {path} gives rows that do "
+                             f"not follow each other.")
+        return np.array(labels, np.int64).reshape(-1, 2)
+    return None
+
+
+def grid_places(path: str | Path, scale: float = 1.0) -> dict[int, Array]:
+    """Places of the grid points of a file of Nastran's, for :class:`~fecontact.reduction.Recovery`.
+
+    Cards GRID of bulk data and punch files, with fields of 8 or 16 characters or parted by commas.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    scale : float
+        Metres per unit of the file: 0.001 for millimetres.
+
+    Returns
+    -------
+    dict of int to (3,) array
+        Place of each point by its number [m].
+
+    Raises
+    ------
+    InputError
+        For a file without grid points, with a point twice at different places, and points whose
+        places or displacements are in local coordinate systems.
+    """
+    path = as_path(path, "grid points")
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file.")
+    require_regular_file(path, "grid points")
+    require_positive("grid_places", scale=scale)
+    found: dict[int, Array] = {}
+    try:
+        for line, fields in _cards(path, "GRID"):
+            number, system, *place, displaced = (fields + [""] * 6)[:6]
+            if {system or "0", displaced or "0"} != {"0"}:
+                raise InputError(f"Card of line {line}: point {number} is in the local coordinate "
+                                 f"system {displaced or system}; write places and displacements "
+                                 f"in the basic one.")
+            at = scale * np.array([_real(line, word or "0.0") for word in place])
+            point = _whole(line, number)
+            if np.abs(found.setdefault(point, at) - at).max() > 0.0:
+                raise InputError(f"Card of line {line}: point {point} is given a second time, at "
+                                 f"another place.")
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    if not found:
+        raise InputError(f"{path}: the file holds no cards GRID.")
+    return found
 
 
 def _column(line: int, fields: list[str]) -> Iterator[tuple[int, int, int, int, float]]:
@@ -179,4 +257,4 @@ def _real(line: int, word: str) -> float:
     try:
         return float(plain)
     except ValueError:
-        raise InputError(f"Card of line {line}: {word[:40]!r} is not a number of a DMIG.") from None
+        raise InputError(f"Card of line {line}: {word[:40]!r} is not a number.") from None

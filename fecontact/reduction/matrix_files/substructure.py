@@ -10,11 +10,13 @@ import re
 
 import numpy as np
 
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array, Integers
 from fecontact.reduction.matrix_files.names import chosen_name
 
 HEADING = "USER ELEMENT"
+# Matrices that are written as their upper triangles.
+_SQUARE = ("STIFFNESS", "MASS", "DAMPING", "VISCOUS DAMPING", "STRUCTURAL DAMPING")
 
 
 def read_substructure(text: str, name: str | None) -> tuple[Array, Integers]:
@@ -33,6 +35,10 @@ def read_substructure(text: str, name: str | None) -> tuple[Array, Integers]:
         raise InputError("The file of a substructure holds no *MATRIX; add MASS=YES, STIFFNESS=YES "
                          "to *SUBSTRUCTURE MATRIX OUTPUT.")
     chosen = chosen_name(matrices, None if name is None else name.upper())
+    if chosen not in _SQUARE:
+        raise InputError(f"The matrix '{chosen}' is none of {choices(_SQUARE)}; recovery matrices "
+                         f"of Abaqus are not read from this file, so give them to Recovery as an "
+                         f"array.")
     try:
         values = np.array([float(word) for line in matrices[chosen]
                            for word in line.replace(",", " ").split()])
