@@ -84,9 +84,8 @@ def basis_from_matrices(
         ``contact``: displacements x, y and rotation of the n contact nodes as linear functions of
         the d degrees of freedom, (n, 3, d), sparse (3 n, d) or n sparse (3, d); for several contact
         groups a mapping of their names to such rows; none for a body that touches nothing. ``B``,
-        ``C`` and further named points: dense or sparse (3, d); B and C default to zero. Two rows,
-        x and y, instead of three mean no rotation; in space six, or three. See
-        :func:`fecontact.reduction.rows_from_dofs`.
+        ``C`` and further named points: (3, d), zero by default. Two rows, x and y, mean no
+        rotation; in space six, or three. See :func:`fecontact.reduction.rows_from_dofs`.
     damping : float, (m,) sequence, Rayleigh, LossFactor or (d, d) array
         Ratios of the modes, factors, or the damping matrix in the given degrees of freedom [N s/m],
         whose skew part is gyroscopic.
@@ -102,8 +101,9 @@ def basis_from_matrices(
     translations : (2, d) array, in space (3, d), optional
         The degrees of freedom in unit translations, fixed ones too; for gravity and base motion.
     dimension : 2 or 3
+        3 for space.
     symmetric : bool
-        False allows a stiffness with a skew (circulatory) part above 1e-10 of its largest entry.
+        False allows a stiffness with a skew (circulatory) part above 1e-10 of the largest entry.
     recovery : Recovery, optional
         Displacements of a body's nodes, where the points of the basis then lie, for pictures.
 

@@ -122,8 +122,9 @@ class Recovery:
         if len(apart):
             at = ", ".join(f"{value:g}" for value in body.nodes[apart[0]])
             raise InputError(f"Recovery.of: {len(apart)} of the {len(body.nodes)} nodes of the "
-                             f"body have no point at their place, the first at ({at}) m; give places in "
-                             f"metres, and a body of degree=1 if its cells have no middle nodes.")
+                             f"body have no point at their place, the first at ({at}) m; give "
+                             f"places in metres, and a body of degree=1 if its cells have no "
+                             f"middle nodes.")
         row = {(node, way): k for k, (node, way) in enumerate(matrix.labels.tolist())}
         wanted = [(int(label), way) for label in labels[nearest] for way in range(1, d + 1)]
         missing = [one for one in wanted if one not in row]
