@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
+from fecontact.bifurcation.harmonic.engine_order import EngineOrder
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import (
     NonlinearMode,
     continued_mode,
@@ -38,7 +39,7 @@ def follow_mode(
     number: int, progress: Callable[[int], None] | None = None,
     earlier: NonlinearMode | None = None,
     keep: Callable[[NonlinearMode], object] | None = None,
-    preload: "LoadHistory | None" = None,
+    preload: "LoadHistory | None" = None, wave: EngineOrder | None = None,
 ) -> NonlinearMode:
     """Follow a nonlinear mode with harmonics and observed point of ``[response]``.
 
@@ -62,8 +63,11 @@ def follow_mode(
         Given what there is after each part, as interrupted.
     preload : LoadHistory, optional
         Whose end elements that never slide keep.
+    wave : EngineOrder, optional
+        The travelling wave of a wheel, of which the system is one sector.
     """
-    observe, method = observed_point(system, wanted), wanted.harmonic_balance()
+    observe = observed_point(system, wanted)
+    method = replace(wanted.harmonic_balance(), repeats=wave)
     parts = not method.refines
     mode = _whole_parts(earlier) if earlier is not None and parts else None
     while True:
@@ -73,7 +77,7 @@ def follow_mode(
         try:
             mode = (nonlinear_mode(system, amplitudes, number, observe=observe, method=method,
                                    options=options, preload=preload) if mode is None
-                    else continued_mode(system, mode, amplitudes, observe, options))
+                    else continued_mode(system, mode, amplitudes, observe, options, wave))
         except KeyboardInterrupt:
             if mode is None:
                 raise

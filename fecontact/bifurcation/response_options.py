@@ -64,6 +64,9 @@ class ResponseSettings:
     stability : 'transitions', 'Koopman-Hill' or 'none'
         How it is told whether orbits are stable; without it points take a fraction of the time and
         folds alone are found.
+    engine_order : int, optional
+        Of one sector of a wheel, ``[symmetry]``: forces reach sector s a time engine_order s T / N
+        later, and the wheel answers with a wave, by harmonic balance without stability.
     preload : bool
         Whether friction elements that never slide keep what ``[preload]`` has left in them;
         otherwise they have no deflection at rest.
@@ -96,6 +99,7 @@ class ResponseSettings:
     most_harmonics: int = 100
     sampling_tolerance: float | None = None
     stability: Literal["transitions", "Koopman-Hill", "none"] = "transitions"
+    engine_order: int | None = None
     preload: bool = False
     step: float = 0.01
     largest_step: float = 0.03
@@ -115,6 +119,7 @@ class ResponseSettings:
         self._check_amplitudes()
         _ = self.also_observed
         self._check_bounds()
+        self._check_engine_order()
         _ = self.harmonic_balance(), self.orbit_method()
 
     def _check_levels(self) -> None:
@@ -146,6 +151,21 @@ class ResponseSettings:
         if given and self.force == self.parameter:
             raise InputError(f"ResponseSettings: force names '{self.force}', over which the "
                              f"responses go; take another one.")
+
+    def _check_engine_order(self) -> None:
+        if self.engine_order is None:
+            return
+        if self.engine_order < 1:
+            raise InputError(f"ResponseSettings: engine_order = {self.engine_order} must be from 1 "
+                             f"to the number of sectors.")
+        for key, usual in (("method", "harmonic balance"), ("amplitudes", ())):
+            if (given := getattr(self, key)) != usual:
+                raise InputError(f"ResponseSettings: {key} = {given!r} and engine_order do not go "
+                                 f"together; leave {key} out.")
+        if self.stability == "Koopman-Hill":
+            raise InputError("ResponseSettings: stability = 'Koopman-Hill' is not known from one "
+                             "sector of a wheel, engine_order; leave it out, and see "
+                             "wheel_stability in Python.")
 
     def _check_bounds(self) -> None:
         if self.bounds is None:
@@ -217,7 +237,8 @@ class ResponseSettings:
         return HarmonicBalance(self.harmonics, self.samples, self.tolerance,
                                max(self.harmonics, most) if isinstance(self.harmonics, int)
                                else most,
-                               None if self.stability == "none" else self.stability,
+                               None if self.stability == "none" or self.engine_order is not None
+                               else self.stability,
                                self.sampling_tolerance)
 
     def options(self) -> "ContinuationOptions":

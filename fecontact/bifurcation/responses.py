@@ -9,9 +9,10 @@ import numpy as np
 from fecontact.analysis.histories import usual_component
 from fecontact.analysis.summaries import usual_point
 from fecontact.bifurcation.continuation.problem import BranchStatus, titled
+from fecontact.bifurcation.harmonic.engine_order import EngineOrder
 from fecontact.bifurcation.harmonic.response import FrequencyResponse, frequency_response
 from fecontact.bifurcation.nonlinear_modes.controlled_response import controlled_response
-from fecontact.core.errors import FecontactError
+from fecontact.core.errors import FecontactError, InputError, choices
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.response_options import ResponseSettings
@@ -44,6 +45,9 @@ def observed_point(
     """Point and component that are observed; InputError if these or further ones do not exist."""
     basis, point = system.basis, wanted.point
     if point is None:
+        if wanted.engine_order is not None:
+            raise InputError(f"ResponseSettings: point is missing, a named point of the sector; "
+                             f"choose from {choices(basis.extra)}.")
         point = usual_point(basis)
     component = wanted.component or usual_component(system)
     for seen in ((point, component), *wanted.also_observed):
@@ -56,7 +60,7 @@ def follow_responses(
     progress: Callable[[str, float], None] | None = None,
     earlier: FrequencyResponse | None = None,
     keep: Callable[[FrequencyResponse], object] | None = None,
-    preload: "LoadHistory | None" = None,
+    preload: "LoadHistory | None" = None, wave: EngineOrder | None = None,
 ) -> Responses:
     """Follow the responses at all levels, one after the other.
 
@@ -76,6 +80,8 @@ def follow_responses(
         Given what there is after each level.
     preload : LoadHistory, optional
         Whose end elements that never slide keep.
+    wave : EngineOrder, optional
+        The wave of a wheel, of which the system is one sector.
 
     Raises
     ------
@@ -104,7 +110,9 @@ def follow_responses(
                 found = frequency_response(
                     system, wanted.checked_bounds, wanted.parameter, observe=observe,
                     levels=None if name is None else {name: [value]},
-                    method=wanted.orbit_method(), options=options, start=start, preload=preload)
+                    method=wanted.orbit_method() if wave is None else replace(
+                        wanted.harmonic_balance(), repeats=wave),
+                    options=options, start=start, preload=preload)
         except KeyboardInterrupt:
             if result.response is None:
                 raise

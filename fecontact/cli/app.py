@@ -46,6 +46,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     turning.buckling,
     turning.campbell,
     turning.diameters,
+    turning.mistuning,
     study.preload,
     study.run,
     study.wear,

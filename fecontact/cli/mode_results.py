@@ -42,8 +42,8 @@ def follow_mode(
     from fecontact.core.tables import located
     from fecontact.output.files.branches import write_mode
 
-    wanted, system = study.response, study.system()
-    with located(f"{study.title}: [response]:"):
+    wanted, system, wave = study.response, study.system(), study.wave()
+    with located(f"{study.title}: [response]:", "ResponseSettings"):
         observe = observed_point(system, wanted)
     file = folder / f"{study.name}-mode-{number}.h5"
 
@@ -59,10 +59,11 @@ def follow_mode(
             preload = study.load_history() if wanted.preload else None
             with (progress_bar(f"Mode {number}", wanted.points) as tell,
                   located("--nonlinear:", "nonlinear_mode")):
-                mode = followed(system, wanted, amplitudes, number, tell, earlier, keep, preload)
+                mode = followed(system, wanted, amplitudes, number, tell, earlier, keep, preload,
+                                wave)
         assert mode is not None
         with waiting("Writing"):
-            files = write_mode_results(study, mode, observe, folder)
+            files = write_mode_results(study, mode, observe, folder, page=wave is None)
     echo(f"\nnonlinear mode {number}: {mode.branch.end}")
     if mode.branch.message:
         echo(f"note: {mode.branch.message}")
@@ -105,7 +106,8 @@ def _earlier(study: "Study", file: Path, amplitudes: tuple[float, float]) -> "No
 
 
 def write_mode_results(
-    study: "Study", mode: "NonlinearMode", observe: tuple[str | int, str], folder: Path
+    study: "Study", mode: "NonlinearMode", observe: tuple[str | int, str], folder: Path,
+    page: bool = True,
 ) -> list[Path]:
     """Write a nonlinear mode as HDF5, CSV, picture and page; returns the files."""
     from fecontact.core.files.atomic_write import write_text
@@ -115,12 +117,14 @@ def write_mode_results(
     from fecontact.study.study import with_given_keys
 
     system, text, name = study.system(), study.to_toml(), f"{study.name}-mode-{mode.number}"
-    files = [folder / f"{name}.{ending}" for ending in ("h5", "csv", "png", "html")]
+    files = [folder / f"{name}.{ending}" for ending in ("h5", "csv", "png")]
     write_mode(files[0], mode, system=system, study=text, root=study.folder)
     write_text(files[1], mode_csv(mode))
     plot_nonlinear_mode(mode, path=files[2])
-    report_modes(mode, system, files[3], observe=observe, study=with_given_keys(text),
-                 title=f"{study.name}, nonlinear mode {mode.number}")
+    if page:
+        files.append(report_modes(
+            mode, system, folder / f"{name}.html", observe=observe, study=with_given_keys(text),
+            title=f"{study.name}, nonlinear mode {mode.number}"))
     return files
 
 

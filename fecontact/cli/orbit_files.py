@@ -72,6 +72,7 @@ def stored_orbit_or_run(
 
     named, model = read_branches(file), read_model(file, trust)
     warn_of_changed_files(file)
+    _require_no_wave(file, named)
     name, branch = _branch(file, named, choice.branch)
     point, run = _motion(file, branch, model, choice)
     settings = _settings(model)
@@ -81,6 +82,13 @@ def stored_orbit_or_run(
                  else f"{branch.parameter_name} = {point.parameter:.5g}, ")
         settings = replace(settings, title=f"{_called(name, branch)}{place}{1.0 / period:.5g} Hz")
     return StoredRun(file, run, settings, True, model.study, model.versions)
+
+
+def _require_no_wave(file: Path, named: "dict[str, Branch]") -> None:
+    """Raise InputError for waves of a wheel, whose orbits need its sector."""
+    if any("engine_order" in branch.attributes for branch in named.values()):
+        raise InputError(f"{file} holds waves of a wheel, whose motion is not that of one body; "
+                         f"fecontact plot draws them, and fecontact response --movie the wheel.")
 
 
 def _motion(
@@ -179,6 +187,7 @@ def write_orbit_page(file: Path, target: Path, trust: bool) -> Path:
 
     named, model = read_branches(file), read_model(file, trust)
     warn_of_changed_files(file)
+    _require_no_wave(file, named)
     first = next(iter(named.values()))
     title = file.stem.removesuffix("-branch").removesuffix("-response")
     if "observed" in first.attributes:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fecontact.bifurcation.fields.contact_field import contact_field
+from fecontact.bifurcation.harmonic.engine_order import EngineOrder, WaveField
 from fecontact.bifurcation.harmonic.response import FrequencyResponse
 from fecontact.core.files.atomic_write import write_text
 from fecontact.core.files.csv_text import csv_text
@@ -36,10 +38,12 @@ def keep_response(study: "Study", response: FrequencyResponse, folder: Path) -> 
 
 def write_response_results(
     study: "Study", response: FrequencyResponse, observe: tuple[str | int, str], folder: Path,
+    wave: EngineOrder | None = None,
 ) -> list[Path]:
     """Write a response as HDF5, CSV, picture and page; returns the files.
 
-    Points above the frequency up to which the basis is usable are marked.
+    The wave of a wheel has no page. Points above the frequency up to which the basis is usable are
+    marked.
     """
     from fecontact.output.plots.responses.response import plot_response
     from fecontact.output.report.response_report import report_response
@@ -47,14 +51,36 @@ def write_response_results(
 
     name = f"{study.name}-response"
     files = [keep_response(study, response, folder),
-             *(folder / f"{name}.{ending}" for ending in ("csv", "png", "html"))]
-    usable = study.usable_hz
-    also = [response.of(study.system(), seen) for seen in study.response.also_observed]
+             *(folder / f"{name}.{ending}" for ending in ("csv", "png"))]
+    usable, seen_by = study.usable_hz, study.system() if wave is None else wave_field(
+        study, response, wave)
+    also = [response.of(seen_by, seen) for seen in study.response.also_observed]
     write_text(files[1], response_csv(response, usable, also))
     plot_response(response, usable_hz=usable, path=files[2])
-    report_response(response, study.system(), files[3], observe=observe, title=study.name,
-                    study=with_given_keys(study.to_toml()), usable_hz=usable)
+    if wave is None:
+        files.append(report_response(
+            response, study.system(), folder / f"{name}.html", observe=observe, title=study.name,
+            study=with_given_keys(study.to_toml()), usable_hz=usable))
     return files
+
+
+def wave_field(study: "Study", response: FrequencyResponse, wave: EngineOrder) -> WaveField:
+    """The field of the wave to which the points of a response belong."""
+    names = response.branches[0].attributes.get("parameter_names", [response.parameter_name])
+    return wave.field(contact_field(study.system(), dict.fromkeys(map(str, names))))
+
+
+def write_wheel_movie(
+    study: "Study", response: FrequencyResponse, wave: EngineOrder, folder: Path
+) -> Path:
+    """Draw the whole wheel at the peak of the last response."""
+    from fecontact.bifurcation.harmonic.wheel_orbits import wheel_motion
+    from fecontact.output.render.wheel_movie import render_wheel
+
+    point = response.peak(len(response.branches) - 1)
+    motion = wheel_motion(wave_field(study, response, wave), point)
+    return render_wheel(motion, folder / f"{study.name}-wheel.mp4", fps=study.render.fps,
+                        progress=True)
 
 
 def response_csv(

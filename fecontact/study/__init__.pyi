@@ -13,6 +13,7 @@ from .sections import (
     SimulationSettings,
     WearSettings,
 )
+from .sector_section import MistuningSettings
 from .sweep_section import Distribution, Span, Strobing, SweepSettings
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "InterfaceSettings",
     "MaterialSettings",
     "MeshFile",
+    "MistuningSettings",
     "OutputSettings",
     "Placement",
     "PreloadSettings",

@@ -20,6 +20,7 @@ from fecontact.core.tables import (
 )
 from fecontact.core.types import Array, Coordinates
 from fecontact.core.units import Unit
+from fecontact.fem.cyclic_symmetry import NEXT, CyclicSymmetry
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.pairing import Pairing, TwoPassPairing, pair_both_faces, pair_faces
@@ -96,9 +97,12 @@ class BodyBasisSettings(BasisSettings):
         the points of these names of the only mesh that has them.
     reduction : 'vibration', 'residual' or 'craig-bampton'
         Static shapes added to the vibration modes; by default those of forces at the interfaces.
+    rigid : bool
+        Whether the body is rigid; for bodies of one sector of a wheel, such as dampers.
     """
 
     reduction: Literal["vibration", "residual", "craig-bampton"] = "residual"
+    rigid: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -160,7 +164,8 @@ class InterfaceSettings:
         'BODY.BOUNDARY', one of the two faces; required for several bodies. The keys below are for
         several bodies only.
     other : str
-        'BODY.BOUNDARY' of the other face, or 'ground'.
+        'BODY.BOUNDARY' of the other face, or 'ground'; with ``[symmetry]`` also
+        'next_BODY.BOUNDARY' of the next sector.
     passes : 1 or 2
         One pass has contact nodes on one of the faces; two have them on both, which loads them more
         evenly. Totals refer to both passes together. For compliant laws, not on the ground and not
@@ -221,6 +226,10 @@ class Bodies(Protocol):
     @property
     def links(self) -> Mapping[str, LinkSettings]:
         """What joins them."""
+
+    @property
+    def symmetry(self) -> CyclicSymmetry | None:
+        """Wheel of which they are one sector."""
 
     @property
     def folder(self) -> Path:
@@ -285,6 +294,7 @@ def check_bodies(study: Bodies, title: str) -> None:
                              f"[bodies.NAME].")
         return
     _check_names(study, title)
+    _check_sector(study, title)
     touched: set[str] = set()
     for name, one in study.interfaces.items():
         where = f"{title}: [interfaces.{name}]"
@@ -299,7 +309,11 @@ def check_bodies(study: Bodies, title: str) -> None:
                 ground = " or 'ground'" if key == "other" else ""
                 raise InputError(f"{where}: {key} = {shown(face)} must be \"BODY.BOUNDARY\""
                                  f"{ground}; the bodies are: {choices(study.bodies)}.")
+            if key == "other" and study.symmetry is not None:
+                body = body.removeprefix(NEXT)
             touched.add(_known_body(body, study.bodies, f"{where}: {key} = {shown(face)}"))
+    if study.symmetry is not None:
+        return
     for name, link in study.links.items():
         for key, point in (("first", link.first), ("second", link.second)):
             if point is None:
@@ -315,6 +329,18 @@ def check_bodies(study: Bodies, title: str) -> None:
         raise InputError(f"{title}: no interface and no link touches the "
                          f"{'body' if len(loose) == 1 else 'bodies'} {choices(loose)}; name a face "
                          f"of each in [interfaces.NAME], or leave it out.")
+
+
+def _check_sector(study: Bodies, title: str) -> None:
+    """Refuse links in a sector of a wheel, and what only sectors have in other studies."""
+    if study.symmetry is not None and study.links:
+        raise InputError(f"{title} has [links], which one sector of a wheel does not take; let "
+                         f"bodies touch in [interfaces.NAME], or model them as one.")
+    for name, one in study.bodies.items():
+        if one.basis.rigid and study.symmetry is None:
+            raise InputError(f"{title}: [bodies.{name}.basis]: rigid = true is for one sector of a "
+                             f"wheel, [symmetry]; take reduction = \"vibration\" with the rigid "
+                             f"modes alone.")
 
 
 def _check_names(study: Bodies, title: str) -> None:
@@ -368,9 +394,6 @@ def elastic_bodies(study: Bodies, meshes: Mapping[str, Mesh], title: str) -> dic
     found = {}
     for name, one in study.bodies.items():
         with located(f"{title}: [bodies.{name}.body]:", "ElasticBody"):
-            if one.body.symmetry is not None:
-                raise InputError("symmetry is for a single body, one sector of a wheel; leave it "
-                                 "out.")
             found[name] = one.body.elastic_body(meshes[name])
     return found
 

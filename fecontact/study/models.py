@@ -6,12 +6,19 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
+from fecontact.bifurcation.harmonic.engine_order import EngineOrder
+from fecontact.bifurcation.response_options import ResponseSettings
 from fecontact.core.errors import InputError, choices
 from fecontact.core.tables import located
+from fecontact.fem.cyclic_symmetry import CyclicSymmetry, sector_nodes
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.pairing import Pairing, TwoPassPairing
-from fecontact.laws.excitation import Load
+from fecontact.fem.rotation import Rotation
+from fecontact.laws.excitation import Drive, Load
+from fecontact.reduction.cyclic.cyclic_basis import CyclicBasis
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.report import usable_hz
 from fecontact.study.bodies_section import (
@@ -27,6 +34,13 @@ from fecontact.study.bodies_section import (
 from fecontact.study.geometry_section import Geometry, geometry_mesh
 from fecontact.study.links_section import LinkSettings
 from fecontact.study.sections import BasisSettings, BodySettings
+from fecontact.study.sector_section import (
+    MistuningSettings,
+    diameters_of,
+    sector_basis,
+    usable_of_sector,
+    wave_of,
+)
 
 # Cached objects of a study, and that on which each depends.
 _MADE_FROM: Mapping[str, Callable[["StudyModels"], Any]] = {
@@ -37,11 +51,13 @@ _MADE_FROM: Mapping[str, Callable[["StudyModels"], Any]] = {
     "_bodies": lambda study: {
         name: (one.geometry, one.placement, one.body) for name, one in study.bodies.items()},
     "_pairings": lambda study: (_MADE_FROM["_bodies"](study), {
-        name: one.pairing_keys for name, one in study.interfaces.items()}),
+        name: one.pairing_keys for name, one in study.interfaces.items()}, study.symmetry),
+    "_wheel": lambda study: (study.bodies, study.symmetry, diameters_of(study), study.drive,
+                             _MADE_FROM["_pairings"](study)),
     "_bases": lambda study: (study.bodies, study.links, _MADE_FROM["_pairings"](study)),
     "_reduced": lambda study: (study.geometry, study.body, study.basis,
                                study.load if study.basis.prestress else None,
-                               _MADE_FROM["_bases"](study)),
+                               _MADE_FROM["_bases"](study), _MADE_FROM["_wheel"](study)),
 }
 
 
@@ -55,6 +71,10 @@ class StudyModels:
     interfaces: Mapping[str, InterfaceSettings]
     links: Mapping[str, LinkSettings]
     load: Load
+    drive: Drive
+    response: ResponseSettings
+    symmetry: CyclicSymmetry | None
+    mistuning: MistuningSettings | None
     path: Path | None
 
     @property
@@ -121,11 +141,71 @@ class StudyModels:
     def modal_bases(self) -> dict[str, ModalBasis]:
         """Modal bases of several bodies by name."""
         self._require_several("modal_bases", "modal_basis")
+        self.require_no_sector("the modal bases of its bodies are by nodal diameters; use "
+                               "Study.cyclic_basis")
         return dict(self._bases)
+
+    def cyclic_basis(self) -> CyclicBasis:
+        """Modes of one sector of a wheel by nodal diameters, those that ``[response]`` needs."""
+        if self.symmetry is None:
+            raise InputError(f"{self.title} lacks the section [symmetry], which makes its bodies "
+                             f"one sector of a wheel.")
+        self._require_bodies_of_sector()
+        return self._wheel
+
+    def wave(self) -> EngineOrder | None:
+        """The wave of the engine order of ``[response]``; None without ``[symmetry]``.
+
+        Raises
+        ------
+        InputError
+            For an engine order without a sector, or a sector without one.
+        """
+        if self.symmetry is None and self.response.engine_order is None:
+            return None
+        if self.symmetry is None:
+            raise InputError(f"{self.title}: [response]: engine_order = "
+                             f"{self.response.engine_order} is for one sector of a wheel; describe "
+                             f"it in [symmetry], or leave engine_order out.")
+        return wave_of(self, self.cyclic_basis(), self.title)
+
+    def body_between_sectors(self) -> tuple[ElasticBody, Rotation | None]:
+        """The body that goes on into its neighbours, and how it rotates.
+
+        Raises
+        ------
+        InputError
+            If none or several of the bodies have both boundaries of ``[symmetry]``.
+        """
+        assert self.symmetry is not None
+        if not self.bodies:
+            return self._body, self.body.rotation
+        faces = {self.symmetry.low, self.symmetry.high}
+        found = [name for name, one in self._bodies.items() if faces <= set(one.mesh.boundaries)]
+        if len(found) != 1:
+            known = sorted({face for one in self._bodies.values() for face in one.mesh.boundaries})
+            raise InputError(f"{self.title}: [symmetry]: {len(found) or 'none'} of the bodies has "
+                             f"both boundaries {choices(sorted(faces))}, at which sectors meet; "
+                             f"one must, the boundaries are {choices(known)}.")
+        return self._bodies[found[0]], self.bodies[found[0]].body.rotation
+
+    def _require_bodies_of_sector(self) -> None:
+        if not self.bodies:
+            raise InputError(f"{self.title}: [symmetry] of a single body is for `fecontact "
+                             f"diameters`; describe the sector in [bodies.NAME], also if it is one "
+                             f"body, or leave [symmetry] out to take the sector alone.")
+
+    def require_no_sector(self, reason: str) -> None:
+        """Raise InputError for one sector of a wheel."""
+        if self.symmetry is not None:
+            raise InputError(f"{self.title}: [symmetry] makes the bodies one sector of a wheel: "
+                             f"{reason}, or leave the section out to take the sector alone.")
 
     @property
     def usable_hz(self) -> float:
         """Lowest frequency up to which the modal bases of the bodies are usable [Hz]."""
+        if self.symmetry is not None:
+            return usable_of_sector(self, self._wheel)
         bases = self._bases.values() if self.bodies else [self._reduced.basis]
         return min(usable_hz(basis) for basis in bases)
 
@@ -188,7 +268,18 @@ class StudyModels:
 
     @cached_property
     def _pairings(self) -> dict[str, Pairing | TwoPassPairing]:
-        return pairings(self, self._bodies, self.title)
+        if self.symmetry is None:
+            return pairings(self, self._bodies, self.title)
+        body, _ = self.body_between_sectors()
+        with located(f"{self.title}: [symmetry]:", "CyclicSymmetry"):
+            # A wrong number of sectors is said before faces that do not meet for it.
+            sector_nodes(body, self.symmetry)
+        return pairings(self, {**self._bodies, **self.symmetry.next_sector(self._bodies)},
+                        self.title)
+
+    @cached_property
+    def _wheel(self) -> CyclicBasis:
+        return sector_basis(self, self._bodies, self._pairings, self.title)
 
     @cached_property
     def _bases(self) -> dict[str, ModalBasis]:
@@ -196,13 +287,12 @@ class StudyModels:
 
     @cached_property
     def _reduced(self) -> Reduced:
+        if self.symmetry is not None:
+            self._require_bodies_of_sector()
+            return Reduced(self._wheel.basis, np.asarray(self._wheel.gaps))
         if self.bodies:
             return reduced_bodies(self._bases, self._pairings, self.links, self._bodies,
                                   self.title)
         body = self._body
-        if self.body.symmetry is not None:
-            raise InputError(f"{self.title}: [body.symmetry] makes the body one sector of a wheel, "
-                             f"whose modes `fecontact diameters` computes; leave it out to take "
-                             f"the sector alone.")
         with located(f"{self.title}: [basis]:"):
             return Reduced(self.basis.modal_basis(body, self.body.rotation, self.load))

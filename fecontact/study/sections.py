@@ -16,7 +16,6 @@ from fecontact.core.errors import (
 from fecontact.core.tables import convert_fields, located, plain, shown
 from fecontact.core.types import Coordinates
 from fecontact.core.units import Unit
-from fecontact.fem.cyclic_symmetry import CyclicSymmetry
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.material import AnyMaterial, Material
 from fecontact.fem.mesh import Mesh
@@ -69,8 +68,6 @@ class BodySettings:
     rotation : Rotation, optional
         ``[body.rotation]``: the body rotates at a constant speed about an axis, of a plane body
         about a point of its plane.
-    symmetry : CyclicSymmetry, optional
-        ``[body.symmetry]``: the body is one sector of a wheel, for ``fecontact diameters``.
     """
 
     material: str | None = None
@@ -84,7 +81,6 @@ class BodySettings:
     bricks: Literal["full", "incompatible"] | None = None
     fixed: Mapping[str, str] = field(default_factory=dict)
     rotation: Rotation | None = None
-    symmetry: CyclicSymmetry | None = None
 
     def __post_init__(self) -> None:
         convert_fields(self)

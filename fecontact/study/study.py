@@ -30,6 +30,7 @@ from fecontact.core.tables import (
     with_keys,
 )
 from fecontact.core.units import Summarised, listed, quantity
+from fecontact.fem.cyclic_symmetry import CyclicSymmetry
 from fecontact.integrate.events import ContactEvents
 from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.simulate import simulate
@@ -66,6 +67,7 @@ from fecontact.study.sections import (
     SimulationSettings,
     WearSettings,
 )
+from fecontact.study.sector_section import MistuningSettings
 from fecontact.study.sweep_section import SweepSettings, flat_axes
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.gap import Crown
@@ -76,12 +78,19 @@ from fecontact.system.quasistatic.history import LoadHistory
 # names, by names relative to its folder, and the keys that its file gives.
 _FILES, _KEYS_GIVEN = "# Content of files: ", "# Keys given: "
 
-NOT_OF_THE_RUN = ("output", "render", "sweep", "fit")
+NOT_OF_THE_RUN = ("output", "render", "sweep", "fit", "mistuning")
 
 _SECTIONS: Mapping[str, type] = {
     "body": BodySettings, "basis": BasisSettings, **PART_CLASSES,
     "simulation": SimulationSettings, "wear": WearSettings, "branch": BranchSettings,
     "response": ResponseSettings, "output": OutputSettings, "render": RenderSettings,
+}
+
+# Sections that a study may lack, and what makes their tables flat.
+_OPTIONAL: Mapping[str, tuple[type, Callable[[Any], Any]]] = {
+    "symmetry": (CyclicSymmetry, lambda table: table),
+    "preload": (PreloadSettings, lambda table: table), "sweep": (SweepSettings, flat_axes),
+    "fit": (FitSettings, flat_parameters), "mistuning": (MistuningSettings, lambda table: table),
 }
 
 
@@ -133,6 +142,10 @@ class Study(Summarised, StudyModels):
         ``[basis]``.
     links : mapping of name to link
         ``[links.NAME]``: what joins bodies at points or faces and does not open; ``kind = "weld"``.
+    symmetry : CyclicSymmetry or None
+        ``[symmetry]``: the body, or the bodies together, are one sector of a wheel.
+    mistuning : MistuningSettings or None
+        ``[mistuning]``: deviations of its blades.
     path : Path or None
         The study file; paths of other files are relative to it.
     content_hashes : mapping of name to str
@@ -160,6 +173,8 @@ class Study(Summarised, StudyModels):
     fit: FitSettings | None = None
     bodies: Mapping[str, BodySections] = field(default_factory=dict)
     links: Mapping[str, LinkSettings] = field(default_factory=dict)
+    symmetry: CyclicSymmetry | None = None
+    mistuning: MistuningSettings | None = None
     path: Path | None = field(default=None, compare=False)
     _keys: Mapping[str, Any] = field(default_factory=dict, compare=False)  # those of the file
     content_hashes: Mapping[str, str] = field(default_factory=dict, compare=False)
@@ -234,7 +249,7 @@ class Study(Summarised, StudyModels):
                                  f"interfaces stand in [interfaces.NAME.normal] and "
                                  f"[interfaces.NAME.friction].")
             if name not in (valid := ("gap", "geometry", "bodies", "interfaces", "links",
-                                      "preload", "sweep", "fit", *_SECTIONS)):
+                                      *_OPTIONAL, *_SECTIONS)):
                 raise InputError(f"{title} has an unknown section or key '{name}'"
                                  f"{nearest(name, valid)}; there are: {choices(valid)}.")
         if "bodies" in tables:
@@ -254,16 +269,12 @@ class Study(Summarised, StudyModels):
             gap=_gap(tables.get("gap", 0.0), title),
             interfaces=convert(tables.get("interfaces", {}), Mapping[str, InterfaceSettings], title,
                                "interfaces"),
-            sweep=from_table(SweepSettings, flat_axes(tables["sweep"]), f"{title}: [sweep]")
-            if "sweep" in tables else None,
-            fit=from_table(FitSettings, flat_parameters(tables["fit"]), f"{title}: [fit]")
-            if "fit" in tables else None,
-            preload=from_table(PreloadSettings, tables["preload"], f"{title}: [preload]")
-            if "preload" in tables else None,
             path=path, _keys=key_tree(tables),
             content_hashes=content_hashes(of_the_run(tables), folder),
             **{name: from_table(kind, tables.get(name, {}), f"{title}: [{name}]")
                for name, kind in _SECTIONS.items() if name in tables or name not in LAWS},
+            **{name: from_table(kind, flat(tables[name]), f"{title}: [{name}]")
+               for name, (kind, flat) in _OPTIONAL.items() if name in tables},
         )
         check_bodies(study, title)
         return study
@@ -312,7 +323,7 @@ class Study(Summarised, StudyModels):
         full = defaults and bool(self.bodies)
         interfaces = {"interfaces": {name: to_table(one, defaults=full) for name, one in
                                      self.interfaces.items()}} if self.interfaces else {}
-        for name in ("preload", "sweep", "fit"):
+        for name in _OPTIONAL:
             if getattr(self, name) is not None:
                 sections[name] = to_table(getattr(self, name), defaults=defaults)
         gap = {} if self.gap == 0.0 and not defaults else {"gap": plain(self.gap)}
@@ -413,6 +424,7 @@ class Study(Summarised, StudyModels):
         Solvers without checkpoints ignore ``checkpoint``. The file is kept after the run: remove
         it once the run is written. ``keep_steps`` takes the place of that of the study.
         """
+        self.require_no_sector("`fecontact response` computes its waves")
         settings, t_end, system = self.simulation, self.t_end, self.system()
         solver = settings.chosen_solver()
         if isinstance(solver, CompiledSolver):
@@ -438,6 +450,7 @@ class Study(Summarised, StudyModels):
 
         See :func:`fecontact.integrate.wear_history`.
         """
+        self.require_no_sector("`fecontact response` computes its waves")
         wanted, settings, title = self.wear, self.simulation, _title(self.path)
         if (law := wanted.law_if_any) is None:
             raise InputError(f"{title}: [wear] lacks the key 'coefficient', in m^3/J for law = "

@@ -9,9 +9,9 @@ from fecontact.cli import execute
 SECTOR = """
 geometry = { file = "sector.msh" }
 basis = { contact = [] }
+symmetry = { low = "bottom", high = "top", sectors = 5 }
 [body]
 thickness = 0.1
-symmetry = { low = "bottom", high = "top", sectors = 5 }
 """
 
 
@@ -38,7 +38,7 @@ def test_sectors_that_do_not_close_the_circle(tmp_path, capsys):
     path.write_text(SECTOR.replace("5", "6"))
     assert execute(["diameters", str(path)]) != 0
     message = capsys.readouterr().err
-    assert "[body.symmetry]" in message
+    assert "[symmetry]" in message
     assert "give sectors = 5" in message
     assert execute(["modes", str(path)]) != 0
     assert "fecontact diameters" in capsys.readouterr().err

@@ -56,6 +56,7 @@ def branch(
         write_branch_results,
     )
 
+    described.require_no_sector("`fecontact response` computes its waves")
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
             system, usable = described.system(), described.usable_hz

@@ -45,6 +45,8 @@ def response(
         help="Largest truncation error; overrides [response].")] = None,
     set_: Changes = None,
     output: Folder = None,
+    movie: Annotated[bool, Parameter(negative=(), help=(
+        "Draw the whole wheel at the peak of the last response, NAME-wheel.mp4."))] = False,
     resume: Annotated[bool, Parameter(
         negative=(), help="Go on with an interrupted response.")] = False,
 ) -> int:
@@ -54,6 +56,8 @@ def response(
     (NAME-response.h5, NAME-response.csv), a picture of amplitude and phase, and a page whose
     diagram plays the orbit of a point that is clicked (NAME-response.html). Each level is stored
     when it is done. Ctrl-C stops it; --resume goes on where it was.
+
+    With [symmetry] and an engine_order it is that of a whole wheel, from one sector, without page.
     """
     from fecontact.cli.run_files import read_study
     from fecontact.core.files.atomic_write import output_folder
@@ -76,6 +80,7 @@ def response(
         response_file,
         response_table,
         write_response_results,
+        write_wheel_movie,
     )
 
     with (output_folder(output or described.results) as folder,
@@ -83,18 +88,23 @@ def response(
                  f"Another response is writing {folder / described.name}-response.h5; wait for "
                  f"it, or choose another folder with -o.")):
         with waiting("Computing modes"):
-            system = described.system()
-        with located(f"{described.title}: [response]:"):
+            system, wave = described.system(), described.wave()
+        if movie and wave is None:
+            raise InputError("--movie is for a wheel, a study with [symmetry]; leave it out, and "
+                             "see fecontact render.")
+        with located(f"{described.title}: [response]:", "ResponseSettings"):
             observe = observed_point(system, wanted)
         earlier = _earlier(described, response_file(described, folder)) if resume else None
         with titled_bar() as progress:
             found = follow_responses(
                 system, wanted, progress, earlier,
                 lambda part: keep_response(described, part, folder),
-                described.load_history() if wanted.preload else None)
+                described.load_history() if wanted.preload else None, wave)
         assert found.response is not None
         with waiting("Writing"):
-            files = write_response_results(described, found.response, observe, folder)
+            files = write_response_results(described, found.response, observe, folder, wave)
+        if movie and wave is not None:
+            files.append(write_wheel_movie(described, found.response, wave, folder))
         show(response_table(found.response, described.usable_hz, system))
         echo_unresolved(found.response.branches)
         name = found.response.level_name

@@ -149,11 +149,13 @@ def modes(
     damping over the amplitude, is written (NAME-mode-N.h5, .csv), drawn (.png), and shown by a page
     whose points play the motion (.html); harmonics, the observed displacement and preload are those
     of [response]. It is stored as it grows; Ctrl-C stops it, --resume goes on where it was. With a
-    tolerance it is stored at the end only, and followed anew.
+    tolerance it is stored at the end only, and followed anew. With [symmetry] and an engine_order
+    the nonlinear mode is that of a travelling wave, without page.
     """
     import numpy as np
 
     from fecontact.cli.console import waiting
+    from fecontact.cli.mode_results import follow_mode
     from fecontact.cli.run_files import interfaces_of, read_study
     from fecontact.cli.tables import complex_table, compliance_table
     from fecontact.core.files.atomic_write import name_parts, output_folder
@@ -163,7 +165,12 @@ def modes(
     described = read_study(study, set_)
     from fecontact.output.plots.modes import plot_convergence, plot_modes
 
+    if nonlinear is None or movie is not None or complex_ or converge:
+        described.require_no_sector("`fecontact diameters` prints the modes of the wheel, "
+                                    "--nonlinear alone follows that of a travelling wave")
     with output_folder(output or described.results) as folder:
+        if described.symmetry is not None and nonlinear is not None:
+            return follow_mode(described, nonlinear, amplitudes, folder, resume)
         with waiting("Computing modes"):
             basis = described.reduced.basis
             bases = described.modal_bases() if described.bodies else {"": basis}
@@ -218,8 +225,6 @@ def modes(
                 raise InputError(f"{option} is for a nonlinear mode; add --nonlinear with its "
                                  f"number.")
             return 0
-        from fecontact.cli.mode_results import follow_mode
-
         return follow_mode(described, nonlinear, amplitudes, folder, resume)
 
 

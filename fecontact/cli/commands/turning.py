@@ -114,7 +114,7 @@ def diameters(
     set_: Changes = None,
     output: Folder = None,
 ) -> None:
-    """Frequencies of a wheel over its nodal diameters, from the sector of [body.symmetry].
+    """Frequencies of a wheel over its nodal diameters, from the sector of [symmetry].
 
     Writes NAME-diameters.png and .csv with the frequencies at rest, and draws the lowest elastic
     mode of each diameter over the whole wheel to NAME-wheel.png. With [body.rotation] it prints the
@@ -133,15 +133,15 @@ def diameters(
     from fecontact.reduction.sector_modes import sector_modes
 
     described = read_study(study, set_)
-    if described.bodies or described.body.symmetry is None:
+    if described.symmetry is None:
         raise InputError(f"{described.title}: diameters is for one sector of a wheel; describe it "
-                         f"in [geometry], [body] and [body.symmetry].")
+                         f"in [symmetry].")
+    body, rotation = described.body_between_sectors()
     with output_folder(output or described.results) as folder:
-        with waiting("Computing modes"), located(f"{described.title}: [body.symmetry]:",
+        with waiting("Computing modes"), located(f"{described.title}: [symmetry]:",
                                                  "CyclicSymmetry"):
-            turning = described.body.rotation
-            found = sector_modes(described.elastic_body(), described.body.symmetry, modes,
-                                 rotation=turning)
+            turning = rotation
+            found = sector_modes(body, described.symmetry, modes, rotation=turning)
         seen = {"frequencies [Hz]": found.frequencies_hz}
         if turning is not None and found.rotation is not None:
             at_speed = found.rotation.frequencies_hz(turning.speed)
@@ -162,4 +162,40 @@ def diameters(
         elastic = [(k, int(np.argmax(row > 0.0))) for k, row in zip(
             found.diameters, found.frequencies_hz, strict=True) if row.any()]
         plot_wheel(found, elastic[:12], path=files[2])
+        echo_written(*files)
+
+
+def mistuning(
+    study: StudyFile,
+    /,
+    *,
+    set_: Changes = None,
+    output: Folder = None,
+    resume: Annotated[bool, Parameter(
+        negative=(), help="Go on with random wheels; finished ones are not repeated.")] = False,
+    overwrite: Annotated[bool, Parameter(
+        negative=(), help="Remove finished wheels and start again.")] = False,
+    workers: Annotated[int | None, Parameter(
+        help="Processes on this machine; one per core by default.")] = None,
+) -> None:
+    """Amplification of the linear response of wheels whose blades differ, from [mistuning].
+
+    Engine order and range are those of [response], the force is the first of [[load.forces]].
+    Contact is left out. Random wheels give statistics, NAME-mistuning.csv with each wheel and a
+    picture; finished wheels are kept in NAME-mistuning. Measured deviations give the displacement
+    of each sector over the frequency.
+    """
+    from fecontact.cli.mistuning_results import measured_wheel, random_wheels
+    from fecontact.cli.run_files import read_study
+    from fecontact.core.files.atomic_write import output_folder
+
+    described = read_study(study, set_)
+    if described.mistuning is None:
+        raise InputError(f"{described.title} lacks the section [mistuning]; give the group of "
+                         f"cells that deviates and its spread, or measured deviations.")
+    with output_folder(output or described.results) as folder:
+        if described.mistuning.deviations:
+            files = measured_wheel(described, folder)
+        else:
+            files = random_wheels(described, folder, resume, overwrite, workers)
         echo_written(*files)

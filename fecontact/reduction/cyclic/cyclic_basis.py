@@ -174,7 +174,7 @@ def cyclic_basis(
     rigid: Sequence[str] = (),
     points: Mapping[str, Place] | None = None,
     loads: Sequence[str] = (),
-    damping: Damping = 0.0,
+    damping: Any = 0.0,
     diameters: Iterable[int] | str = "all",
     rotation: Rotation | None = None,
     prestress: Mapping[str, BodyFields] | None = None,
@@ -202,7 +202,7 @@ def cyclic_basis(
         Points for loads and results.
     loads : sequence of 'body.boundary'
         Boundaries on which pressures may vary in time.
-    damping : float, Rayleigh or LossFactor
+    damping : float, Rayleigh, LossFactor, or mapping of body to one of them
         Of all modes of all diameters; residual vectors are modes too.
     diameters : sequence of int or 'all'
         Nodal diameters up to N / 2; 0 is always there. Engine order m needs those of all h m.
@@ -228,13 +228,15 @@ def cyclic_basis(
     constant = {name: constant_forces(body, rotation, warm.get(name))
                 for name, body in bodies.items()}
     counts = modes if isinstance(modes, Mapping) else dict.fromkeys(bodies, modes)
+    dampings = damping if isinstance(damping, Mapping) else dict.fromkeys(bodies, damping)
     for name, body in bodies.items():
         require_kind(f"cyclic_basis: body '{name}'", ElasticBody, body=body)
         if "." in name or name.startswith(NEXT):
             raise InputError(f"cyclic_basis: the name '{name}' of a body must have no dot and not "
                              f"begin with '{NEXT}', which is for bodies of the next sector.")
-        if name not in counts:
-            raise InputError(f"cyclic_basis: modes lacks the body '{name}'.")
+        for what, values in (("modes", counts), ("damping", dampings)):
+            if name not in values:
+                raise InputError(f"cyclic_basis: {what} lacks the body '{name}'.")
     if not bodies:
         raise InputError("cyclic_basis: bodies is empty; give at least one.")
     separate = _without_boundaries(bodies, symmetry)
@@ -258,7 +260,7 @@ def cyclic_basis(
             _warn_beyond_divergence(name, parts[name])
     loaded = _loaded(bodies, loads)
     found = tuple(_diameter(k, {name: one[k] for name, one in parts.items()}, bodies, nodes,
-                            damping, loaded) for k in chosen)
+                            dampings, loaded) for k in chosen)
     first = found[0]
     m, w = len(first.stiffness), np.concatenate([one[0].w for one in parts.values()])
     load = np.concatenate([parts[name][0].shapes.real.T @ forces
@@ -407,7 +409,7 @@ def _separate_modes(
 
 def _diameter(
     k: int, parts: Mapping[str, _BodyModes], bodies: Mapping[str, ElasticBody], nodes: SectorRows,
-    damping: Damping, loaded: Sequence[tuple[str, Array]],
+    dampings: Mapping[str, Damping], loaded: Sequence[tuple[str, Array]],
 ) -> DiameterModes:
     """All bodies of one nodal diameter, one after the other."""
     from scipy.linalg import block_diag
@@ -429,5 +431,6 @@ def _diameter(
         first += len(one.w)
     return DiameterModes(
         k, block_diag(*(one.stiffness for one in parts.values())),
-        block_diag(*(modal_damping(damping, one.w) + one.turning for one in parts.values())),
+        block_diag(*(modal_damping(dampings[name], one.w) + one.turning
+                     for name, one in parts.items())),
         T, rows, shapes)
