@@ -7,7 +7,7 @@ stick: each mode of a blade feels the springs k_t of both contacts,
 
     4 k_t sin^2(pi m / N),
 
-and between slip and stick friction takes most. One blade with its neighbours stands for the wheel.
+and between slip and stick friction takes most. One blade stands for the wheel.
 
 Usage: python examples/bladed_wheel.py [FOLDER] [--quick]
 """
@@ -20,15 +20,19 @@ import numpy as np
 import fecontact as fc
 from fecontact.bifurcation import (
     ContinuationOptions,
+    EngineOrder,
     HarmonicBalance,
-    Repeats,
-    contact_field,
     frequency_response,
 )
 from fecontact.fem import CyclicSymmetry, Rotation
 from fecontact.laws import Harmonic, JenkinsFriction, PrescribedForce
 from fecontact.plot import COLOURS, new_figure, plot_diameters, plot_wheel
-from fecontact.reduction import PointPairing, sector_modes
+from fecontact.reduction import (
+    CyclicBasis,
+    PointPairing,
+    cyclic_basis_from_bases,
+    sector_modes,
+)
 
 N, ORDER, SPEED = 12, 4, 900.0  # sectors, engine order, rad/s
 INNER, OUTER, TIP = 0.175, 0.20, 0.32  # radii of the ring and of the tips [m]
@@ -57,25 +61,28 @@ def sector(columns: int = 8) -> fc.ElasticBody:
         "low": side(0), "high": side(columns)}), thickness=DEPTH)
 
 
-def blades(load: float, frequency_hz: float) -> fc.ContactSystem:
-    """A blade with its neighbours, pressed on each other at the tips [N]; no load: apart."""
+def blades() -> CyclicBasis:
+    """A wheel of blades that touch the next one at their tips."""
     mesh = fc.generate(fc.Beam(LENGTH, HEIGHT, 0.5 * HEIGHT))
     blade = fc.modal_basis(fc.ElasticBody(mesh, thickness=DEPTH, fixed={"left": "xy"}), 4,
                            contact=(), B="", C="", damping=2e-3,
                            points={"tip": (LENGTH, 0.5 * HEIGHT)})
-    joints = [fc.Interface(f"{a}-{b}", PointPairing(a, "tip", b, "tip", normals=(1.0, 0.0)),
-                           PrescribedForce(load), JenkinsFriction(TANGENTIAL, COEFFICIENT))
-              for a, b in (("before", "own"), ("own", "after"))]
+    return cyclic_basis_from_bases({"blade": blade}, N, {"tips": PointPairing(
+        "blade", "tip", "next_blade", "tip", normals=(1.0, 0.0))})
+
+
+def system(wheel: CyclicBasis, load: float, frequency_hz: float) -> fc.ContactSystem:
+    """The wheel with the tips pressed on each other [N]."""
     return fc.ContactSystem(
-        bodies=dict.fromkeys(("before", "own", "after"), blade), interfaces=joints,
-        load=fc.Load(forces=(fc.PointLoad("own.tip", "y", signal=Harmonic(
+        wheel.basis, normal=PrescribedForce(load),
+        friction=JenkinsFriction(TANGENTIAL, COEFFICIENT),
+        load=fc.Load(forces=(fc.PointLoad("blade.tip", "y", signal=Harmonic(
             FORCE, frequency_hz)),)))
 
 
-def stuck_hz() -> float:
+def stuck_hz(basis: fc.ModalBasis) -> float:
     """Frequency of a blade with the springs of both contacts, of the wave of the order."""
-    basis = blades(1.0, 1.0).basis.select(range(4))
-    row = basis.point_row("before.tip", "y")
+    row = basis.point_row("blade.tip", "y")
     stiffness = np.diag(basis.angular_frequencies**2) + (
         4.0 * TANGENTIAL * np.sin(np.pi * ORDER / N) ** 2 * np.outer(row, row))
     return float(np.sqrt(np.linalg.eigvalsh(stiffness)[0])) / (2.0 * np.pi)
@@ -95,21 +102,20 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
     plot_diameters(wheel, speed=SPEED, path=folder / "wheel_diameters.png")
     plot_wheel(wheel, [(2, 0), (4, 0), (6, 1)], path=folder / "wheel_modes.png")
 
-    free = blades(1.0, 1.0).basis.frequencies_hz.min()
-    stuck = stuck_hz()
+    tips = blades()
+    free, stuck = tips.basis.frequencies_hz.min(), stuck_hz(tips.basis)
     bounds = (0.93 * free, 1.04 * stuck)
-    method = HarmonicBalance([0, 1, 3], 12 * N, stability=None, repeats=Repeats(
-        "own", {"before": -ORDER / N, "after": ORDER / N}))
+    method = HarmonicBalance([0, 1, 3], 12 * N, stability=None, repeats=EngineOrder(
+        tips, ORDER))
     name = "load.forces.0.signal.frequency_hz"
     loads = np.array([1.0, 4.0, 1000.0]) if quick else np.array(
         [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 1000.0])
     with new_figure(7.0, 4.5, folder / "blade_tips.png") as figure:
         axes = figure.subplots()
         for load, colour in zip(loads, COLOURS, strict=False):
-            field = contact_field(blades(load, bounds[0]), [name])
-            found = frequency_response(field, bounds, name, observe=("own.tip", "y"),
-                                       method=method, options=ContinuationOptions(
-                                           points=1000, largest_step=0.1))
+            found = frequency_response(
+                system(tips, load, bounds[0]), bounds, name, observe=("blade.tip", "y"),
+                method=method, options=ContinuationOptions(points=1000, largest_step=0.03))
             peak = found.peak()
             print(f"{load:6.1f} N: peak {1e6 * found.amplitude().max():.2f} um at "
                   f"{peak.parameter:.2f} Hz")

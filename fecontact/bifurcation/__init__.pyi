@@ -25,7 +25,6 @@ from .fields import VectorField, vector_field
 from .fields.contact_field import ContactField, contact_field
 from .harmonic.engine_order import EngineOrder, WaveField
 from .harmonic.method import HarmonicBalance
-from .harmonic.repeats import Repeats
 from .harmonic.response import FrequencyResponse, frequency_response
 from .harmonic.wheel_orbits import (
     WheelMotion,
@@ -80,7 +79,6 @@ __all__ = [
     "PeriodDoublingPoint",
     "PeriodicMotion",
     "PoincareScan",
-    "Repeats",
     "Resonance",
     "ResonanceCurve",
     "ResponseSettings",

@@ -12,6 +12,7 @@ from .assembly.point_pairing import PointPairing
 from .assembly.tightened import TightenedBolts, tightened
 from .convergence import ModeConvergence, mode_convergence
 from .cyclic.cyclic_basis import CyclicBasis, DiameterModes, cyclic_basis
+from .cyclic.cyclic_basis_from_bases import cyclic_basis_from_bases
 from .cyclic.whole_wheel import WholeWheel
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import Normalisation, normalisation
@@ -63,6 +64,7 @@ __all__ = [
     "assembled_basis",
     "bodies_convergence",
     "cyclic_basis",
+    "cyclic_basis_from_bases",
     "eigenfrequencies_hz",
     "grid_places",
     "interface_compliance",

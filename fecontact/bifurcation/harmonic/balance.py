@@ -14,7 +14,6 @@ from fecontact.bifurcation.harmonic.engine_order import Waves
 from fecontact.bifurcation.harmonic.few_contacts import Factors, FewContacts, contact_directions
 from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
-from fecontact.bifurcation.harmonic.repeats import Ties
 from fecontact.bifurcation.harmonic.series import (
     Series,
     differentiated,
@@ -77,9 +76,8 @@ class Balance:
         Makes compiled equations.
     orders : tuple of int, optional
         Harmonics of the series where some of 0 to H are left out: these are zero.
-    ties : Ties or Waves, optional
-        Modes of bodies that repeat the motion of another one, or equations of one sector of a
-        wheel.
+    waves : Waves, optional
+        Equations of one sector of a wheel.
     """
 
     field: VectorField
@@ -96,7 +94,7 @@ class Balance:
     kept: Kept = _NOTHING_KEPT
     compiled: CompiledBalance | None = None
     orders: tuple[int, ...] | None = None
-    ties: Ties | Waves | None = None
+    waves: Waves | None = None
 
     def equations(self, value: float) -> Equations | None:
         """Compiled equations about a value of the parameter; None where there are none."""
@@ -133,8 +131,8 @@ class Balance:
         """Indices of the coefficients that are zero because their harmonics are left out."""
         places = np.arange(self.size).reshape(self.reference.shape)
         left = np.delete(places, self.rows_kept, axis=0).reshape(-1)
-        if self.ties is not None:
-            left = np.union1d(left, self.ties.left_out(self.reference.shape))
+        if self.waves is not None:
+            left = np.union1d(left, self.waves.left_out(self.reference.shape))
         return left
 
     @cached_property
@@ -232,7 +230,7 @@ class Balance:
     @cached_property
     def directions(self) -> Array | None:
         """Columns (m, r) of what contact nodes see, where these are few; see FewContacts."""
-        return None if self.ties is not None else contact_directions(
+        return None if self.waves is not None else contact_directions(
             self.field, self.values, self.harmonics)
 
     @cached_property
@@ -383,8 +381,8 @@ class Linearised:
         """Residual (n + 1,), without the last entry for forced systems."""
         problem = self.problem
         turned = self.free_balance.copy()
-        if problem.ties is not None:
-            problem.ties.residual(problem.coefficients(self.u), turned, self.period,
+        if problem.waves is not None:
+            problem.waves.residual(problem.coefficients(self.u), turned, self.period,
                                   float(self.u[-1]), problem.harmonics_kept)
         found = turned.reshape(-1)
         found[problem.left_out] = self.u[problem.left_out]
@@ -394,7 +392,7 @@ class Linearised:
 
     @cached_property
     def free_balance(self) -> Array:
-        """Balance (2 H + 1, b) of the harmonics, without the equations of ties."""
+        """Balance (2 H + 1, b) of the harmonics, without the equations of waves."""
         return self._balance(self.u, self.period, self.rates)
 
     def _balance(self, u: Array, period: float, rates: Array) -> Array:
@@ -564,8 +562,8 @@ class Linearised:
             found[:n] += self._coupled(self._followed)
         if problem.autonomous:
             found[n, :n], found[n, n:] = problem.phase_row, 0.0
-        if problem.ties is not None:
-            problem.ties.derivatives(found[:n], problem.coefficients(self.u), self.free_balance,
+        if problem.waves is not None:
+            problem.waves.derivatives(found[:n], problem.coefficients(self.u), self.free_balance,
                                      self.period, float(self.u[-1]), self._by_common,
                                      problem.harmonics_kept)
         return zero_left_out(found, problem.left_out)

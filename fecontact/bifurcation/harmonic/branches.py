@@ -109,7 +109,7 @@ def method_of(point: BranchPoint) -> HarmonicBalance:
 def _method_of(problem: HarmonicProblem) -> HarmonicBalance:
     return HarmonicBalance(problem.orders or problem.harmonics, problem.samples,
                            stability=problem.stability,
-                           repeats=None if problem.ties is None else problem.ties.repeats)
+                           repeats=None if problem.waves is None else problem.waves.repeats)
 
 
 def _rescaled(
@@ -126,8 +126,8 @@ def attributes_of(problem: HarmonicProblem) -> dict[str, Any]:
     found: dict[str, Any] = {} if problem.limits is None else {"limits": problem.limits}
     if problem.orders is not None:
         found["orders"] = np.array(problem.orders)
-    if problem.ties is not None:
-        found |= problem.ties.repeats.attributes()
+    if problem.waves is not None:
+        found |= problem.waves.repeats.attributes()
     return {**found, "state_names": list(field.state_names),
             "parameter_names": list(field.parameters),
             "parameter_values": problem.values, "scales": problem.scales,

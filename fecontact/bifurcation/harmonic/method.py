@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fecontact.bifurcation.harmonic.engine_order import EngineOrder
-from fecontact.bifurcation.harmonic.repeats import Repeats
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.resources.memory import require_memory
@@ -55,9 +54,9 @@ class HarmonicBalance:
         projection of Bayer and Leine with 2 H harmonics, which suits smooth systems of few states.
         None for none: folds alone are found then, but points take a fraction of the time. Branches
         whose folds show that multipliers are wrong have none either, and say so.
-    repeats : Repeats or EngineOrder, optional
-        Bodies that move as another one does at another time: the neighbours of one sector of a
-        wheel under engine order; or the wave of an elastic wheel. With ``stability = None`` alone.
+    repeats : EngineOrder, optional
+        The wave in which the sectors of a wheel move as one of them does, at other times. With
+        ``stability = None`` alone.
 
     Raises
     ------
@@ -71,7 +70,7 @@ class HarmonicBalance:
     most_harmonics: int = 100
     stability: str | None = "transitions"
     sampling_tolerance: float | None = None
-    repeats: Repeats | EngineOrder | None = None
+    repeats: EngineOrder | None = None
 
     def __post_init__(self) -> None:
         if isinstance(self.harmonics, Sequence | np.ndarray) and not isinstance(
@@ -93,7 +92,7 @@ class HarmonicBalance:
         if self.stability not in _STABILITY:
             raise InputError(f"HarmonicBalance: stability = {self.stability!r} must be "
                              f"'transitions' or 'Koopman-Hill', or None.")
-        require_kind("HarmonicBalance", (Repeats, EngineOrder, type(None)), repeats=self.repeats)
+        require_kind("HarmonicBalance", (EngineOrder, type(None)), repeats=self.repeats)
         if self.repeats is not None:
             require_wave(self)
 

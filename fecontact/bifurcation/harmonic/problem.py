@@ -34,7 +34,6 @@ from fecontact.bifurcation.harmonic.compiled.orbit import (
     evaluate,
 )
 from fecontact.bifurcation.harmonic.compiled.strides import Strides
-from fecontact.bifurcation.harmonic.engine_order import Waves
 from fecontact.bifurcation.harmonic.series import differentiated, shifted
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions
 from fecontact.bifurcation.harmonic.stored import StoredOrbits, StoredValues
@@ -266,8 +265,8 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
             periods = self.periods * self.turn / u[:, -1]
         else:
             periods = np.array([self.period(each) for each in u])
-        if isinstance(self.ties, Waves):
-            errors = [self.ties.neglected(self.coefficients(one), accelerations, T, float(one[-1]),
+        if self.waves is not None:
+            errors = [self.waves.neglected(self.coefficients(one), accelerations, T, float(one[-1]),
                                           size, self.harmonics_kept)
                       for one, accelerations, T, size in zip(
                           u, forces, periods, np.broadcast_to(sizes, (count, sizes.shape[-1])),

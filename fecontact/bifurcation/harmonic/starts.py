@@ -12,7 +12,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
-from fecontact.bifurcation.harmonic.engine_order import EngineOrder, WaveField, Waves
+from fecontact.bifurcation.harmonic.engine_order import WaveField, Waves
 from fecontact.bifurcation.harmonic.layout import (
     element_counts,
     element_rows,
@@ -22,7 +22,6 @@ from fecontact.bifurcation.harmonic.layout import (
 from fecontact.bifurcation.harmonic.memory import Kept
 from fecontact.bifurcation.harmonic.method import HarmonicBalance, require_wave
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
-from fecontact.bifurcation.harmonic.repeats import Repeats, Ties, ties_of
 from fecontact.bifurcation.harmonic.series import with_harmonics
 from fecontact.bifurcation.harmonic.timing import timing_of
 from fecontact.bifurcation.orbits import starts as orbit_starts
@@ -58,14 +57,14 @@ def problem_for(
         field, values.copy(), free, method.highest, method.count,
         np.zeros((2 * method.highest + 1, layout.harmonic)), scales, layout, periods,
         *timing_of(field, values, free), kept, orders=method.orders, stability=method.stability,
-        limits=limits, ties=_ties_of(field, method))
-    if found.ties is None:
+        limits=limits, waves=_waves_of(field, method))
+    if found.waves is None:
         # The problem is new: nobody has it yet.
         object.__setattr__(found, "compiled", CompiledBalance.of(found))
     return found
 
 
-def _ties_of(field: VectorField, method: HarmonicBalance) -> Ties | Waves | None:
+def _waves_of(field: VectorField, method: HarmonicBalance) -> Waves | None:
     """Equations of sectors of a wheel.
 
     Raises
@@ -80,10 +79,10 @@ def _ties_of(field: VectorField, method: HarmonicBalance) -> Ties | Waves | None
                              "leave them out.")
         require_wave(method)
         return Waves(field.waves, field.unfolded)
-    if isinstance(method.repeats, EngineOrder):
+    if method.repeats is not None:
         raise InputError("HarmonicBalance: repeats=EngineOrder(...) needs the field of its wave; "
                          "make it by its method field.")
-    return None if method.repeats is None else ties_of(method.repeats, field)
+    return None
 
 
 def _require_even(method: HarmonicBalance) -> None:
@@ -170,8 +169,7 @@ def method_of(attributes: Mapping[str, Any]) -> HarmonicBalance:
     orders = attributes.get("orders")
     return HarmonicBalance(int(attributes["harmonics"]) if orders is None else
                            np.asarray(orders).tolist(), int(attributes["samples"]),
-                           stability=None if stability == "none" else stability,
-                           repeats=Repeats.stored(attributes))
+                           stability=None if stability == "none" else stability)
 
 
 def corrected(

@@ -121,7 +121,7 @@ def wheel_motion(field: WaveField, point: BranchPoint) -> WheelMotion:
     if _of_mode(point):
         own = field_over_xi(field.waves.at_rest(field.system()), point.parameter, field.waves)
     problem, u, _ = starts.restored(own, point)
-    linearised, waves = problem.evaluate(u), problem.ties
+    linearised, waves = problem.evaluate(u), problem.waves
     assert isinstance(waves, Waves)
     period, wheel = problem.period(u), field.waves.wheel
     X, free = problem.coefficients(u), linearised.free_balance

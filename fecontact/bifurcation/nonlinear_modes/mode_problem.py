@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.harmonic.engine_order import Waves
 from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.observed import observed_values
 from fecontact.bifurcation.harmonic.problem import HarmonicLinearisation, HarmonicProblem
@@ -124,12 +123,12 @@ class ModeProblem(HarmonicProblem):
         """Period, velocities, truncation errors, and what is observed."""
         T, X = self.period(u), self.coefficients(u)
         found = motion_values(self.layout, X, T, self.row)
-        if isinstance(self.ties, Waves):
+        if self.waves is not None:
             forces, _ = linearisation._samples()
             xi, kept = float(u[-1]), self.harmonics_kept
-            error, residual = self.ties.neglected(
+            error, residual = self.waves.neglected(
                 X, forces, T, xi, self.scales[self.layout.columns], kept), float("nan")
-            found["mean_square_velocity"] = self.ties.mean_square_velocity(
+            found["mean_square_velocity"] = self.waves.mean_square_velocity(
                 X, linearisation.free_balance, T, xi, kept)
         else:
             error, residual = linearisation.neglected

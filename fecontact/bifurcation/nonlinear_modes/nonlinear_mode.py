@@ -374,12 +374,7 @@ def _begun(
 
 def _wave_of(method: HarmonicBalance | Shooting) -> EngineOrder | None:
     """The travelling wave that a method is for, if it is for one."""
-    if not isinstance(method, HarmonicBalance) or method.repeats is None:
-        return None
-    if not isinstance(method.repeats, EngineOrder):
-        raise InputError("nonlinear_mode: repeats must be an EngineOrder; nonlinear modes of "
-                         "bodies that repeat each other are not there.")
-    return method.repeats
+    return method.repeats if isinstance(method, HarmonicBalance) else None
 
 
 def continued_mode(

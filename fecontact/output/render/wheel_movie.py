@@ -6,6 +6,7 @@ import numpy as np
 
 from fecontact.bifurcation.harmonic.wheel_orbits import WheelMotion
 from fecontact.core.checks import require_kind
+from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ComplexArray, Integers
 from fecontact.fem.fields import body_elements, linear_cells, of_one_kind
 from fecontact.output.render.mode_movie import ModeMotion, write_motion
@@ -72,6 +73,9 @@ def _of_mode(wheel: SectorModes, diameter: int, mode: int) -> tuple[ModeMotion, 
 
 def _of_response(motion: WheelMotion) -> tuple[ModeMotion, str]:
     """A response prepared for drawing, without its mean, and its description."""
+    if not motion.wheel.bodies:
+        raise InputError("render_wheel: the wheel is one of reduced bodies, without meshes; make "
+                         "it by cyclic_basis to draw it.")
     symmetry, first = motion.wheel.symmetry, 0
     nodes, cells, outlines, starts = [], [], [], []
     shapes: dict[int, list[ComplexArray]] = {h: [] for h in motion.amplitudes if h}

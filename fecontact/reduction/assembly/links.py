@@ -248,9 +248,7 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
             held.append(_felt(link, relative[: d if link.turning else None]))
             continue
         if isinstance(link, Spring):
-            ends = [end for end in (link.first, link.second) if end is not None]
-            rows = spring_direction(link, *(basis.positions[basis.point_index(end)]
-                                            for end in ends))[None] @ relative[:d]
+            rows = relative_row(basis, link)[None]
             c, b = np.array([link.stiffness]), np.array([link.damping])
             load -= (link.preload + link.stiffness * link.shortening) * rows[0]
         else:
@@ -337,6 +335,14 @@ def _relative_rows(basis: ModalBasis, link: Link) -> Array:
     """Displacements and rotations (3, m) or (6, m) of the first point relative to the second."""
     rows = basis.T[basis.point_index(link.first)]
     return rows if link.second is None else rows - basis.T[basis.point_index(link.second)]
+
+
+def relative_row(basis: ModalBasis, spring: Spring) -> Array:
+    """Elongation (m,) of a spring between points of a basis."""
+    ends = [end for end in (spring.first, spring.second) if end is not None]
+    direction = spring_direction(spring, *(basis.positions[basis.point_index(end)]
+                                           for end in ends))
+    return np.asarray(direction @ _relative_rows(basis, spring)[: basis.dimension])
 
 
 def _felt(link: Link, rows: Array) -> Array:

@@ -97,7 +97,8 @@ class CyclicBasis(Summarised):
     ----------
     symmetry : CyclicSymmetry
     bodies : mapping of name to ElasticBody
-        Those of one sector.
+        Those of one sector; none of
+        :func:`~fecontact.reduction.cyclic_basis_from_bases`.
     diameters : tuple of DiameterModes
         Of the nodal diameters, ascending from 0.
     basis : ModalBasis
@@ -123,7 +124,8 @@ class CyclicBasis(Summarised):
         """Sectors, bodies, nodal diameters and frequencies."""
         hertz = np.concatenate([np.sqrt(np.maximum(np.linalg.eigvalsh(one.stiffness), 0.0))
                                 for one in self.diameters]) / (2.0 * np.pi)
-        return [("sectors", f"{self.symmetry.sectors}"), ("bodies", listed(list(self.bodies))),
+        bodies = [part.name for part in self.basis.parts]
+        return [("sectors", f"{self.symmetry.sectors}"), ("bodies", listed(bodies)),
                 ("nodal diameters", listed([str(one.diameter) for one in self.diameters])),
                 ("modes of each", listed([str(len(one.stiffness)) for one in self.diameters], 6)),
                 ("frequencies", span(hertz, "Hz")),

@@ -218,6 +218,7 @@ class WholeWheel:
             thickness=own.thickness, stiffness=self.stiffness,
             contact_normals=None if own.contact_normals is None else own.contact_normals[order],
             on_ground=None if own.on_ground is None else own.on_ground[order],
+            springs=tuple(f"{name}_{s}" for name in own.springs for s in range(N)),
             constant_load=None if load is None else np.append(
                 np.sqrt(N) * load, np.zeros(self.modes - len(load))))
 
