@@ -12,6 +12,8 @@ from fecontact.system.nodes import SystemArrays
 
 # Largest out-of-balance fraction of the load, regardless of the rounding of other forces.
 _UNBALANCED = 1e-6
+# Part of a motion at the contacts, and of the loads along it, that counts as rounding.
+_ROUNDING = 1e-9
 # Largest number of steps down the slopes of waves.
 _SLIDES = 3000
 
@@ -20,7 +22,7 @@ class Balance:
     """Out-of-balance modal forces of a resting or steadily sliding body."""
 
     def __init__(self, arrays: SystemArrays, time: float, scale: float) -> None:
-        self.arrays = arrays
+        self.arrays = arrays = _without_free_motion(arrays)
         self.load = arrays.constant_load
         self._time = time
         n, _, m = arrays.rows.shape
@@ -41,7 +43,9 @@ class Balance:
             arrays.on_ground, 0.0, np.abs(undisplaced[:, kernels.NORMAL_FORCE]))
         self.scale = np.abs(np.diag(arrays.stiffness)) + np.einsum(
             "jai,jai,j->i", arrays.rows, arrays.rows, np.abs(self.face_stiffness))
-        self.scale[self.scale == 0.0] = 1.0
+        # Free motion is as stiff as the stiffest one, so that rounding does not carry it away.
+        largest = self.scale.max(initial=0.0) or 1.0
+        self.scale[self.scale <= _ROUNDING**2 * 1e-2 * largest] = largest
 
     def _penetration(self, scale: float) -> float:
         """Uniform penetration under which the face carries the load, at most 1e6 scales.
@@ -259,6 +263,35 @@ class Balance:
         rounding = 1e-11 * self._size(terms + np.abs(contact) + self._initial)
         applied = self._size(load * self.load)
         return min(rounding, _UNBALANCED * applied) if applied > 0.0 else rounding
+
+
+def _without_free_motion(arrays: SystemArrays) -> SystemArrays:
+    """Arrays without rounding in motions that neither stiffness nor contacts resist.
+
+    The rows of the contacts get no part along these motions, and neither do loads that are in
+    balance along them. A motion along level faces without friction is one of them.
+    """
+    still = np.flatnonzero(~arrays.stiffness.any(axis=1))
+    m = arrays.rows.shape[2]
+    if not len(still):
+        return arrays
+    slides = not arrays.follows_surface and not arrays.memory.any()
+    felt = arrays.rows[:, 1:2] if slides else arrays.rows
+    size = np.linalg.norm(felt.reshape(-1, m), 2) if felt.size else 0.0
+    _, values, ways = np.linalg.svd(felt[..., still].reshape(-1, len(still)))
+    free = ways[np.count_nonzero(values > _ROUNDING * size):]
+    rows, load = arrays.rows.copy(), arrays.constant_load.copy()
+    columns = [1] if slides else slice(None)
+    kept = rows[:, columns][..., still]
+    kept = kept - kept @ free.T @ free
+    kept[np.abs(kept) < _ROUNDING**1.5 * size] = 0.0
+    block = rows[:, columns]
+    block[..., still] = kept
+    rows[:, columns] = block
+    along = free @ load[still]
+    if np.linalg.norm(along) <= _ROUNDING * np.linalg.norm(load):
+        load[still] -= along @ free
+    return arrays._replace(rows=rows, constant_load=load)
 
 
 def _continued(problem: Balance) -> Array | None:

@@ -106,6 +106,9 @@ def equilibrium(
     stands. Runs with ``initial="rest"`` start from where it stands: they leave the forces along
     the ground to friction. With ``ground.normal = "vertical"`` both are the same.
 
+    Bodies that nothing holds in space, under loads in balance, keep their place: rigid motion that
+    changes no contact is left out.
+
     Parameters
     ----------
     system : ContactSystem
@@ -268,7 +271,8 @@ def _reason(system: ContactSystem, problem: Balance, friction: bool) -> str:
         springs = ", ".join(f"drive.stiffness_{axis}" for axis in AXES[: system.basis.dimension])
         remedy = (f"a spring at B ({springs}) or a support"
                   if not system.basis.parts else "a support, an interface or a link")
-        return f"There is no {kind}: nothing holds {body} against {motion}; give it {remedy}."
+        return (f"There is no {kind}: nothing holds {body} against {motion}; give it {remedy}, or "
+                f"balance the loads.")
     names = [name for name, count in system.basis.groups for _ in range(count)]
     falls = problem.face_stiffness < 0.0
     giving = sorted({name for name, fall in zip(names, falls, strict=True)
