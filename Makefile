@@ -73,7 +73,7 @@ bench: $(READY) $(ALL) $(SYSTEM) ## run the benchmarks
 	done
 
 docs: $(READY) $(ALL) $(SYSTEM) ## build the site into build/site/html
-	@$(BIN)/python docs/site/build.py
+	@$(BIN)/python -m sphinx -W --keep-going -q docs build/site/html
 
 validation: $(READY) $(ALL) $(SYSTEM) ## compute docs/validation.md and its pictures again
 	@$(BIN)/python docs/validation/build.py

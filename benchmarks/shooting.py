@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "validation" / "cases"))
 
 import beam_stick_slip as example
 import integrator_problems as problems

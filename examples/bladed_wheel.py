@@ -1,4 +1,6 @@
-"""A wheel of blades from one sector: nodal diameters, rotation, friction between the blades.
+"""
+A wheel of blades from one sector: nodal diameters, rotation, friction between the blades
+=========================================================================================
 
 The sector of a plane wheel is a piece of a ring with one blade. Its modes are those of the whole
 wheel, by nodal diameters; at speed, waves that run forwards and backwards differ. Then blades

@@ -1,4 +1,6 @@
-"""The Brake-Reuss beam, from a deck to its damping over the amplitude.
+"""
+The Brake-Reuss beam, from a deck to its damping over the amplitude
+===================================================================
 
 Two steel beams of 0.72 m in all overlap by 0.12 m and are held by three bolts. The deck, in Abaqus'
 format, has both beams, bolts, washers and nuts as bricks, tied to each other; the thread of each

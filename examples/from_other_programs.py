@@ -1,107 +1,46 @@
-"""One body, brought from other programs: does each way in give the same modes?
+"""
+A body from another program
+===========================
 
-A free steel block comes as matrices (Matrix Market, Abaqus, MATLAB, NumPy) and as modes (computed
-by SciPy; from a universal file). Its lower face is the contact, B and C are two of its nodes.
-Matrices agree to round-off, the universal file to the six digits that it holds.
-
-Usage: python examples/from_other_programs.py [--quick]
+Matrices and modes of other finite-element programs become a modal basis: mass and stiffness from
+Matrix Market, Abaqus, MATLAB or NumPy files, or modes from a universal file. Here a free steel
+block comes in three of these ways, and all of them give the same frequencies.
 """
 
-import sys
 from pathlib import Path
 
-import numpy as np
-from scipy.linalg import eigh
+import fecontact as fc
+from fecontact.io import read_matrix, read_uff
+from fecontact.laws import ConstantFriction, RoughSurface
+from fecontact.plot import plot_phase
+from fecontact.reduction import rows_from_dofs
 
-from fecontact import ModalBasis, basis_from_matrices, basis_from_modes
-from fecontact.io import AssembledMatrix, read_matrix, read_uff
-from fecontact.reduction import normalisation, rows_from_dofs
+data = Path(fc.__file__).parents[1] / "tests" / "data"
 
-DATA = Path(__file__).resolve().parents[1] / "tests" / "data"
-MODES = 8
-CONTACT_X = [0.0, 0.025, 0.05, 0.075, 0.1]
-# Mass and stiffness: files, and names in the files.
-FILES = {
-    "Matrix Market": ("block_mass.mtx", None, "block_stiffness.mtx", None),
-    "Abaqus, COORDINATE": ("block_MASS1.mtx", None, "block_STIF1.mtx", None),
-    "Abaqus, MATRIX INPUT": ("block_MASS2.mtx", None, "block_STIF2.mtx", None),
-    "MATLAB 5": ("block.mat", "M", "block.mat", "K"),
-    "MATLAB 7.3": ("block_v73.mat", "M", "block_v73.mat", "K"),
-    "SciPy": ("block_mass.npz", None, "block_stiffness.npz", None),
-    "NumPy, several arrays": ("block.npz", "M", "block.npz", "K"),
-    "NumPy": ("block_mass.npy", None, "block_stiffness.npy", None),
-}
+# %%
+# Matrices that know their nodes: 101 to 105 touch the ground, 106 and 113 are B and C.
+M, K = (read_matrix(data / f"block_{name}2.mtx") for name in ("MASS", "STIF"))
+rows = rows_from_dofs(K.matrix.shape[0], [(K.dof(node, 1), K.dof(node, 2))
+                                          for node in range(101, 106)],
+                      B=(K.dof(106, 1), K.dof(106, 2)), C=(K.dof(113, 1), K.dof(113, 2)))
+x = [0.0, 0.025, 0.05, 0.075, 0.1]
+bases = {"Abaqus": fc.basis_from_matrices(M, K, rows, modes=8, damping=0.01, contact_x=x)}
 
+# %%
+# Matrices by name in a MATLAB file, and modes that were measured or computed elsewhere.
+M, K = (read_matrix(data / "block.mat", name) for name in ("M", "K"))
+bases["MATLAB"] = fc.basis_from_matrices(M, K, rows, modes=8, damping=0.01, contact_x=x)
+bases["universal file"] = read_uff(data / "block.uff").modal_basis(contact=range(101, 106), B=106,
+                                                                   C=113)
+for name, basis in bases.items():
+    print(f"{name}: {', '.join(f'{value:.1f}' for value in basis.frequencies_hz[3:6])} Hz")
 
-def rows(stiffness: AssembledMatrix) -> dict[str, object]:
-    """Points of interest: nodes 101 ... 105 touch the ground, B is 106 and C 113."""
-    def place(node: int) -> tuple[int, int]:
-        if stiffness.labels is not None:
-            return stiffness.dof(node, 1), stiffness.dof(node, 2)
-        return 2 * (node - 101), 2 * (node - 101) + 1  # two for each node, in order
-
-    return rows_from_dofs(stiffness.matrix.shape[0], [place(node) for node in range(101, 106)],
-                          B=place(106), C=place(113))
-
-
-def from_files(mass: str, mass_name: str | None, stiffness: str,
-               stiffness_name: str | None) -> ModalBasis:
-    """The basis of two matrices."""
-    M, K = read_matrix(DATA / mass, mass_name), read_matrix(DATA / stiffness, stiffness_name)
-    return basis_from_matrices(M, K, rows(K), modes=MODES, damping=0.01, contact_x=CONTACT_X)
-
-
-def from_own_modes() -> ModalBasis:
-    """The basis of modes of another solver, scaled to a length of one as it happens."""
-    M, K = (read_matrix(DATA / f"block_{name}.npy") for name in ("mass", "stiffness"))
-    squares, shapes = eigh(K.matrix, M.matrix, subset_by_index=[0, MODES - 1])
-    shapes /= np.linalg.norm(shapes, axis=0)
-    found = normalisation(shapes, M)
-    print(f"The shapes are normalised to {found.name}, the largest product of two is "
-          f"{found.worst_off_diagonal:.0e}.")
-    w = np.sqrt(np.where(np.arange(MODES) < 3, 0.0, squares))  # a free plane body: three are rigid
-    return basis_from_modes(shapes, rows(K), angular_frequencies=w, mass=M, damping=0.01,
-                            contact_x=CONTACT_X)
-
-
-def bases(count: int | None = None) -> dict[str, ModalBasis]:
-    """The basis by each way in, or by so many kinds of files, and by modes."""
-    found = {name: from_files(*files) for name, files in list(FILES.items())[:count]}
-    found["modes of SciPy"] = from_own_modes()
-    found["universal file"] = read_uff(DATA / "block.uff").modal_basis(
-        contact=range(101, 106), B=106, C=113)
-    return found
-
-
-def difference(basis: ModalBasis, other: ModalBasis) -> tuple[float, float]:
-    """Largest relative differences of frequencies, and of T.
-
-    Rigid modes may be turned among themselves, so that they are compared by their products.
-    """
-    r = other.rigid_modes
-    w, expected = basis.angular_frequencies[r:], other.angular_frequencies[r:]
-    T, reference = basis.T_matrix, other.T_matrix
-    rigid = T[:, :r] @ T[:, :r].T - reference[:, :r] @ reference[:, :r].T
-    return (float(np.abs(w / expected - 1.0).max()),
-            float(max(np.abs(T[:, r:] - reference[:, r:]).max() / np.abs(reference).max(),
-                      np.abs(rigid).max() / np.abs(reference).max() ** 2)))
-
-
-def main(quick: bool = False) -> None:
-    """Print and compare; quickly the first two kinds of files alone."""
-    found = bases(2 if quick else None)
-    reference = found["Matrix Market"]
-    print(f"Frequencies [Hz]: {np.round(reference.frequencies_hz, 1).tolist()}")
-    for name, basis in found.items():
-        of_frequencies, of_shapes = difference(basis, reference)
-        print(f"{name:22s} {basis.rigid_modes} rigid modes, frequencies differ by "
-              f"{of_frequencies:.0e}, shapes by {of_shapes:.0e}")
-        limit = 2e-5 if name == "universal file" else 1e-9
-        assert basis.rigid_modes == 3
-        assert of_frequencies < limit
-        assert of_shapes < limit
-        assert np.allclose(basis.contact_x, CONTACT_X)
-
-
-if __name__ == "__main__":
-    main("--quick" in sys.argv)
+# %%
+# From here on it is a body like any other: a block that sticks and slips on a belt.
+system = fc.ContactSystem(
+    bases["Abaqus"],
+    normal=RoughSurface(stiffness=10e6, roughness_height=10e-6, damping=40.0),
+    friction=ConstantFriction(0.4, smoothing_slope=1e4), ground=fc.Ground(speed=0.01),
+    load=fc.Load(normal=100.0), drive=fc.Drive(stiffness_x=1e5, damping_x=1.0))
+run = fc.simulate(system, 0.1, outputs=2001)
+plot_phase(run, "B", path="from_other_programs.png")

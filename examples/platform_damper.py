@@ -1,4 +1,6 @@
-"""A bladed disc with underplatform dampers, from the mesh of one sector: amplitude over preload.
+"""
+A bladed disc with underplatform dampers, from the mesh of one sector: amplitude over preload
+=============================================================================================
 
 Each blade stands on its piece of the disc and has a platform. Between the platforms of two
 neighbours lies a damper, a wedge that the centrifugal force P presses outwards against both. Under

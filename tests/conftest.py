@@ -14,8 +14,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # Files that run all pages, examples and benchmarks, kill processes on purpose, or follow branches
 # of whole examples: a minute or more each.
-SLOW = {"test_documentation", "test_examples", "test_benchmarks", "test_site", "test_reference",
-        "test_sweep_killed", "test_ending_signals",
+SLOW = {"test_documentation", "test_examples", "test_validation_cases", "test_benchmarks",
+        "test_site", "test_reference", "test_sweep_killed", "test_ending_signals",
         "test_two_mass_example", "test_shooting_of_beam", "test_branch_command",
         "test_impact_orbits", "test_report_browser", "test_report_solid", "test_report_of_solids",
         "test_report_widget"}

@@ -5,6 +5,7 @@ of docs/images/validation belong to ``make validation``.
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from pictures import shrink  # noqa: E402
 
 IMAGES = ROOT / "docs" / "images"
 EXAMPLES = ROOT / "examples"
+CASES = ROOT / "docs" / "validation" / "cases"
 LARGEST = 200_000  # bytes
 SHOWN_AT = 0.1047  # s, of the beam on wavy ground
 
@@ -28,10 +30,19 @@ def command(folder: Path, *arguments: str) -> None:
     subprocess.run([sys.executable, "-m", "fecontact", *arguments], cwd=folder, check=True)
 
 
-def example(folder: Path, name: str, *arguments: str) -> None:
-    """Run an example in a folder."""
-    subprocess.run([sys.executable, str(EXAMPLES / f"{name}.py"), *arguments], cwd=folder,
-                   check=True)
+def example(folder: Path, name: str, count: int | None = None) -> None:
+    """Run an example in a folder, or with another ``count`` than it has."""
+    text = (EXAMPLES / f"{name}.py").read_text(encoding="utf-8")
+    if count is not None:
+        text, changed = re.subn(r"^count = \d+$", f"count = {count}", text, flags=re.MULTILINE)
+        assert changed == 1
+    _written(folder / f"{name}.py", text)
+    subprocess.run([sys.executable, f"{name}.py"], cwd=folder, check=True)
+
+
+def case(folder: Path, name: str, *arguments: str) -> None:
+    """Run a case of the validation page in a folder."""
+    subprocess.run([sys.executable, str(CASES / f"{name}.py"), *arguments], cwd=folder, check=True)
 
 
 def studied(folder: Path, name: str, *arguments: str) -> Path:
@@ -110,7 +121,7 @@ def _photographed(page: Path, path: Path, view: str = "") -> bool:
 
 def squeal(folder: Path) -> dict[str, Path]:
     """The flutter of a beam on a belt."""
-    example(folder, "squeal", ".")
+    example(folder, "squeal")
     return {"flutter_modes": folder / "squeal_modes.png"}
 
 
@@ -128,53 +139,54 @@ def sweep(folder: Path) -> dict[str, Path]:
 
 def stick_slip(folder: Path) -> dict[str, Path]:
     """Stick-slip of a beam."""
-    example(folder, "beam_stick_slip", "beam_stick_slip.png")
+    case(folder, "beam_stick_slip", "beam_stick_slip.png")
     return {"beam_stick_slip": folder / "beam_stick_slip.png"}
 
 
 def orbits(folder: Path) -> dict[str, Path]:
     """The orbits of the impact oscillator, and a part of them."""
-    example(folder, "impact_orbits", ".")
+    case(folder, "impact_orbits", ".")
     return {name: folder / f"{name}.png" for name in ("impact_orbits", "impact_doublings")}
 
 
 def two_masses(folder: Path) -> dict[str, Path]:
     """Branches of two masses on a belt."""
-    example(folder, "two_mass_friction", ".")
+    case(folder, "two_mass_friction", ".")
     return {"two_masses_over_B": folder / "two_masses_over_B.png"}
 
 
 def responses(folder: Path) -> dict[str, Path]:
     """Frequency responses of a friction damper and of a hardening spring."""
-    example(folder, "frequency_response", ".")
+    example(folder, "frequency_response")
     return {name: folder / f"{name}.png" for name in ("friction_damper_response",
                                                       "hardening_response")}
 
 
 def blades(folder: Path) -> dict[str, Path]:
     """Responses of two blades with a damper between them."""
-    example(folder, "blade_pair", ".")
-    example(folder, "platform_damper", ".")
+    case(folder, "blade_pair", ".")
+    example(folder, "platform_damper")
     return {name: folder / f"{name}.png" for name in ("blade_pair", "platform_damper")}
 
 
 def many_runs(folder: Path) -> dict[str, Path]:
     """A million starts and a hundred thousand frequencies of an impact oscillator."""
-    example(folder, "million_starts")
-    return {name: folder / f"{name}.png"
-            for name in ("million_starts", "hundred_thousand_frequencies")}
+    example(folder, "million_starts", 1000)
+    example(folder, "impact_map", 100_000)
+    return {"million_starts": folder / "million_starts.png",
+            "hundred_thousand_frequencies": folder / "impact_map.png"}
 
 
 def modes(folder: Path) -> dict[str, Path]:
     """Nonlinear modes of a beam with a damper, and of two masses."""
-    example(folder, "nonlinear_modes", ".")
+    case(folder, "nonlinear_modes", ".")
     return {name: folder / f"{name}.png" for name in ("damped_beam_mode", "damped_beam_responses",
                                                       "internal_resonance")}
 
 
 def panel(folder: Path) -> dict[str, Path]:
     """Nonlinear mode of a thin panel between bolted ends."""
-    example(folder, "bolted_panel", ".")
+    example(folder, "bolted_panel")
     return {"bolted_panel": folder / "bolted_panel.png"}
 
 

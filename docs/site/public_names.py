@@ -97,6 +97,16 @@ def completed(text: str, space: str) -> str:
     return page
 
 
+def complete(app: Any, docname: str, source: list[str]) -> None:
+    """Complete the pages of the reference as they are read."""
+    folder, _, page = docname.rpartition("/")
+    if folder == "reference" and page == "index":
+        for space in NAMESPACES:
+            source[0] = source[0].replace(f"<!-- names of {space} -->", table(space))
+    elif folder == "reference":
+        source[0] = completed(source[0], page if page == "fecontact" else f"fecontact.{page}")
+
+
 BARS = re.compile(r"(``.*?``|:math:`.*?`)|(\|)")
 INITIAL = re.compile(r"^(\s*)([A-Z])\. ")
 
@@ -152,6 +162,7 @@ def borrowed(app: Any, what: str, name: str, thing: Any, skip: bool, options: An
 
 def setup(app: Any) -> dict[str, bool]:
     """Sphinx calls this."""
+    app.connect("source-read", complete)
     app.connect("autodoc-process-docstring", escape)
     app.connect("autodoc-skip-member", borrowed)
     app.connect("doctree-read", narrow)

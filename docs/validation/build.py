@@ -4,7 +4,7 @@ import sys
 import time
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
+sys.path.insert(0, str(Path(__file__).resolve().parent / "cases"))
 
 import continuation_cases
 import eigenfrequencies
@@ -28,7 +28,8 @@ HEAD = """# Validation
 
 What the package computes, beside closed forms, published numbers and the figures of W. Sextro,
 *Dynamical Contact Problems with Friction*, chapter 4. `make validation` computes everything here
-again, in about ten minutes on two cores, and writes this page.
+again, in about ten minutes on two cores, and writes this page. Scripts named here are in
+`docs/validation/cases`; each runs by itself and draws its pictures.
 
 """
 

@@ -111,7 +111,7 @@ def solvers() -> list[Comparison]:
 
 TEXT = """## Section 4.3: friction oscillator
 
-A mass on a moving belt, pulled to and fro through a spring: `examples/friction_oscillator.py`. The
+A mass on a moving belt, pulled to and fro through a spring: `friction_oscillator.py`. The
 source gives no third mode. Taken: 30 Hz, D = 0.01, with amplitudes of 0.5 at B and -0.5 at the
 contact relative to the rigid mode; with equal signs no vibration is seen. The contact is stuck
 during stick, so that the vibration shows at B alone.

@@ -154,7 +154,7 @@ def hysteresis(diagram: impact_map.Diagram) -> str:
 
 TEXT = """## Section 4.2: impact oscillator
 
-A pendulum hinged at one end strikes a stop, moved through a spring: `examples/impact_oscillator.py`
+A pendulum hinged at one end strikes a stop, moved through a spring: `impact_oscillator.py`
 and its study file, pictures by `impact_figures.py` and `impact_map.py`.
 
 What the source does not give, and what is taken here:
@@ -165,7 +165,7 @@ What the source does not give, and what is taken here:
 - The functions f* and h* of the rough surface. Taken: uniform asperity heights,
   f* = s^2 / 2 and h* = s up to s = 1.
 - The pendulum's dimensions. An aluminium arm with a square bob is calibrated in finite elements
-  (`examples/impact_calibration.py`) to the reduced mass 0.092 kg and to the bending mode above. A
+  (`impact_calibration.py`) to the reduced mass 0.092 kg and to the bending mode above. A
   strip of 6 mm touches the stop; if the whole bottom of the bob did, 5.954 Hz would give
   period two.
 

@@ -26,7 +26,7 @@ def section(images: Path) -> str:
     return f"""## Line contact with partial slip
 
 A cylinder of R = 50 mm on a rigid plane, plane strain, E = 210 GPa, P' = 1 MN/m, mu = 0.3: pressed
-without friction, then sheared by Q = mu P / 2 (`examples/line_contact.py`; sixteen quadratic
+without friction, then sheared by Q = mu P / 2 (`line_contact.py`; sixteen quadratic
 elements per half-width). On a rigid plane normal and tangential contact are coupled, unless nu is
 1/2: at 0.49 Cattaneo's closed form holds.
 

@@ -233,8 +233,8 @@ samples, collocation on 200 intervals, shooting with two segments, and a run of 
 
 {methods}
 
-Elastic bodies with friction dampers at resonance (`examples/friction_damper.py` with a smoothing
-slope of 200 s/m, `examples/blade_pair.py` with the best load) beside runs that have settled. With
+Elastic bodies with friction dampers at resonance (`friction_damper.py` with a smoothing
+slope of 200 s/m, `blade_pair.py` with the best load) beside runs that have settled. With
 one harmonic the amplitude of the blades agrees by chance:
 
 {bodies}

@@ -28,7 +28,7 @@ def section(images: Path) -> str:
         shrink(drawn, images / "tipping-pad.png")
     return f"""## Solids that slide
 
-A steel pad of 60 x 36 x 30 mm on a belt, pressed and held at its top (`examples/tipping_pad.py`).
+A steel pad of 60 x 36 x 30 mm on a belt, pressed and held at its top (`tipping_pad.py`).
 Friction mu N moves the resultant of the pressure ahead by mu h, h = 30 mm, on belts in any
 direction. The edge that lifts off: largest difference from a rigid pad on springs that do not pull,
 solved as three equations, in parts of the largest force; with six modes the pad is rigid.
@@ -39,7 +39,7 @@ A run from rest on a belt at 35 degrees ends {settled:.0e} of the largest force 
 
 ![Pressure below a pad that tips](images/validation/tipping-pad.png)
 
-An annular disc between two pads that squeals (`examples/disc_brake.py`). A disturbance of 1 nm
+An annular disc between two pads that squeals (`disc_brake.py`). A disturbance of 1 nm
 grows in time as the complex mode about steady sliding does, the rate to at least seven digits and
 the frequency to nine: what the run's tolerance of 1e-9 leaves, as the contact is linear until a pad
 lifts off. The disc turns as a prescribed motion, without gyroscopic terms.
@@ -51,7 +51,7 @@ the motion varies slowly.
 
 ![Growth of a squeal, and forces on both pads](images/validation/disc-brake.png)
 
-A plate with a bolted lap (`examples/bolted_plate.py`): ring-downs in time beside a slow loop under
+A plate with a bolted lap (`bolted_plate.py`): ring-downs in time beside a slow loop under
 the inertia force of the mode, from the equations alone, in its second cycle: in the first one
 friction still finds its way and loses up to half as much again. The loop leaves out the inertia of
 other modes, so that the shift of the frequency differs by up to a tenth and damping by up to 6 %.

@@ -35,7 +35,7 @@ def section(images: Path) -> str:
         for ratio in (0.1, 0.5, 1.0)}), images / "dithered-friction.png")
     return f"""## Solids
 
-A steel box of 0.3 x 0.2 x 0.1 m whose six faces slide without friction (`examples/sliding_box.py`):
+A steel box of 0.3 x 0.2 x 0.1 m whose six faces slide without friction (`sliding_box.py`):
 standing waves fit in exactly, without any singularity. Relative error of the frequency, the larger
 one of the two waves (1, 1, 1), and how it falls with the element size h between the last two
 meshes; linear elements promise h^2, quadratic ones h^4:
@@ -61,7 +61,7 @@ to which its frequencies converge like h^3.9:
 ## Friction in two directions
 
 A mass and a steel block of 60 x 40 x 20 mm, twelve modes and 24 contact nodes, are thrown across a
-belt (`examples/thrown_block.py`): mu = 0.3, belt 0.5 m/s along x, thrown with 1 m/s along y. In the
+belt (`thrown_block.py`): mu = 0.3, belt 0.5 m/s along x, thrown with 1 m/s along y. In the
 belt's frame they stop on a straight line. Smoothed with the arctan and k_s = 1e5 s/m, friction
 lets them creep on by 2.4 um. Friction acts below the centre of mass of the block, so that its
 centre of pressure runs ahead by mu h / 2.
@@ -80,7 +80,7 @@ others.
 ![Path of the block, and what smoothing adds to it](images/validation/thrown-block.png)
 
 Steady sliding at V while the ground shakes with a cos w t across or along the motion
-(`examples/dithered_friction.py`, k_s = 1e6 s/m): mean friction along the motion over mu N, beside
+(`dithered_friction.py`, k_s = 1e6 s/m): mean friction along the motion over mu N, beside
 2/pi V / sqrt(V^2 + a^2) K(a^2 / (V^2 + a^2)) and 2/pi arcsin(V / a).
 
 {comparisons([Comparison(f"dither {direction}, V = {ratio:g} a",
@@ -116,7 +116,7 @@ def spheres(images: Path) -> str:
     return f"""## Two spheres
 
 Two steel spheres of R = 50 mm are pressed together (Hertz) and moved to and fro by the displacement
-that Q = 0.75 mu P needs, at 30 degrees to the x axis (`examples/two_spheres.py`). Near the contact
+that Q = 0.75 mu P needs, at 30 degrees to the x axis (`two_spheres.py`). Near the contact
 they are half-spaces whose compliance between rings is a closed form, so that no mesh matters, and
 are of one material, so that normal and tangential contact are not coupled. Cattaneo and Mindlin,
 loss by Mindlin and Deresiewicz (1953): as the small difference of large works it feels errors of
@@ -150,7 +150,7 @@ def sphere_of_elements(images: Path) -> str:
     return f"""## An elastic sphere on a rigid plane
 
 The lowest part of such a sphere, of finite elements (Q2, nu = 0.49), on a rigid plane: pressed, and
-sheared by +-Q, Q = 0.9 mu P, in increments without time (`examples/pressed_sphere.py`; so many
+sheared by +-Q, Q = 0.9 mu P, in increments without time (`pressed_sphere.py`; so many
 elements along the radius of the contact). The plane is that of symmetry of two such spheres: half
 of their approach, displacement and loss. The body is five times as wide and high as the contact,
 and what it lacks of a half-space is taken from uniform tractions on the same face: 5 % of the

@@ -28,7 +28,7 @@ def section(images: Path) -> str:
     return f"""## Two bodies
 
 A cylinder of R = 50 mm on a block, both elastic, in plane strain, P' = 1 MN/m
-(`examples/two_bodies.py`; twelve quadratic elements per half-width, matching meshes): Hertz with
+(`two_bodies.py`; twelve quadratic elements per half-width, matching meshes): Hertz with
 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2. Pressed without friction and then sheared by Q = mu P / 2, a
 strip sticks; for equal materials normal and tangential contact are not coupled.
 
@@ -36,20 +36,20 @@ strip sticks; for equal materials normal and tangential contact are not coupled.
 
 ![Pressure and shear between two bodies beside closed forms](images/validation/two-bodies.png)
 
-Two blocks under uniform pressure, without friction (`examples/stacked_blocks.py`): largest error of
+Two blocks under uniform pressure, without friction (`stacked_blocks.py`): largest error of
 a stress component over the pressure. At mesh nodes of meshes that do not match, the other face is
 loaded unevenly, as `pair_faces` reports; segments with mean displacements load both evenly.
 
 {table(("meshes of the faces", "error"), patches)}
 
 A bar of 1 m hits another one that rests, with a spring between the ends that delays waves by 2 % of
-2 L / c (`examples/colliding_bars.py`; forty modes per metre and residual vectors). Momentum is kept
+2 L / c (`colliding_bars.py`; forty modes per metre and residual vectors). Momentum is kept
 to round-off. Without the spring equal bars exchange velocities, and e = L_1 / L_2 on a longer one.
 
 {comparisons(_bars())}
 
 Two layers clamped at one end, L = 0.5 m, h = 10 mm each, under the pressure p and an end load of
-+-300 N (`examples/clamped_layers.py`), beside the slip theory of Goodman and Klumpp (1956) for
++-300 N (`clamped_layers.py`), beside the slip theory of Goodman and Klumpp (1956) for
 beams: 8 F L^3 (P - 4/3 F) / (E b h^3) with F = mu p b h.
 
 {comparisons(slip)}

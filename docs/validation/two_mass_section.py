@@ -87,7 +87,7 @@ def places(branches: Mapping[str, Branch], kind: str) -> str:
 TEXT = """## Section 4.4: bifurcations of two masses on a belt
 
 A chain of two masses, each pressed on the belt, friction falling with the slip velocity:
-`examples/two_mass_friction.py`. The print leaves out the ratio of the masses in (4.4-1), a
+`two_mass_friction.py`. The print leaves out the ratio of the masses in (4.4-1), a
 parenthesis in the friction law, its constants and the base values of the diagrams; the ones taken
 were found by fitting the printed results: v_0 = 1 m/s and D = 0.1 over B, B = 20 m and D = 0.1
 over v_0.

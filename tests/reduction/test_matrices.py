@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import block_from_files as block
 import h5py
 import numpy as np
 import pytest
@@ -16,8 +17,6 @@ from fecontact import InputError, basis_from_matrices, modal_basis
 from fecontact.io import AssembledMatrix, read_matrix
 
 DATA = Path(__file__).parents[1] / "data"
-
-import from_other_programs as example  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -41,9 +40,9 @@ def full(found):
 # One body in every format ------------------------------------------------------------------------
 
 def test_every_way_in_gives_the_same_basis(make):
-    expected = modal_basis(make.block(), example.MODES, contact="bottom", contact_nodes="all")
-    for name, basis in example.bases().items():
-        of_frequencies, _ = example.difference(basis, expected)
+    expected = modal_basis(make.block(), block.MODES, contact="bottom", contact_nodes="all")
+    for name, basis in block.bases().items():
+        of_frequencies, _ = block.difference(basis, expected)
         assert of_frequencies < (2e-5 if name == "universal file" else 1e-10), name
         elastic = slice(3, None)
         for rows, reference in ((basis.T[0], expected.T[0]), (basis.T[1], expected.T[1]),
@@ -53,7 +52,7 @@ def test_every_way_in_gives_the_same_basis(make):
             assert np.abs(error).max() < limit, name
 
 
-@pytest.mark.parametrize("files", example.FILES.values(), ids=example.FILES)
+@pytest.mark.parametrize("files", block.FILES.values(), ids=block.FILES)
 def test_files_hold_the_matrices_of_the_body(make, files):
     body = make.block()
     for path, name, matrix in ((*files[:2], body.mass), (*files[2:], body.stiffness)):
@@ -65,13 +64,6 @@ def test_files_hold_the_matrices_of_the_body(make, files):
             assert found.labels.tolist() == [[101 + k // 2, 1 + k % 2] for k in range(30)]
         else:
             assert found.labels is None
-
-
-def test_example_runs(capsys):
-    example.main()
-    printed = capsys.readouterr().out
-    assert "normalised to length one" in printed
-    assert printed.count("3 rigid modes") == 10
 
 
 def test_files_are_small_and_made_by_the_script(make, tmp_path, monkeypatch):

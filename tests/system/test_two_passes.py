@@ -15,7 +15,7 @@ from fecontact.io import read_basis, write_basis
 from fecontact.laws import ConstantFriction, EnergyWear, LinearContact, SlidingTranslation
 from fecontact.reduction import reduce_bodies
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "examples"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "docs" / "validation" / "cases"))
 import stacked_blocks
 
 STIFFNESS, AREA = 1e12, stacked_blocks.WIDTH * 0.02

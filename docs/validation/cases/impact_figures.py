@@ -3,7 +3,7 @@
 Figures 4.2-2 and 4.2-3 of the source are phase diagrams at five frequencies, and displacement,
 velocity and phase diagram of the chatter; here at the middle of the contact.
 
-Usage: python examples/impact_figures.py [FOLDER] [--quick]
+Usage: python impact_figures.py [FOLDER] [--quick]
 """
 
 import sys

@@ -10,7 +10,7 @@ its frequencies go on falling with finer meshes and are compared on a coarse one
 are those of Mindlin's plate whose edges do not move along themselves either. With sides held like
 this the solid has standing Lamb waves, and its frequencies converge to those.
 
-Usage: python examples/sliding_box.py [OUTPUT_FOLDER] [--quick]
+Usage: python sliding_box.py [OUTPUT_FOLDER] [--quick]
 """
 
 import sys

@@ -14,7 +14,7 @@ slips: the frequency agrees to 2e-4, its shift to a tenth, the damping to 6 %. T
 computed by Newton's method with return of the friction forces to their discs, written here from the
 equations alone. Its area is the work of friction in the slip.
 
-Usage: python examples/bolted_plate.py [FOLDER] [--quick]
+Usage: python bolted_plate.py [FOLDER] [--quick]
 
 H. Festjens, G. Chevallier, J.-L. Dion, A numerical tool for the design of assembled structures
 under dynamic loads, International Journal of Mechanical Sciences 75 (2013); R. M. Lacayo, M. S.

@@ -5,7 +5,7 @@ pressure everywhere: to round-off where the meshes match, with an error that thi
 do not. Contact nodes at the nodes of a face load the other face unevenly then; segments with mean
 displacements, fewer than either mesh has elements, load both evenly.
 
-Usage: python examples/stacked_blocks.py
+Usage: python stacked_blocks.py
 """
 
 from dataclasses import dataclass

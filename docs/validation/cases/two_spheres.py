@@ -18,7 +18,7 @@ A cycle of +-Q loses (Mindlin and Deresiewicz 1953)
 
 This is what is left of two larger works, so that errors of the forces weigh up to thirty times.
 
-Usage: python examples/two_spheres.py [OUTPUT_FOLDER] [--quick]
+Usage: python two_spheres.py [OUTPUT_FOLDER] [--quick]
 """
 
 import sys

@@ -7,7 +7,7 @@ depth of an aluminium arm, 19.6 mm thick, and the side of its square bob are fou
 three numbers in finite elements. A strip 6 mm long at the middle of the bob touches the stop; the
 arm turns about a hole of 4 mm in it.
 
-Usage: python examples/impact_calibration.py [--quick]   (prints the dimensions and what they give)
+Usage: python impact_calibration.py [--quick]   (prints the dimensions and what they give)
 """
 
 import sys

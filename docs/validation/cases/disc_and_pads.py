@@ -5,7 +5,7 @@ and press. Friction has a constant coefficient, so nothing falls with slip veloc
 about steady sliding tell from which coefficient on the disc squeals and at which frequency; a run
 from a small disturbance grows as they say, until the pad lifts off, and keeps a limit cycle.
 
-Usage: python examples/disc_and_pads.py [FOLDER] [--quick]
+Usage: python disc_and_pads.py [FOLDER] [--quick]
 """
 
 import sys

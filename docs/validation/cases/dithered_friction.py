@@ -10,7 +10,7 @@ with the complete elliptic integral K of the parameter m. Vibration along the mo
 round whenever it is faster than V, and leaves 2 / pi arcsin(V / a) up to V = a, and everything
 above. For slow motion both act like a dashpot.
 
-Usage: python examples/dithered_friction.py [OUTPUT_FOLDER] [--quick]
+Usage: python dithered_friction.py [OUTPUT_FOLDER] [--quick]
 """
 
 import sys

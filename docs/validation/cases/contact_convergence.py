@@ -5,7 +5,7 @@ along it. With loads and contact nodes spread over lengths of the outline, defle
 and the sliding and sticking parts of the face settle; with a load on a single mesh node the
 deflection under it grows with every refinement, as that of the continuum is infinite.
 
-Usage: python examples/contact_convergence.py [--quick]   (prints the tables of docs/convergence.md)
+Usage: python contact_convergence.py [--quick]   (prints the tables of docs/convergence.md)
 """
 
 import sys

@@ -8,7 +8,7 @@ the blades by its contacts alone: in between friction takes most energy, and the
 is least, at mu N = pi F / 2 for the force F on a blade, and pi F / k with the stiffness k of a
 contact.
 
-Usage: python examples/blade_pair.py [FOLDER] [--quick]
+Usage: python blade_pair.py [FOLDER] [--quick]
 """
 
 import sys
