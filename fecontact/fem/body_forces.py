@@ -63,6 +63,15 @@ def _face_forces(body: ElasticBody, facets: Integers) -> Array:
     return forces.reshape(-1, 3)
 
 
+def boundary_facets(body: ElasticBody, name: str) -> Integers:
+    """Nodes of the facets of a boundary; of edges start, end, (middle), the body on their left."""
+    facets = body.mesh.boundary(name)
+    if body.dimension == 3:
+        return body.facet_nodes(facets)
+    nodes = body.edge_nodes(along_outline(body.mesh, facets))
+    return nodes if nodes.shape[1] == 2 else nodes[:, [0, 2, 1]]
+
+
 def along_outline(mesh: Mesh, edges: Integers) -> Integers:
     """Edges (k, 2) of the outline, turned such that the body lies on their left."""
     forward = {tuple(edge) for edge in mesh.outline.tolist()}

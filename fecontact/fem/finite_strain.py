@@ -58,12 +58,18 @@ class StrainState:
         ``d^2U/dq^2`` [N/m], if it was asked for.
     strain : float
         Largest component of E at a point of quadrature, without sign.
+    contacts : bytes
+        Which contacts are closed, and which slide; empty without contacts.
+    rounding : float
+        Error of the forces of contacts by rounding of places [N].
     """
 
     energy: float
     force: Array
     tangent: Any
     strain: float
+    contacts: bytes = b""
+    rounding: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,6 +207,22 @@ class FiniteStrainModel:
         if more:
             matrix = sp.csc_array(sp.block_diag([matrix, sp.csc_array((more, more))]))
         return self._on_free(q, np.append(force, np.zeros(more)), matrix)
+
+    def slopes(self, q: Array) -> Any:
+        """Displacements (d N, f) of the nodes from changes of the free unknowns (f,), sparse."""
+        J, turning = self.expansion, self._rotations
+        own = self.body.nodes.size
+        return (J if turning is None else J + turning.slopes(q)).tocsr()[:own]
+
+    def curvature(self, q: Array, force: Array) -> Any:
+        """Second derivative (f, f), sparse, of the work of fixed forces (d N,) on the nodes."""
+        import scipy.sparse as sp
+
+        size = self.expansion.shape[1]
+        if self._rotations is None:
+            return sp.csc_array((size, size))
+        more = self.body.dimension * self.nodes - len(force)
+        return self._rotations.curvature(q, np.append(force, np.zeros(more)))
 
     def _on_free(self, q: Array, force: Array, K: Any) -> tuple[Array, Any]:
         """Forces and tangent over the free unknowns; K may be None."""

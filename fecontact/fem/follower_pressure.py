@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.types import Array, Integers
-from fecontact.fem.body_forces import along_outline
+from fecontact.core.types import Array
+from fecontact.fem.body_forces import boundary_facets
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import shape_functions
 from fecontact.fem.faces.surface import quadrature
@@ -46,7 +46,7 @@ def follower_pressure(
     for name, pressure in pressures.items():
         if not pressure:
             continue
-        facets = _facets(body, name)
+        facets = boundary_facets(body, name)
         own, slopes = (_edges if d == 2 else _faces)(places[facets])
         scale = pressure * (body.thickness if d == 2 else 1.0)
         np.add.at(force, facets, scale * own)
@@ -58,15 +58,6 @@ def follower_pressure(
     data = np.concatenate([np.zeros(0), *entries])
     where = tuple(np.concatenate([np.zeros(0, np.int64), *one]) for one in (rows, columns))
     return force.ravel(), sp.csc_array(sp.coo_array((data, where), shape=(size, size)))
-
-
-def _facets(body: ElasticBody, name: str) -> Integers:
-    """Nodes of the facets of a boundary; of edges start, end, (middle), the body on their left."""
-    facets = body.mesh.boundary(name)
-    if body.dimension == 3:
-        return body.facet_nodes(facets)
-    nodes = body.edge_nodes(along_outline(body.mesh, facets))
-    return nodes if nodes.shape[1] == 2 else nodes[:, [0, 2, 1]]
 
 
 def _edges(places: Array) -> tuple[Array, Array]:

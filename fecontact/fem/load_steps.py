@@ -20,6 +20,8 @@ from fecontact.fem.finite_strain import StrainState
 Steps = Literal["load", "arc"]
 # Iterations of Newton's method that a step should take, and bounds of the change of its length.
 _WANTED, _LEAST, _MOST = 5, 0.4, 1.6
+# Times as many iterations are allowed while contacts change.
+_CHANGING = 5
 # Displacement of an iteration, relative to the whole, that is rounding.
 _ROUNDING = 1e-11
 Loads = Callable[[Array], tuple[Array, Any]]
@@ -69,7 +71,8 @@ class DeflectionSteps:
     tolerance : float
         Largest residual of the forces, relative to the whole load.
     iterations : int
-        Most iterations of a step before it is halved.
+        Most iterations of a step before it is halved. Those after which contacts close, open, slide
+        or stick do not count, up to five times as many.
 
     Raises
     ------
@@ -128,6 +131,7 @@ class FollowedPath:
 def follow(
     model: Equations, loads: Loads, options: DeflectionSteps,
     stop: Callable[[Array], bool] | None = None, free: FreeMotion | None = None,
+    accepted: Callable[[Array], None] | None = None, begin: Array | None = None,
 ) -> FollowedPath:
     """Follow the equilibria of a body from no load to the load factor 1, or until ``stop``.
 
@@ -143,18 +147,28 @@ def follow(
         True for free unknowns q with which the path ends, at whatever load factor.
     free : FreeMotion, optional
         Rigid modes of a body that nothing holds.
+    accepted : callable, optional
+        Called with the free unknowns of each point once it belongs to the path, for forces that
+        depend on its history.
+    begin : (f,) array, optional
+        Free unknowns of the first point, which is known; near zero by default.
     """
-    zero = np.zeros(model.expansion.shape[1])
-    newton = _Newton(model, loads, options, free)
+    zero = np.zeros(model.expansion.shape[1]) if begin is None else begin
+    newton = _Newton(model, loads, options, free, zero)
+    keep = accepted or (lambda q: None)
     # Contacts may press without load.
     start = newton.at_load(zero, 0.0)
     if start is None:
+        keep(zero)
         return FollowedPath([newton.point(zero, 0.0)], False,
                             "There is no equilibrium without load under the forces of the contacts "
                             "alone.")
     here, _ = start
+    if begin is None:
+        keep(here.q)
     points, message = [here], ""
     if not newton.loaded:
+        keep(here.q)
         return FollowedPath([here, newton.point(here.q, 1.0)], True, "There is no load.")
     length, heading = options.first, newton.linear
     newton.scale = float(np.linalg.norm(newton.linear[:-1]))
@@ -181,6 +195,7 @@ def follow(
         heading = np.append(there.q - here.q, there.factor - here.factor)
         points.append(there)
         here = there
+        keep(here.q)
         if last or (stop is not None and stop(here.q)):
             return FollowedPath(points, True, "The whole load is reached.")
         length = min(options.largest, length * float(np.clip(
@@ -197,12 +212,12 @@ class _Newton:
     """
 
     def __init__(
-        self, model: Equations, loads: Loads, options: DeflectionSteps, free: FreeMotion | None
+        self, model: Equations, loads: Loads, options: DeflectionSteps, free: FreeMotion | None,
+        begin: Array,
     ) -> None:
         self.model, self.loads, self.options, self.free = model, loads, options, free
-        zero = np.zeros(model.expansion.shape[1])
         self.scale = 1.0
-        load, state = loads(zero)[0], model.state(zero)
+        load, state = loads(begin)[0], model.state(begin)
         self.loaded = bool(load.any())
         self.size = float(np.linalg.norm(load if self.loaded else state.force)) or 1.0
         self.linear = np.append(self._factors(state.tangent).solve(load), 1.0)
@@ -240,15 +255,20 @@ class _Newton:
         self, q: Array, factor: float, normal: Array | None
     ) -> tuple[PathPoint, int] | None:
         largest = 1e3 * max(self.scale, float(np.linalg.norm(q)))
-        for iteration in range(1, self.options.iterations + 1):
+        iteration, contacts = 0, b""
+        for number in range(_CHANGING * self.options.iterations):
             state = self.model.state(q)
+            iteration += number == 0 or state.contacts == contacts
+            contacts = state.contacts
+            if iteration > self.options.iterations:
+                return None
             force, slope = self.loads(q)
             residual = factor * force - state.force
             if self.free is not None:
                 residual = residual - self.free.inertia @ (self.free.shapes.T @ residual)
             error = float(np.linalg.norm(residual)) / self.size
             factors = self._factors(self._matrix(state, factor, slope))
-            if error <= self.options.tolerance:
+            if error <= max(self.options.tolerance, state.rounding / self.size):
                 return PathPoint(q, factor, state, _negative(factors)), iteration - 1
             change, shift = factors.solve(residual), 0.0
             if normal is not None:

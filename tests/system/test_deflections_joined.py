@@ -25,7 +25,9 @@ from fecontact.fem import Coupling, Tie
 from fecontact.fem.finite_strain import FiniteStrainModel
 from fecontact.laws import Frictionless, LinearContact, PowerContact
 from fecontact.reduction import LargeDeflections
-from fecontact.system.statics.ground_contact import GroundContact, GroundedModel
+from fecontact.system.statics.contact_forces import MovingContact
+from fecontact.system.statics.contact_points import ground_points
+from fecontact.system.statics.deflecting_bodies import DeflectingBodies
 
 E, L, H, B = 2e11, 1.0, 1.0 / 250.0, 0.01
 STEEL = Material(E, 0.0, 7800.0)
@@ -94,10 +96,13 @@ def test_contact_forces_are_derivatives_of_the_stored_energy():
     q, v = rng.normal(size=(2, model.expansion.shape[1]))
     turn = body.motion_rows("hub")[3:] @ (body.expansion @ q)
     q *= 0.3 / np.linalg.norm(turn)
-    moved = GroundContact.of(body, "contact", (3, 2), law, 0.0).penetration(
-        model.displacement(q).ravel())
-    ground = GroundContact.of(body, "contact", (3, 2), law, float(np.median(moved)))
-    both, depth = GroundedModel(model, ground), moved - np.median(moved)
+    def above(gap):
+        points = ground_points(body, "contact", (3, 2), law, None, gap)[0]
+        return MovingContact(body.nodes, points)
+
+    moved = above(0.0).accept(model.displacement(q)).penetration
+    both = DeflectingBodies({"": model}, [above(float(np.median(moved)))])
+    depth = moved - np.median(moved)
     assert 0 < (depth > 0.0).sum() < len(depth)
     h = 1e-6 * np.linalg.norm(q) / np.linalg.norm(v)
     state, ahead, behind = ([one.state(at) for one in (both, model)]

@@ -9,6 +9,7 @@ import numpy as np
 from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, shown
 from fecontact.core.types import Array
+from fecontact.laws.base import FrictionLaw
 from fecontact.laws.friction_curve import static_coefficient
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.quasistatic.pose import Sliders
@@ -20,9 +21,14 @@ _PENALTY = 1e3
 def require_sliders(system: ContactSystem) -> None:
     """Raise InputError for friction with internal variables that are not deflections of springs."""
     for _, share, law in system.law_groups("friction"):
-        if law.memory and law.sliders(share) is None:
-            raise InputError(f"{type(law).__name__} has no quasi-static limit made of springs and "
-                             f"sliders; use JenkinsFriction, IwanFriction or a law without memory.")
+        require_springs(law, share)
+
+
+def require_springs(law: FrictionLaw, share: Array) -> None:
+    """Raise InputError for a law with internal variables that are not deflections of springs."""
+    if law.memory and law.sliders(share) is None:
+        raise InputError(f"{type(law).__name__} has no quasi-static limit made of springs and "
+                         f"sliders; use JenkinsFriction, IwanFriction or a law without memory.")
 
 
 def sliders_of(

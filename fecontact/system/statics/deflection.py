@@ -3,8 +3,10 @@
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any, overload
 
 import numpy as np
+from typing_extensions import TypeAliasType
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, ModelWarning, require_finite
@@ -17,16 +19,23 @@ from fecontact.fem.faces.contact_patches import Count
 from fecontact.fem.fields import BodyFields, body_elements
 from fecontact.fem.finite_rotations import turning_nodes
 from fecontact.fem.finite_strain import LARGE_STRAIN, FiniteStrainModel
-from fecontact.fem.follower_pressure import follower_pressure
-from fecontact.fem.load_steps import DeflectionSteps, follow
+from fecontact.fem.load_steps import DeflectionSteps, Loads, PathPoint, follow
 from fecontact.fem.points import Place, place_rows
 from fecontact.laws.excitation import Load
-from fecontact.laws.signals.base import Signal
 from fecontact.reduction.eigenmodes import rigid_modes
 from fecontact.system.gap import Gap
-from fecontact.system.statics.ground_contact import GroundContact, GroundedModel, NormalLaws
-from fecontact.system.statics.static_solution import nodal_forces
+from fecontact.system.interfaces import Interface
+from fecontact.system.statics.contact_forces import MovingContact, PointForces
+from fecontact.system.statics.contact_points import (
+    FrictionLaws,
+    NormalLaws,
+    ground_points,
+    interface_points,
+)
+from fecontact.system.statics.deflecting_bodies import DeflectingBodies, models_of
 
+Bodies = TypeAliasType("Bodies", ElasticBody | Mapping[str, ElasticBody])
+Loading = TypeAliasType("Loading", Load | Sequence[Load])
 # Rotation up to which distributing couplings are linear [rad].
 SMALL_ANGLE = 0.1
 # Strain by the linear equations of a rotation, relative to that of the body, that is small.
@@ -38,24 +47,35 @@ _FALSE = 0.01
 class DeflectionPath(Summarised):
     """States of equilibrium of a body under growing loads, the first without load.
 
+    Of several bodies energies, strains and contacts are those of all.
+
     Attributes
     ----------
     body : ElasticBody
         The body.
     load_factors : (s,) array
-        Parts of the load; 1 is the whole load.
+        Parts of the load; 1 is the whole load. Of several loads k + r is the part 1 - r of load k
+        with the part r of the next one.
     displacements : (s, N, d) array
         Displacements of the nodes [m].
     unknowns : (s, f) array
         Displacements of the free unknowns, of bricks with their incompatible modes.
     energies : (s,) array
-        Strain energy, with that of springs at points and of contacts [J].
+        Strain energy, with that of springs at points and of contacts, springs of friction too [J].
     strains : (s,) array
         Largest component of Green and Lagrange's strain, without sign.
     unstable : (s,) integer array
-        Number of negative eigenvalues of the tangent stiffness; zero in a stable state.
+        Number of negative eigenvalues of the tangent stiffness; zero in a stable state. Where
+        contacts slide the tangent is not symmetric: number of negative pivots.
     penetration, normal_force : (s, n) arrays
-        Of the contact nodes: penetration of the ground, below zero the gap [m], and force [N].
+        Of the contact nodes, first those of ``contact``, then of each interface: penetration, below
+        zero the gap [m], and force [N].
+    friction_force : (s, n, d) array
+        Friction force on the nodes along x, y (, z) [N].
+    slip : (s, n) array
+        Path that the nodes have slid [m].
+    friction_loss : (s,) array
+        Energy that friction has lost [J]; of mean forces of each step.
     reached : bool
         Whether the path ends with the whole load.
     message : str
@@ -71,6 +91,9 @@ class DeflectionPath(Summarised):
     unstable: Integers
     penetration: Array
     normal_force: Array
+    friction_force: Array
+    slip: Array
+    friction_loss: Array
     reached: bool
     message: str
 
@@ -85,6 +108,8 @@ class DeflectionPath(Summarised):
             ("unstable states", f"{np.count_nonzero(self.unstable)}"),
             *([("nodes in contact", f"{np.count_nonzero(self.normal_force[-1])} of "
                 f"{self.normal_force.shape[1]}")] if self.normal_force.size else []),
+            *([("lost to friction", quantity(float(self.friction_loss[-1]), "J"))]
+              if self.friction_force.any() else []),
             ("end", self.message),
         ]
 
@@ -111,9 +136,27 @@ class DeflectionPath(Summarised):
                           stress[..., 0])
 
 
+@overload
 def deflection_path(
-    body: ElasticBody,
-    load: Load,
+    body: ElasticBody, load: Load | Sequence[Load], *, points: Mapping[str, Place] | None = None,
+    time: float = 0.0, follower: bool = False, steps: DeflectionSteps | None = None,
+    contact: str | Sequence[str] = (), contact_nodes: Count | Sequence[Count] = "all",
+    normal: NormalLaws | None = None, friction: FrictionLaws | None = None, gap: Gap = 0.0,
+    interfaces: Sequence[Interface] = (),
+) -> DeflectionPath: ...
+
+
+@overload
+def deflection_path(
+    body: Mapping[str, ElasticBody], load: Load | Sequence[Load], *,
+    points: Mapping[str, Place] | None = None, time: float = 0.0, follower: bool = False,
+    steps: DeflectionSteps | None = None, interfaces: Sequence[Interface] = (),
+) -> dict[str, DeflectionPath]: ...
+
+
+def deflection_path(
+    body: Bodies,
+    load: Loading,
     *,
     points: Mapping[str, Place] | None = None,
     time: float = 0.0,
@@ -122,85 +165,99 @@ def deflection_path(
     contact: str | Sequence[str] = (),
     contact_nodes: Count | Sequence[Count] = "all",
     normal: NormalLaws | None = None,
+    friction: FrictionLaws | None = None,
     gap: Gap = 0.0,
-) -> DeflectionPath:
-    r"""Equilibria of a body with large deflections, from no load to the whole load.
+    interfaces: Sequence[Interface] = (),
+) -> DeflectionPath | dict[str, DeflectionPath]:
+    r"""Equilibria of bodies with large deflections, from no load to the whole load.
 
-    .. math:: f(u) = \lambda\,p, \qquad f = \partial U / \partial u, \qquad
-        U = \tfrac12 \int E : C : E\,dV
-
-    with Green and Lagrange's strain E, linear elastic (St. Venant and Kirchhoff's material).
-    Displacements and rotations may be large, strains must be small. Supports, ties and constraints
-    are those of the body; distributing couplings rotate by small angles. Forces on nodes of hinges
-    and kinematic couplings keep their moment about the reference point. Contact is that with flat,
-    level ground, without friction, see :mod:`fecontact.system.statics.ground_contact`; for friction
-    and contact between bodies give a reduced model ``large_deflections``, see
-    :func:`~fecontact.modal_basis`.
+    ``f(u) = factor p`` with the derivative f of the energy of Green and Lagrange's strain, linear
+    elastic. Displacements and rotations may be large, strains must be small. Distributing couplings
+    rotate by small angles. Contact nodes slide any distance on flat ground or deformed faces; see
+    :mod:`fecontact.system.statics.contact_forces`. Friction is that of quasi-static loading: of
+    Jenkins' and Iwan's springs; laws without memory act with mu(0+) behind a spring of 0.82 of the
+    normal law's stiffness at its scale of penetration.
 
     Parameters
     ----------
-    body : ElasticBody
-        With supports against all rigid motions.
-    load, points, time : Load, mapping, float
-        As of :func:`~fecontact.static_solution`. Forces keep their directions.
+    body : ElasticBody, or mapping of name to ElasticBody
+        Supported against all rigid motions. Places of several bodies are 'BODY.PLACE'.
+    load, points, time : Load or sequence of Load, mapping, float
+        As of :func:`~fecontact.static_solution`; several loads act one after the other.
     follower : bool
         True if pressures on boundaries act normal to the deformed outline, on its deformed size.
     steps : DeflectionSteps, optional
         Load steps by default; steps of the arc length pass limit points.
     contact, contact_nodes : as of :func:`~fecontact.modal_basis`
-        Boundaries that may touch the ground, none by default, and their contact nodes.
-    normal : normal law, or mapping of boundary to normal law, optional
-        Force from penetration; required with contact.
+        Boundaries of one body that may touch the ground, none by default.
+    normal, friction : laws, or mappings of boundary to law, optional
+        Of the ground; the normal law is required with contact.
     gap : float, (n,) sequence, Crown or function of x
-        Initial distance of the contact nodes from the ground [m].
+        Initial distance from the ground [m].
+    interfaces : sequence of Interface
+        Faces paired by :func:`~fecontact.fem.pair_faces`, and their laws.
 
     Raises
     ------
     InputError, MeshError
-        As :func:`~fecontact.static_solution`; for a body that can move without strain.
+        As :func:`~fecontact.static_solution`; for bodies, laws and interfaces that do not fit.
 
     Warns
     -----
     ModelWarning
-        If the whole load was not reached, for strains above 1 %, distributing couplings that turn
-        by more than 0.1 rad, and nodes of turning couplings that are held by something else too.
+        If the whole load was not reached, and for strains or rotations beyond the range.
     """
-    require_kind("deflection_path", ElasticBody, body=body)
-    require_kind("deflection_path", Load, load=load)
+    require_kind("deflection_path", (ElasticBody, Mapping), body=body)
+    bodies = {"": body} if isinstance(body, ElasticBody) else body
+    for name, one in bodies.items():
+        require_kind("deflection_path: body", ElasticBody, **{name or "body": one})
+        require_supported(one, f"deflection_path{f' of {name}' if name else ''}")
+    require_kind("deflection_path", (Load, Sequence), load=load)
+    loads = [load] if isinstance(load, Load) else [*load]
+    if not bodies or not loads:
+        raise InputError(f"deflection_path: there is no {'load' if bodies else 'body'}; give one"
+                         f"{', if nothing acts Load().' if bodies else '.'}")
+    for load in loads:
+        require_kind("deflection_path", Load, load=load)
     require_kind("deflection_path", Mapping, points={} if points is None else points)
     require_kind("deflection_path", bool, follower=follower)
     require_kind("deflection_path", (DeflectionSteps, type(None)), steps=steps)
     require_finite("deflection_path", time=time)
-    require_supported(body, "deflection_path")
-    model = FiniteStrainModel(body)
-    pressures: dict[str, float] = {}
-    if follower:
-        load, pressures = _without_pressures(load, time)
-    dead = model.free(nodal_forces(body, load, points or {}, time))
-
-    def loads(q: Array) -> tuple[Array, object]:
-        if not pressures:
-            return dead, None
-        force, slope = follower_pressure(body, pressures, model.displacement(q))
-        pushed, stiffness = model.acting(q, force, slope)
-        return dead + pushed, stiffness
-
-    ground = GroundContact.of(body, contact, contact_nodes, normal, gap)
-    path = follow(GroundedModel(model, ground) if ground.laws else model, loads,
-                  steps or DeflectionSteps())
-    found = path.points
-    depth = ground.penetration(np.array([model.displacement(one.q).ravel() for one in found]))
-    result = DeflectionPath(
-        body, np.array([one.factor for one in found]),
-        np.array([model.displacement(one.q) for one in found]),
-        np.array([one.q for one in found]),
-        np.array([one.state.energy for one in found]),
-        np.array([one.state.strain for one in found]),
-        np.array([one.unstable for one in found]), depth,
-        np.array([ground.forces(one)[0] for one in depth]), path.reached, path.message)
-    for sentence in _limits(result):
+    plain = DeflectingBodies(models_of(bodies))
+    if isinstance(body, ElasticBody):
+        touching = ground_points(body, contact, contact_nodes, normal, friction, gap)
+    elif contact or normal or friction:
+        raise InputError("deflection_path: contact and its laws are those of one body; give "
+                         "several bodies interfaces, with the ground too.")
+    else:
+        touching = []
+    touching += interface_points(bodies, interfaces)
+    whole = replace(plain, contacts=[MovingContact(plain.places, one) for one in touching])
+    forces = [whole.loads(one, points or {}, time, follower) for one in loads]
+    contacts: list[list[PointForces]] = []
+    found: list[PathPoint] = []
+    for number, acting in enumerate(forces):
+        stage = replace(whole, held=(forces[number - 1],)) if number else whole
+        path = follow(stage, _difference(forces[number - 1], acting) if number else acting,
+                      steps or DeflectionSteps(), begin=found[-1].q if found else None,
+                      accepted=lambda q: contacts.append(whole.accept(q)))
+        found += [replace(one, factor=number + one.factor)
+                  for one in path.points[min(number, 1):]]
+        if not path.reached:
+            break
+    paths = {name: DeflectionPath(
+        one, np.array([point.factor for point in found]),
+        np.array([whole.models[name].displacement(whole.parts(point.q)[k]) for point in found]),
+        np.array([whole.parts(point.q)[k] for point in found]),
+        np.array([point.state.energy for point in found]),
+        np.array([point.state.strain for point in found]),
+        np.array([point.unstable for point in found]), reached=path.reached,
+        message=path.message, **_contact_arrays(contacts, one.dimension))
+        for k, (name, one) in enumerate(bodies.items())}
+    said = {sentence for one in paths.values() for sentence in _limits(one)}
+    for sentence in sorted(said):
         warnings.warn(f"deflection_path: {sentence}", ModelWarning, stacklevel=2)
-    return result
+    return paths[""] if isinstance(body, ElasticBody) else paths
 
 
 def require_supported(body: ElasticBody, what: str) -> None:
@@ -210,17 +267,29 @@ def require_supported(body: ElasticBody, what: str) -> None:
                          f"support the body with fixed.")
 
 
-def _without_pressures(load: Load, time: float) -> tuple[Load, dict[str, float]]:
-    """The load without pressures on boundaries, and these [Pa]."""
-    pressures: dict[str, float] = {}
-    others = []
-    for one in load.boundaries:
-        given = one.pressure
-        value = float(given.history(time)[0, 0]) if isinstance(given, Signal) else float(given)
-        pressures[one.boundary] = pressures.get(one.boundary, 0.0) + value
-        if one.shear or one.shear_across:
-            others.append(replace(one, pressure=0.0))
-    return replace(load, boundaries=tuple(others)), pressures
+def _difference(first: Loads, last: Loads) -> Loads:
+    """Forces that a load adds to those of the load before."""
+    def at(q: Array) -> tuple[Array, Any]:
+        (before, slope), (after, other) = first(q), last(q)
+        if slope is None or other is None:
+            change = other if slope is None else -slope
+        else:
+            change = other - slope
+        return after - before, change
+
+    return at
+
+
+def _contact_arrays(states: list[list[PointForces]], dimension: int) -> dict[str, Array]:
+    """Penetration, normal force, friction, slip (s, n, ...) and loss (s,) of all contacts."""
+    def together(name: str, *shape: int) -> Array:
+        none = np.zeros((0, *shape))
+        return np.array([np.concatenate([none, *(getattr(one, name) for one in state)])
+                         for state in states])
+
+    return {"penetration": together("penetration"), "normal_force": together("normal_force"),
+            "friction_force": together("friction", dimension), "slip": together("slip"),
+            "friction_loss": together("loss").sum(axis=1)}
 
 
 def _limits(path: DeflectionPath) -> list[str]:
