@@ -26,7 +26,7 @@ from fecontact.fem.elements.cell_geometry import (
     solid_volumes,
 )
 from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind, numbered_rows
-from fecontact.fem.elements.refinement import refined
+from fecontact.fem.elements.refinement import at_second_order, refined
 from fecontact.fem.elements.structured import structured
 from fecontact.fem.material import AnyMaterial
 
@@ -137,6 +137,9 @@ class Mesh(Summarised):
         Kind of the eight-node bricks of a file, for bodies of this mesh with ``degree = 1``.
     attachments : sequence of PointMass or PointSpring
         Masses and springs at points that a file holds, for bodies of this mesh; none by default.
+    temperature : (N,) or (N + E,) array
+        Changes of temperature that a file holds [K], for ``temperature="mesh"`` of bodies of this
+        mesh: at the nodes, and at the middles of the E edges, by default means; none by default.
 
     Raises
     ------
@@ -157,6 +160,7 @@ class Mesh(Summarised):
     materials: Mapping[str, AnyMaterial] = field(default_factory=dict)
     bricks: Bricks = "full"
     attachments: Sequence[Attachment] = ()
+    temperature: Array | None = None
     _checked: "_Checked" = field(init=False, repr=False, compare=False)
 
     @classmethod
@@ -232,6 +236,14 @@ class Mesh(Summarised):
         check_attachments(self.attachments, self.constraints, points, dimension, len(nodes))
         object.__setattr__(self, "attachments", tuple(self.attachments))
         require_choice("Mesh", "bricks", self.bricks, get_args(Bricks))
+        if self.temperature is not None:
+            given = as_floats(self.temperature, "Mesh: temperature")
+            if given.shape == (len(nodes),):
+                given = np.append(given, given[self.edges[0]].mean(axis=1))
+            if given.shape != (len(nodes) + len(self.edges[0]),) or not np.isfinite(given).all():
+                raise MeshError(f"Mesh temperature must be {len(nodes)} finite numbers, one for "
+                                f"each node, not an array of shape {given.shape}.")
+            object.__setattr__(self, "temperature", given)
         require_kind("Mesh", Mapping, cell_groups=self.cell_groups, materials=self.materials)
         groups = {name: np.unique(as_integers(which, f"The cells of mesh group '{name}'"))
                   for name, which in self.cell_groups.items()}
@@ -366,7 +378,8 @@ class Mesh(Summarised):
         constraints = [one.refined(self.middle_node) for one in self.constraints]
         return Mesh(nodes, cells, boundaries, self.points, curved, middles, constraints, groups,
                     self.materials, self.bricks,
-                    [one.refined(self.middle_node) for one in self.attachments])
+                    [one.refined(self.middle_node) for one in self.attachments],
+                    None if self.temperature is None else at_second_order(self, self.temperature))
 
     def middle_node(self, ends: tuple[int, int]) -> int:
         """Node in the middle of an edge in the refined mesh."""
@@ -420,7 +433,8 @@ class Mesh(Summarised):
         return Mesh(nodes, self.cells, self.boundaries, self.points, self.curved_edges, middles,
                     [one.turned(turn * signs, by) for one in self.constraints], self.cell_groups,
                     {name: one.moved(whole, arm) for name, one in self.materials.items()},
-                    self.bricks, [one.turned(turn * signs, by) for one in self.attachments])
+                    self.bricks, [one.turned(turn * signs, by) for one in self.attachments],
+                    self.temperature)
 
     def summary(self) -> list[tuple[str, str]]:
         """Counts, size and named groups."""

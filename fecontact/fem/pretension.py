@@ -142,7 +142,9 @@ def cut_along(
     tie = Tie(f"{name}-above", f"{name}-below", name=f"section {name}", control=name,
               direction=tuple((-along).tolist()))
     made = Mesh(np.concatenate([mesh.nodes, mesh.nodes[nodes]]), cells, boundaries, points, curved,
-                middles, (), mesh.cell_groups, mesh.materials, mesh.bricks)
+                middles, (), mesh.cell_groups, mesh.materials, mesh.bricks,
+                temperature=None if mesh.temperature is None else np.append(
+                    mesh.temperature[: len(mesh.nodes)], mesh.temperature[nodes]))
     return replace(made, constraints=(*mesh.constraints, tie), attachments=mesh.attachments)
 
 

@@ -20,6 +20,7 @@ from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.fem.cell_gradients import cell_gradients
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import shape_functions
+from fecontact.fem.elements.refinement import in_cells
 from fecontact.fem.incompatible_modes import in_parts
 from fecontact.fem.material import Material
 
@@ -33,9 +34,9 @@ def nodal_temperatures(body: ElasticBody, temperature: Temperature) -> Array:
     ----------
     body : ElasticBody
         Of isotropic materials with a thermal expansion.
-    temperature : float, (N,) array or function of the coordinates
+    temperature : float, (N,) array, function of the coordinates or 'mesh'
         The change from the state without stress [K]; ``lambda x, y: 100.0 * y``, of solids of x, y
-        and z.
+        and z; 'mesh' for that of its file, ``body.mesh.temperature``.
 
     Raises
     ------
@@ -52,6 +53,8 @@ def nodal_temperatures(body: ElasticBody, temperature: Temperature) -> Array:
     if not any(one.thermal_expansion for one in body.materials):  # type: ignore[union-attr]
         raise InputError("temperature acts through the thermal expansion of the material, which is "
                          "zero; give Material(..., thermal_expansion=1.2e-5), that of steel.")
+    if isinstance(temperature, str):
+        return _of_mesh(body, temperature)
     given = temperature(*body.nodes.T) if callable(temperature) else temperature
     values = as_floats(given, "temperature")
     if values.shape not in ((), (len(body.nodes),)) or not np.isfinite(values).all():
@@ -59,6 +62,21 @@ def nodal_temperatures(body: ElasticBody, temperature: Temperature) -> Array:
                          f"{len(body.nodes)} displacement nodes, not an array of shape "
                          f"{values.shape}.")
     return np.broadcast_to(values, (len(body.nodes),))
+
+
+def _of_mesh(body: ElasticBody, word: str) -> Array:
+    """Change of temperature (N,) at the displacement nodes that the file of a mesh holds [K]."""
+    if word != "mesh":
+        raise InputError(f"temperature = {word!r} must be a number, or 'mesh' for the changes of "
+                         f"temperature that the file of the mesh holds.")
+    if body.mesh.temperature is None:
+        raise InputError("temperature = 'mesh' is for meshes of decks with *TEMPERATURE or "
+                         "*INITIAL CONDITIONS, TYPE=TEMPERATURE; this one holds none, give "
+                         "numbers.")
+    members = body.basis.element_dofs.T
+    found = np.zeros(len(body.nodes))
+    found[members] = in_cells(body.mesh, body.mesh.temperature)[:, : members.shape[1]]
+    return found
 
 
 def thermal_moduli(body: ElasticBody) -> Array:

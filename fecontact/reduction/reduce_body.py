@@ -115,7 +115,7 @@ def modal_basis(
     prestress, large_deflections : BodyFields and LargeDeflections, optional
         Stress that stiffens the body; forces of large deflections, see its own documentation.
         With both, displacements count from the stressed body, without the loads of the stress.
-    temperature : float, (N,) array or function of the coordinates, optional
+    temperature : float, (N,) array, function of the coordinates or 'mesh', optional
         Its change [K], a constant load that completes the modes; see :mod:`fecontact.fem.thermal`.
     rows, eigensolver : sequence of sparse (k, d N) arrays; 'auto', 'direct' or 'iterative'
         Further motions with forces, see :func:`fecontact.reduction.reduce_bodies`; of solids, see

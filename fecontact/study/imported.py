@@ -98,12 +98,14 @@ class Imported:
             forces, points = self._loads([name])
             tables = {"geometry": self._geometry(file, name),
                       "body": self._body(name),
-                      "basis": {"modes": 20, "contact": [], **_loaded(points[name])}}
+                      "basis": {"modes": 20, "contact": [],
+                                **_loaded(points[name], self.meshes[name])}}
         else:
             forces, points = self._loads(bodies)
             tables = {"bodies": {_name(name): {
                 "geometry": self._geometry(file, name), "body": self._body(name),
-                "basis": {"modes": 10, "damping": 0.01, **_loaded(points[name])}}
+                "basis": {"modes": 10, "damping": 0.01, 
+                          **_loaded(points[name], self.meshes[name])}}
                 for name in bodies},
                 "interfaces": {f"contact-{number}": self._interface(face, other)
                                for number, (face, other) in enumerate(self.interfaces, start=1)}}
@@ -317,11 +319,15 @@ def _references(mesh: Mesh) -> dict[str, str]:
         "NODE "))}
 
 
-def _loaded(points: set[str]) -> dict[str, object]:
-    """Keys of a basis with points at which loads act."""
-    names = sorted(points)
-    return {"points": {name: name for name in names}, "reduction": "residual",
-            "loads": names} if names else {}
+def _loaded(points: set[str], mesh: Mesh) -> dict[str, object]:
+    """Keys of a basis with points at which loads act, and with the temperature of the deck."""
+    names, found = sorted(points), dict[str, object]()
+    if names:
+        found |= {"points": {name: name for name in names}, "loads": names}
+    if mesh.temperature is not None and any(
+            getattr(one, "thermal_expansion", 0.0) for one in mesh.materials.values()):
+        found["temperature"] = "mesh"
+    return {**found, "reduction": "residual"} if found else found
 
 
 def _in_plane(component: str) -> str:

@@ -192,9 +192,9 @@ class BasisSettings:
     prestress : bool
         Whether modes are those about the static state under ``[load]``, whose stress stiffens the
         body, which its supports have to hold.
-    temperature : float, optional
+    temperature : float or 'mesh', optional
         Change of temperature of the whole body from the state without stress [K], a constant load;
-        for 'residual' and 'craig-bampton'.
+        for 'residual' and 'craig-bampton'. 'mesh': that which the deck of the mesh holds.
     large_deflections : LargeDeflections, optional
         ``[basis.large_deflections]``: forces of large deflections of some modes.
     """
@@ -215,7 +215,7 @@ class BasisSettings:
     select: tuple[int, ...] | None = None
     eigensolver: Literal["auto", "direct", "iterative"] = "auto"
     prestress: bool = False
-    temperature: Annotated[float | None, Unit("K")] = None
+    temperature: Annotated[float | Literal["mesh"] | None, Unit("K")] = None
     large_deflections: LargeDeflections | None = None
 
     def __post_init__(self) -> None:

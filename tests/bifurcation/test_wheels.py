@@ -437,6 +437,12 @@ def test_temperatures_that_do_nothing_are_refused(sector):
                            (10.0, "temperature")):
         with pytest.raises(InputError, match=message):
             cyclic_basis({"s": sector}, SYMMETRY, temperature=given)
+    warm = replace(sector, material=Material(2.1e11, thermal_expansion=1.2e-5))
+    for symmetry in (SYMMETRY, replace(SYMMETRY, tied=True)):
+        with pytest.raises(InputError, match=r"Body 's': temperature is .* K on 'high' at .* same"):
+            cyclic_basis({"s": warm}, symmetry, modes=2, temperature={"s": lambda x, y: 300.0 * y})
+        assert cyclic_basis({"s": warm}, symmetry, modes=2, diameters=[0], temperature={
+            "s": lambda x, y: 300.0 * np.hypot(x, y)}).temperature["s"].max() > 1.0
 
 
 @pytest.mark.parametrize("stiffening", [True, False])

@@ -21,6 +21,7 @@ from fecontact import (
     static_solution,
     write_mesh,
 )
+from fecontact.cli import execute
 from fecontact.reduction import eigenfrequencies_hz
 from fecontact.reduction.eigenmodes import strain_energies
 
@@ -143,6 +144,84 @@ def test_thermal_expansion_of_a_deck_against_calculix(tmp_path):
     corner = np.linalg.norm(found.nodes - (0.1, 0.04, 0.03), axis=1).argmin()
     assert found.displacement[corner] == pytest.approx(
         (1.099598e-4, 2.698495e-5, 1.945810e-5), rel=1e-6)
+
+
+TEMPERATURE = "*TEMPERATURE\n"
+
+
+def heated(temperatures, initial="A, 20.\n"):
+    """A deck with initial temperatures and those of a second step."""
+    return (deck_of(MESHES["tetrahedra"], WARM + SECTIONS)
+            + f"*INITIAL CONDITIONS, TYPE=TEMPERATURE\n{initial}*STEP\n*STATIC\n{TEMPERATURE}"
+            f"A, 300.\n*END STEP\n*STEP\n*STATIC\n{temperatures}*END STEP\n")
+
+
+def at_nodes(function):
+    """Data lines of temperatures at all nodes of the ten-node tetrahedra."""
+    return "".join(f"{number}, {function(*place):.9g}\n" for number, place in enumerate(
+        ElasticBody(MESHES["tetrahedra"]).nodes.tolist(), start=1))
+
+
+@pytest.mark.parametrize(("function", "initial", "corner", "tolerance"), [
+    (lambda x, y, z: 20.0 + 500.0 * x + 800.0 * y - 1500.0 * z, "A, 15.\nA_left_N, 20.\nA, 20.\n",
+     (2.487223e-5, -5.338452e-5, 1.437692e-4), 1e-6),
+    # CalculiX integrates the square with four points.
+    (lambda x, y, z: 20.0 + 300.0 * x + 4e4 * y * y - 9e3 * x * z, "A, 20.\nA_left_N, 15.\n",
+     (1.033966e-4, -1.178718e-4, 5.361795e-5), 1.5e-3)])
+def test_temperatures_of_a_deck_against_calculix(tmp_path, function, initial, corner, tolerance):
+    """ccx 2.20: initial temperatures of sets, those of the last step at each node."""
+    mesh = read(tmp_path, heated(TEMPERATURE + at_nodes(function), initial))
+    found = static_solution(ElasticBody(mesh, fixed={"A_left": "xyz"}), Load(), temperature="mesh")
+    at = np.linalg.norm(found.nodes - (0.1, 0.04, 0.03), axis=1).argmin()
+    assert found.displacement[at] == pytest.approx(corner, rel=tolerance)
+
+
+def test_temperatures_of_steps_and_of_changed_meshes(tmp_path):
+    def mean(temperatures, **options):
+        mesh = read(tmp_path, heated(temperatures), **options)
+        return mesh.temperature.mean()
+
+    assert mean("") == pytest.approx(280.0)
+    assert mean("*TEMPERATURE, OP=NEW\n") == 0.0
+    assert mean("*TEMPERATURE, OP=NEW\nA, 60.\n", scale=1e-3) == pytest.approx(40.0)
+    mesh = read(tmp_path, heated(TEMPERATURE + at_nodes(lambda x, y, z: 20.0 + 500.0 * x)))
+    for one in (mesh, mesh.refined(), mesh.refined().placed((0.0, 0.0, 1.0), 90.0)):
+        body = ElasticBody(one)
+        basis = modal_basis(body, 8, contact=(), reduction="residual", temperature="mesh")
+        x = body.nodes[:, 0] if one.nodes[:, 0].max() > 0.05 else body.nodes[:, 1]
+        assert basis.mode_shapes.temperature == pytest.approx(500.0 * x, abs=1e-9)
+    study = Study.from_toml("[geometry]\nfile = 'a.inp'\n[basis]\nmodes = 8\ncontact = []\n"
+                            "reduction = 'residual'\ntemperature = 'mesh'\n", tmp_path / "a.toml")
+    assert study.modal_basis().mode_shapes.temperature.max() == pytest.approx(50.0)
+
+
+def test_import_takes_the_temperature_of_a_deck(tmp_path):
+    read(tmp_path, heated(TEMPERATURE + "A, 60.\n"))
+    assert execute(["import", str(tmp_path / "a.inp"), "-o", str(tmp_path / "a.toml")]) == 0
+    study = Study.read(tmp_path / "a.toml")
+    assert study.basis.temperature == "mesh"
+    assert study.modal_basis().mode_shapes.temperature == pytest.approx(40.0)
+
+
+def test_temperatures_that_are_not_read_are_said(tmp_path):
+    for options in ("AMPLITUDE=RAMP", "FILE=hot, BSTEP=1"):
+        with pytest.warns(ModelWarning, match=f"TEMPERATURE with {options.partition('=')[0]}"):
+            mesh = read(tmp_path, heated(f"*TEMPERATURE, {options}\nA, 60.\n"))
+        assert mesh.temperature is None
+    with pytest.raises(InputError, match="is for meshes of decks with"):
+        static_solution(ElasticBody(mesh), Load(), temperature="mesh")
+    with pytest.raises(InputError, match="temperature = 'warm' must be a number, or 'mesh'"):
+        static_solution(ElasticBody(mesh), Load(), temperature="warm")
+    with pytest.raises(MeshError, match=r"\*TEMPERATURE names the node or set 'B'"):
+        read(tmp_path, heated("*TEMPERATURE\nB, 60.\n"))
+    with pytest.raises(MeshError, match="give a node or set and its temperature"):
+        read(tmp_path, heated("*TEMPERATURE\nA\n"))
+    with pytest.raises(MeshError, match="Mesh temperature must be 9 finite numbers"):
+        rectangle(1.0, 1.0, 2, 2).__class__(rectangle(1.0, 1.0, 2, 2).nodes, rectangle(
+            1.0, 1.0, 2, 2).cells, temperature=[1.0])
+    hot = read(tmp_path, heated(TEMPERATURE + "A, 60.\n"))
+    with pytest.warns(ModelWarning, match="Gmsh cannot store .* its temperatures"):
+        write_mesh(hot, tmp_path / "a.msh")
 
 
 def test_decks_in_millimetres_newtons_and_tonnes(tmp_path):

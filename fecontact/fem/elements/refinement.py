@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from fecontact.core.types import Array, Integers
+from fecontact.fem.elements.cell_geometry import second_order_places
 from fecontact.fem.elements.cell_kinds import CellKind, numbered_rows, shape_functions
 
 
@@ -73,6 +74,21 @@ def second_order_nodes(mesh: _Cells) -> tuple[Array, Integers, Integers]:
     if len(mesh.curved_cells):
         places[cells[mesh.curved_cells]] = mesh.second_order_places(mesh.curved_cells)
     return places, cells, faces
+
+
+def at_second_order(mesh: _Cells, values: Array) -> Array:
+    """Values (n,) at all second-order nodes from those (N + E,) at corners and middles of edges."""
+    places, members, _ = second_order_nodes(mesh)
+    found = np.zeros(len(places))
+    found[members] = in_cells(mesh, values)
+    return found
+
+
+def in_cells(mesh: _Cells, values: Array) -> Array:
+    """Values (M, k) at the second-order nodes of cells, in the order of the kind; see above."""
+    corners, middles = values[: len(mesh.nodes), None], values[len(mesh.nodes) :, None]
+    return np.asarray(second_order_places(corners, mesh.cells, mesh.kind,
+                                          middles[mesh.edges[1]])[:, :, 0])
 
 
 def refined(mesh: _Cells) -> tuple[Array, Integers, dict[str, Integers], Integers, Array]:

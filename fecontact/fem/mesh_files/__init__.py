@@ -194,7 +194,7 @@ def _mesh(
     made = Mesh(mesh.nodes, mesh.cells, named_boundaries(mesh, groups, boundaries),
                 named_points(mesh, groups, points), mesh.curved_edges, mesh.curved_middles,
                 named_constraints(groups.constraints, boundaries, points), mesh.cell_groups,
-                groups.materials, mesh.bricks)
+                groups.materials, mesh.bricks, temperature=mesh.temperature)
     for surface, control, direction in raw.sections:
         if surface in groups.inner:
             made = cut_along(made, control, groups.inner[surface], direction)
@@ -229,6 +229,7 @@ def write_mesh(mesh: Mesh, path: str | Path) -> None:
     lost += [counted_attachments(mesh.attachments)] * bool(mesh.attachments)
     lost += [f"the materials of {choices(mesh.materials)}"] * bool(mesh.materials)
     lost += ["the incompatible modes of its bricks"] * (mesh.bricks == "incompatible")
+    lost += ["its temperatures"] * (mesh.temperature is not None)
     if lost:
         warnings.warn(f"{path}: Gmsh cannot store {' and '.join(lost)}; give them to the body "
                       f"anew.", ModelWarning, stacklevel=2)

@@ -36,6 +36,7 @@ from fecontact.fem.mesh_files.abaqus_constraints import (
 )
 from fecontact.fem.mesh_files.abaqus_keywords import Deck, Options
 from fecontact.fem.mesh_files.abaqus_materials import Given, material, orientation
+from fecontact.fem.mesh_files.abaqus_temperatures import is_temperature, temperature_of
 from fecontact.fem.mesh_files.raw import NODES, PLANE, SOLID, RawMesh
 
 _PLANE = re.compile(r"(?:C(?:PS|PE|PEG|GPE)|DC2D|AC2D|M3D|R3D|SFM3D|STRI|S)(\d)")
@@ -117,7 +118,7 @@ def read_inp(path: Path) -> RawMesh:
     if not bodies:
         raise MeshError("The file holds no *NODE or no *ELEMENT data.")
     deck.require_end()
-    joined, unread = _constrained(assembly, bodies)
+    joined, unread, without = _constrained(assembly, bodies)
     count = sum(len(body.numbered.places) for body in bodies)
     unused = sum(body.part.unused_nodes for body in bodies) if deck.ends_with_elements else 0
     if unused:
@@ -131,6 +132,10 @@ def read_inp(path: Path) -> RawMesh:
         warnings.warn(f"{path}: the file holds {', '.join(unread)}, which are not read; the mesh "
                       f"has none of their stiffness or mass, so give supports, links and welds "
                       f"beside it.", ModelWarning, stacklevel=4)
+    if without:
+        warnings.warn(f"{path}: the file holds {without}, which is not read, so that no "
+                      f"temperature of the file is taken; give it beside the mesh.", ModelWarning,
+                      stacklevel=4)
     if any(re.match("C3D8[IR]", name) for body in bodies for name in body.part.element_types):
         joined.bricks = "incompatible"
     joined.materials, unread = assembly.section_materials(bodies)
@@ -140,15 +145,17 @@ def read_inp(path: Path) -> RawMesh:
     return joined
 
 
-def _constrained(assembly: "_Assembly", bodies: list["_Instance"]) -> tuple[RawMesh, list[str]]:
-    """Mesh of all bodies with constraints and attachments, and keywords of these not read.
+def _constrained(
+    assembly: "_Assembly", bodies: list["_Instance"]
+) -> tuple[RawMesh, list[str], str]:
+    """Mesh with constraints, attachments and temperatures, and keywords of these not read.
 
     Nodes of reference points, which belong to no body, follow those of the bodies.
     """
     parts = {body.title or body.name: body.raw_mesh() for body in bodies}
     joined = _joined(parts)
-    if not assembly.constraints and not assembly.attachments:
-        return joined, []
+    if not assembly.constraints and not assembly.attachments and not assembly.temperatures:
+        return joined, [], ""
     owners = [*bodies, *assembly.reference_points()]
     places = [*(raw.points for raw in parts.values()),
               *(one.placed(one.numbered.places) for one in owners[len(bodies):])]
@@ -197,9 +204,10 @@ def _constrained(assembly: "_Assembly", bodies: list["_Instance"]) -> tuple[RawM
         else:
             joined.attachments += attachments_of(keyword, options, lines, elements, names)
     joined.sections = list(sections_of(assembly.constraints, names))
+    joined.temperature, without = temperature_of(assembly.temperatures, names)
     joined.apart = bool(joined.constraints or joined.sections)
     joined.separate &= not _connected(joined, joined.constraints, first[: len(bodies)])
-    return joined, unread
+    return joined, unread, without
 
 
 def _connected(raw: RawMesh, constraints: list[Constraint], first: Integers) -> bool:
@@ -393,6 +401,7 @@ class _Assembly:
         self.constraints: list[Block] = []
         self.attachments: list[tuple[_Part | None, Block]] = []
         self.unsorted: set[str] = set()
+        self.temperatures: list[Block] = []
         self.sections: list[tuple[_Part | None, Options]] = []
         self.materials: dict[str, dict[str, Given]] = {}
         self.orientations: dict[str, Given] = {}
@@ -432,6 +441,8 @@ class _Assembly:
                 self.orientations[options["NAME"].upper()] = options, lines
             case "ELASTIC" | "DENSITY" | "DAMPING" | "EXPANSION" if self.materials:
                 self.materials[next(reversed(self.materials))][keyword] = options, lines
+            case _ if is_temperature(keyword, options):
+                self.temperatures.append((keyword, options, lines))
             case _ if keyword in READ:
                 self.constraints.append((keyword, options, lines))
             case _ if keyword in TYPES:

@@ -78,6 +78,8 @@ class RawMesh:
         Materials of groups of elements in the unit of the file, with forces in N.
     bricks : 'full' or 'incompatible'
         Kind of the eight-node bricks.
+    temperature : (N,) array, optional
+        Changes of temperature at the nodes.
     """
 
     points: Array
@@ -96,6 +98,7 @@ class RawMesh:
     cell_sets: dict[str, list[tuple[str, Integers]]] = field(default_factory=dict)
     materials: dict[str, AnyMaterial] = field(default_factory=dict)
     bricks: Bricks = "full"
+    temperature: Array | None = None
 
     def part(self, name: str | None) -> "RawMesh":
         """The elements of one part, with the groups of the file; all elements for None.
@@ -228,6 +231,9 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     regions = _cell_groups(raw, points, number, cells[kept])
     mesh = Mesh(points[used], cells[kept], {}, {}, ends[once], middles[once],
                 cell_groups=regions, bricks=raw.bricks)
+    if raw.temperature is not None:
+        mesh = replace(mesh, temperature=_temperature(raw.temperature, mesh, used, number,
+                                                      second_order, orders))
     groups = replace(_groups(raw, mesh, number), materials={
         name: one.scaled(scale) for name in regions for of, one in raw.materials.items()
         if name == of or name.endswith(f".{of}")})
@@ -385,6 +391,22 @@ def _require_plane(points: Array, size: float) -> None:
         raise MeshError(f"The mesh holds surfaces only, in space (z runs from {low:g} to {high:g} "
                         f"m); a solid needs tetrahedra or hexahedra inside its surfaces, and a "
                         f"plane body lies in the x-y plane.")
+
+
+def _temperature(
+    values: Array, mesh: Mesh, used: Integers, number: Integers,
+    second_order: list[tuple[CellKind, Integers]], orders: list[Integers],
+) -> Array:
+    """Temperatures at the nodes of a mesh and at the middles of its edges."""
+    at_nodes = values[used]
+    found = np.append(at_nodes, at_nodes[mesh.edges[0]].mean(axis=1))
+    for (kind, cells), order in zip(second_order, orders, strict=True):
+        if kind in CELL_KINDS.values():
+            pairs = number[cells[:, np.array(kind.edges)]].reshape(-1, 2)
+            pairs, once = np.unique(np.sort(pairs, axis=1), axis=0, return_index=True)
+            edges = mesh.edge_numbers(pairs, "temperature")
+            found[len(at_nodes) + edges] = values[cells[:, order].ravel()[once]]
+    return found
 
 
 def _curved_edges(

@@ -9,10 +9,14 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.tables import located
 from fecontact.core.types import Array
+from fecontact.fem.cyclic_symmetry import CyclicSymmetry, SectorNodes
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.rotation import Rotation, centrifugal_force
 from fecontact.fem.thermal import Temperature, nodal_temperatures, thermal_forces
 from fecontact.reduction.cyclic.sector_rows import known_bodies
+
+# Rounding of temperatures on the two faces of a sector, relative to the largest one.
+_SAME = 1e-3
 
 
 def warmed(
@@ -28,6 +32,27 @@ def warmed(
         with located(f"Body '{name}':"):
             found[name] = nodal_temperatures(bodies[name], temperature[name])
     return found
+
+
+def require_same_temperature(
+    body: ElasticBody, symmetry: CyclicSymmetry, nodes: SectorNodes, warm: Array
+) -> None:
+    """Refuse temperatures (N,) that differ on the two faces at which sectors meet.
+
+    Raises
+    ------
+    InputError
+        Naming the node of the largest difference.
+    """
+    d = body.dimension
+    low = warm[nodes.low] if nodes.weights is None else nodes.weights[::d, ::d] @ warm
+    apart = np.abs(warm[nodes.high] - low)
+    worst = int(apart.argmax())
+    if apart[worst] > _SAME * np.abs(warm).max():
+        x = ", ".join(f"{value:g}" for value in body.nodes[nodes.high[worst]])
+        raise InputError(f"temperature is {warm[nodes.high[worst]]:.6g} K on '{symmetry.high}' at "
+                         f"({x}) and {low[worst]:.6g} K on '{symmetry.low}', turned; all sectors "
+                         f"are alike, give both faces the same.")
 
 
 def constant_forces(body: ElasticBody, rotation: Rotation | None, warm: Array | None) -> Array:

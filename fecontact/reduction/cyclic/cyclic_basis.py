@@ -34,7 +34,12 @@ from fecontact.fem.pairing import Pairing
 from fecontact.fem.points import Place
 from fecontact.fem.rotation import Rotation, coriolis_matrix
 from fecontact.fem.thermal import Temperature, held_stress
-from fecontact.reduction.cyclic.constant_forces import constant_forces, warmed, with_constant
+from fecontact.reduction.cyclic.constant_forces import (
+    constant_forces,
+    require_same_temperature,
+    warmed,
+    with_constant,
+)
 from fecontact.reduction.cyclic.sector_rows import SectorRows, known_bodies, owned
 from fecontact.reduction.damping import Damping, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, free_modes, frequencies_of
@@ -213,7 +218,7 @@ def cyclic_basis(
         switch it off and give the common state as ``prestress``.
     prestress : mapping of body to BodyFields
         Whose stress stiffens the bodies; see :meth:`CyclicBasis.fields`.
-    temperature : mapping of body to float, (N,) array or function of the coordinates
+    temperature : mapping of body to float, (N,) array, function of the coordinates or 'mesh'
         Change [K] from the state without stress, in all sectors alike; stiffens by ``prestress``.
 
     Raises
@@ -254,6 +259,8 @@ def cyclic_basis(
         with located(f"Body '{name}':"):
             given = _Terms.of(body, symmetry, rotation, prestress.get(name),
                               name in separate)
+            if name in warm and given.nodes is not None:
+                require_same_temperature(body, symmetry, given.nodes, warm[name])
             parts[name] = {k: _modes_of_body(
                 body, symmetry, given, k, counts[name],
                 with_constant(nodes.loaded(name, k), None if k else constant[name]),
