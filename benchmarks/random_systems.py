@@ -41,8 +41,9 @@ CHANGE = 1e-7
 DEEPEST = 5.0
 # Steps after which the reference gives up.
 MOST_STEPS = 20_000_000
-# The contact element is two other laws.
-NORMAL = [name for name in law_names()[laws.NormalLaw] if name != "friction-contact-3d"]
+# The contact element is two other laws, and rigid stops need solvers of their own.
+NORMAL = [name for name in law_names()[laws.NormalLaw]
+          if name not in ("friction-contact-3d", "rigid-stop")]
 FRICTION = list(law_names()[laws.FrictionLaw])
 # Time constant of memory that fades without force [s].
 FADING = 1e-7

@@ -19,7 +19,8 @@ import fecontact  # noqa: E402
 project = "fecontact"
 author = "The fecontact developers"
 project_copyright = "The fecontact developers, BSD 3-clause licence"
-logging.getLogger("skfem").setLevel(logging.WARNING)  # it tells of every assembly
+for _name in ("skfem", "traitlets"):  # these tell of every assembly and every notebook
+    logging.getLogger(_name).setLevel(logging.WARNING)
 version = release = fecontact.__version__
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_gallery.gen_gallery",
@@ -62,6 +63,7 @@ sphinx_gallery_conf = {
     "image_scrapers": ("gallery.written",),
     "reset_modules": ("gallery.emptied",),
     "capture_repr": (),
+    "remove_config_comments": True,
     "abort_on_example_error": True,
     "download_all_examples": False,
     "min_reported_time": 10_000,

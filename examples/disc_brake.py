@@ -57,6 +57,7 @@ print(f"at 0.3 a mode of {modes.frequencies_hz[worst]:.2f} Hz grows by "
       f"{modes.eigenvalues[worst].real:.3f} 1/s")
 
 # %%
+# sphinx_gallery_thumbnail_number = 2
 # From steady sliding and a little of this mode on.
 start = initial_state(squealing, "sliding", 0.0)
 shape = modes.right[:, worst].real

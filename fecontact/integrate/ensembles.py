@@ -32,9 +32,9 @@ from fecontact.integrate.lanes.driver import SideBySide, side_by_side
 from fecontact.integrate.rodas5p.driver import again
 from fecontact.integrate.rodas5p.run import Run
 from fecontact.integrate.simulate import (
-    require_fields,
     require_max_step,
     require_resolved_span,
+    require_runs,
 )
 from fecontact.integrate.solvers import AUTO, CompiledSolver, Solver, require_solver
 from fecontact.integrate.step_loop import RUNNING
@@ -157,8 +157,8 @@ def ensemble(
     watched = as_events(events)
     require_solver(solver, *(["events"] if watched else []))
     seen = [Events.none(state_size(members[0]))] * count
-    if not all(isinstance(member, ContactSystem) for member in members):
-        require_fields(solver)
+    for member in members:
+        require_runs(solver, member, "ensemble")
     if isinstance(solver, CompiledSolver) and solver.checkpoint is not None:
         raise InputError(f"solver = {solver!r}: runs of an ensemble keep no checkpoint; leave it "
                          f"out.")

@@ -140,6 +140,7 @@ def simulate(
         with shown(progress, lambda: progress_bar("Running", times[-1], times[0])) as tell:
             return run_field(system, state, times, rtol=float(rtol), max_step=max_step,
                              events=watched, progress=tell)
+    require_runs(solver, system, f"simulate by {solver.name}")
     state = initial_state(system, initial, t_start)
     if not isinstance(initial, str | Trajectory | LoadHistory | RestState):
         _warn_of_depth(system, state, t_start)
@@ -261,6 +262,14 @@ def _depth_at_rest(system: ContactSystem, time: float) -> float:
         return _depth(system, initial_state(system, "rest", time), time)
     except AnalysisError:
         return 0.0
+
+
+def require_runs(solver: Solver, system: ContactSystem | VectorField, what: str) -> None:
+    """Raise InputError unless a solver runs a system: a field, or one with rigid stops."""
+    if isinstance(system, VectorField):
+        require_fields(solver)
+    elif getattr(solver, "restitution", None) is None:
+        system.require_compliance(what)
 
 
 def require_fields(solver: Solver) -> None:

@@ -29,6 +29,7 @@ from .normal.bilateral import (
 from .normal.linear import LinearContact, PrescribedForce, TwoSidedStop
 from .normal.measured_surface import MeasuredSurface
 from .normal.power import BackBurdekinContact, PowerContact, RestitutionContact
+from .normal.rigid_stop import RigidStop
 from .normal.rough_surface import CosineSurface, GaussianSurface, ParabolicSurface, RoughSurface
 from .normal.statistical import ExponentialContact, GreenwoodWilliamson
 from .registry import law_names
@@ -97,6 +98,7 @@ __all__ = [
     "Pulse",
     "RandomRoughness",
     "RestitutionContact",
+    "RigidStop",
     "RoughSurface",
     "Signal",
     "Sine",

@@ -167,6 +167,8 @@ class NormalLaw(NodeLaw):
 
     # Whether it pulls as well as pushes, as a spring does and no contact.
     bilateral: ClassVar[bool] = False
+    # Whether it has no force of the penetration; see RigidStop.
+    rigid: ClassVar[bool] = False
 
     @property
     def penetration_scale(self) -> float:

@@ -57,6 +57,8 @@ def require_sound(law: NormalLaw | FrictionLaw) -> None:
     if not isinstance(scale, float | int) or not 0.0 < scale < np.inf:
         raise InputError(f"{name}: {what} = {scale!r} must be a finite number above zero; define "
                          f"it as a property of the law.")
+    if isinstance(law, NormalLaw) and law.rigid:
+        return
     nodes = law.node_count() or 1
     row = law.table(np.full(nodes, 1.0 / nodes))[0]
     if isinstance(law, NormalLaw):

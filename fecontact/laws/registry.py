@@ -39,6 +39,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
         linear,
         measured_surface,
         power,
+        rigid_stop,
         rough_surface,
         statistical,
     )
@@ -58,6 +59,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "back-burdekin": power.BackBurdekinContact,
             "greenwood-williamson": statistical.GreenwoodWilliamson,
             "two-sided-stop": linear.TwoSidedStop,
+            "rigid-stop": rigid_stop.RigidStop,
             "prescribed-force": linear.PrescribedForce,
             "friction-contact-3d": friction_contact.FrictionContact3D,
             "bilateral-polynomial": bilateral.BilateralPolynomial,

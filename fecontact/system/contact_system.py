@@ -274,6 +274,13 @@ class ContactSystem(Summarised):
         return groups_of_laws(
             [one for one in groups if one[0] or len(groups) == 1], basis.tributary)
 
+    def require_compliance(self, what: str) -> None:
+        """Raise InputError if some contacts are rigid stops, of which something needs a force."""
+        if any(law.rigid for _, _, law in self.law_groups("normal")):
+            raise InputError(f"{what}: a RigidStop has no force of the penetration; give contacts "
+                             f"a normal law with stiffness, or run the system by simulate(..., "
+                             f"initial=..., solver=SetValued(restitution=...)).")
+
     @property
     def share(self) -> Array:
         """Fraction (n,) of the contact face of each node; their sum is one."""

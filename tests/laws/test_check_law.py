@@ -56,7 +56,8 @@ NEEDED = {
 
 
 @pytest.mark.parametrize("cls", [
-    cls for kind in (NormalLaw, FrictionLaw) for cls in law_names()[kind].values()],
+    cls for kind in (NormalLaw, FrictionLaw) for cls in law_names()[kind].values()
+    if not getattr(cls, "rigid", False)],
     ids=lambda cls: cls.__name__)
 def test_laws_of_the_package_pass(cls):
     check_law(cls(*NEEDED[cls]) if cls in NEEDED else made(cls))
@@ -208,7 +209,8 @@ UNTOUCHED = {
     BilateralPiecewise: None}
 
 
-@pytest.mark.parametrize("cls", law_names()[NormalLaw].values(), ids=lambda cls: cls.__name__)
+@pytest.mark.parametrize("cls", [cls for cls in law_names()[NormalLaw].values() if not cls.rigid],
+                         ids=lambda cls: cls.__name__)
 def test_penetration_up_to_which_laws_are_zero(cls):
     law = cls(*NEEDED.get(cls, ()))
     found = law.untouched(3)

@@ -5,9 +5,10 @@ from test_friction_laws import every_law
 from test_memory_laws import LAWS as MEMORY_LAWS
 from test_normal_laws import LAWS as NORMAL_LAWS
 
-from fecontact.laws import FrictionLaw, NormalLaw, law_names
+from fecontact.laws import FrictionLaw, NormalLaw, RigidStop, law_names
 
-TRIED = {NormalLaw: {type(law) for law, _ in NORMAL_LAWS.values()},
+# A rigid stop has no force of the penetration; tests/integrate/test_rigid_stop.py.
+TRIED = {NormalLaw: {RigidStop} | {type(law) for law, _ in NORMAL_LAWS.values()},
          FrictionLaw: {type(law) for law in (*every_law(), *MEMORY_LAWS)}}
 
 

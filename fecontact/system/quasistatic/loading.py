@@ -84,6 +84,7 @@ def load_history(
     require_kind("load_history", LoadPath, path=path)
     if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
         raise InputError(f"load_history: rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
+    system.require_compliance("load_history")
     require_sliders(system)
     system, path = with_named_forces(system, path)
     given, arrays = given_rows(system, path), travelling(system)

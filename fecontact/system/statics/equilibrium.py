@@ -165,6 +165,7 @@ def equilibrium_coordinates(
     ``standing`` leaves forces along the ground out: the normal equilibrium of a body that stays
     where it is.
     """
+    system.require_compliance("equilibrium")
     friction = kind == "sliding"
     ground = system.ground
     if friction and ground.wavy:
