@@ -1,16 +1,21 @@
 """Underplatform dampers of a meshed sector: preload, the linear limits, elastic dampers."""
 
+from dataclasses import replace
+
 import numpy as np
 import platform_damper as example
 import pytest
 
-from fecontact import equilibrium
+from fecontact import AnalysisError, equilibrium
 from fecontact.bifurcation import (
     ContinuationOptions,
     EngineOrder,
     HarmonicBalance,
+    contact_field,
     frequency_response,
 )
+from fecontact.bifurcation.continuation.problem import BranchStatus
+from fecontact.bifurcation.harmonic.stalled import stall_reason
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +62,26 @@ def test_responses_tend_to_the_stuck_limit(wheel):
         found.append(response.amplitude().max() / stuck)
     assert found[1] == pytest.approx(1.0, rel=5e-3)
     assert 0.2 < found[0] < 0.6
+
+
+def test_dampers_that_lift_off_say_what_to_do():
+    """A small load does not hold them: no wave under the whole excitation, or one that stalls."""
+    wheel = example.wheel(2)
+    hertz, wave = example.linear(wheel, stuck=False)[0], EngineOrder(wheel, example.ORDER)
+
+    def response(load, bounds):
+        return frequency_response(
+            example.system(wheel, load, bounds[1]), bounds, example.NAME, start=bounds[1],
+            observe=("blade.tip", "y"), options=ContinuationOptions(points=5, largest_step=0.2),
+            method=HarmonicBalance([0, 1], 24, stability=None, repeats=wave))
+
+    with pytest.raises(AnalysisError, match=r"No wave .* simulate\(wheel_system"):
+        response(0.02, (0.999 * hertz, hertz))
+    field = wave.field(contact_field(example.system(wheel, 6.0, hertz), [example.NAME]))
+    branch = response(6.0, (1.05 * hertz, 1.16 * hertz)).branches[0]
+    said = stall_reason(field, replace(branch, status=BranchStatus.STALLED))
+    for part in ("Contact opens and closes at", "lacks nodal diameters", "run all sectors"):
+        assert part in said
 
 
 @pytest.mark.slow

@@ -41,7 +41,7 @@ from fecontact.bifurcation.harmonic.observed import (
     observed_of_orbits,
 )
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
-from fecontact.bifurcation.harmonic.stalled import stall_reason
+from fecontact.bifurcation.harmonic.stalled import NO_WAVE, stall_reason
 from fecontact.bifurcation.orbit_methods import Collocation, Method, Shooting
 from fecontact.bifurcation.orbits.branches import orbit_branch
 from fecontact.bifurcation.orbits.from_run import periodic_motion
@@ -545,8 +545,13 @@ def _excited_further(
 ) -> tuple[HarmonicProblem, Array]:
     """The wave at full excitation, along a branch from a thousandth of it."""
     part = field.waves.excited(field, values)
-    return _taken(field, values, free, method, options, _up_to(
-        part, part.values, 0, 1.0, method, options, held), held)
+    try:
+        states = _up_to(part, part.values, 0, 1.0, method, options, held)
+    except AnalysisError as error:
+        said = str(error).replace("No orbit was found at the level 1",
+                                  "No wave was found under the whole excitation")
+        raise AnalysisError(f"{said} {NO_WAVE}") from None
+    return _taken(field, values, free, method, options, states, held)
 
 
 def _raised(

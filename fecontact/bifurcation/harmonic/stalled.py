@@ -5,11 +5,16 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.problem import BranchStatus
 from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.harmonic.engine_order import WaveField
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.kernels import NORMAL_FORCE
 
 # Samples that a contact phase should have, and truncation error above which harmonics lack.
 _ENOUGH, _LARGE = 16, 1e-2
+
+# What to do where one sector does not stand for the wheel.
+NO_WAVE = ("Where contact opens, the wheel may not move in a wave that repeats: press the contacts "
+           "more, or run all sectors, simulate(wheel_system(...)).")
 
 
 def stall_reason(field: VectorField, branch: Branch) -> str:
@@ -44,4 +49,10 @@ def stall_reason(field: VectorField, branch: Branch) -> str:
     if error > _LARGE:
         told.append(f"The truncation error is {error:.2g} with {branch.attributes['harmonics']} "
                     f"harmonics: take more, or damp the modes that they excite.")
+    if isinstance(field, WaveField):
+        if np.isnan(error):
+            told.append("The truncation error is not known, as the wheel lacks nodal diameters of "
+                        "further harmonics: make it with all.")
+        if opens.any():
+            told.append(NO_WAVE)
     return " ".join(told)
