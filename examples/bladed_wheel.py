@@ -3,19 +3,10 @@ A wheel of blades from one sector: nodal diameters, rotation, friction between t
 =========================================================================================
 
 The sector of a plane wheel is a piece of a ring with one blade. Its modes are those of the whole
-wheel, by nodal diameters; at speed, waves that run forwards and backwards differ. Then blades
-alone, clamped at the root, rub on each other at the tips under engine order m. Pressed hard they
-stick: each mode of a blade feels the springs k_t of both contacts,
-
-    4 k_t sin^2(pi m / N),
-
-and between slip and stick friction takes most. One blade stands for the wheel.
-
-Usage: python examples/bladed_wheel.py [FOLDER] [--quick]
+wheel, by nodal diameters; at speed, waves that run forwards and backwards differ. Then the blades
+rub on each other at their tips under an engine order: pressed lightly they slide, pressed hard they
+stick, and in between friction takes most. One blade stands for the wheel.
 """
-
-import sys
-from pathlib import Path
 
 import numpy as np
 
@@ -28,106 +19,56 @@ from fecontact.bifurcation import (
 )
 from fecontact.fem import CyclicSymmetry, Rotation
 from fecontact.laws import Harmonic, JenkinsFriction, PrescribedForce
-from fecontact.plot import COLOURS, new_figure, plot_diameters, plot_wheel
-from fecontact.reduction import (
-    CyclicBasis,
-    PointPairing,
-    cyclic_basis_from_bases,
-    sector_modes,
-)
+from fecontact.plot import plot_diameters, plot_response, plot_wheel
+from fecontact.reduction import PointPairing, cyclic_basis_from_bases, sector_modes
 
-N, ORDER, SPEED = 12, 4, 900.0  # sectors, engine order, rad/s
-INNER, OUTER, TIP = 0.175, 0.20, 0.32  # radii of the ring and of the tips [m]
-LENGTH, HEIGHT, DEPTH = 0.12, 0.008, 0.02  # of a blade alone [m]
-TANGENTIAL, COEFFICIENT, FORCE = 2e4, 0.4, 1.0  # N/m, friction, N
+sectors, order, speed = 12, 4, 900.0  # engine order; rad/s
 
+# %%
+# The sector: a grid over radius and angle, of which the outer part is the blade alone.
+radii = np.concatenate([np.linspace(0.175, 0.2, 4), np.linspace(0.2, 0.32, 9)[1:]])
+flat = fc.Mesh.grid(np.linspace(0.0, 2.0 * np.pi / sectors, 9), radii)
+angle, radius = flat.nodes.T
+middle = np.abs(angle - np.pi / sectors) < 1.1 * np.pi / 4.0 / sectors
+cells = flat.cells[(middle | (radius < 0.201))[flat.cells].all(axis=1)]
+used, numbers = np.unique(cells, return_inverse=True)
+places = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+new = dict(zip(used.tolist(), range(len(used)), strict=True))
+sides = {name: [[new[k] for k in edge] for edge in flat.boundary(side).tolist()
+                if new.keys() >= set(edge)] for name, side in (("low", "left"), ("high", "right"))}
+mesh = fc.Mesh(places[used], numbers.reshape(cells.shape)[:, ::-1], sides)
+body = fc.ElasticBody(mesh, thickness=0.02)
 
-def sector(columns: int = 8) -> fc.ElasticBody:
-    """A piece of the ring with a blade in its middle: the middle columns go on to the tip."""
-    angles = np.linspace(0.0, 2.0 * np.pi / N, columns + 1)
-    radii = np.concatenate([np.linspace(INNER, OUTER, 4), np.linspace(OUTER, TIP, 9)[1:]])
-    number, nodes = {}, []
-    inside = range(columns // 2 - 1, columns // 2 + 2)
-    for i, r in enumerate(radii):
-        for j, angle in enumerate(angles):
-            if i < 4 or j in inside:
-                number[i, j] = len(nodes)
-                nodes.append((r * np.cos(angle), r * np.sin(angle)))
-    cells = [[number[i, j], number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]]
-             for i, j in number if {(i + 1, j), (i + 1, j + 1), (i, j + 1)} <= number.keys()]
+# %%
+# Frequencies over the nodal diameter, at rest and at speed.
+symmetry = CyclicSymmetry("low", "high", sectors)
+wheel = sector_modes(body, symmetry, 3)
+turning = sector_modes(body, symmetry, 16, rotation=Rotation(speed)).rotation
+forward, backward = turning.frequencies_hz(speed)
+print(f"diameter {order}: {forward[order, 0]:.1f} Hz forwards, {backward[order, 0]:.1f} Hz "
+      f"backwards")
+plot_diameters(wheel, speed=speed, path="wheel_diameters.png")
+plot_wheel(wheel, [(2, 0), (4, 0), (6, 1)], path="wheel_modes.png")
 
-    def side(j):
-        return [[number[i, j], number[i + 1, j]] for i in range(3)]
+# %%
+# Blades that touch the next one at their tips, by an elastic Coulomb element.
+blade = fc.modal_basis(
+    fc.ElasticBody(fc.generate(fc.Beam(0.12, 0.008, 0.004)), thickness=0.02, fixed={"left": "xy"}),
+    4, contact=(), B="", C="", damping=2e-3, points={"tip": (0.12, 0.004)})
+tips = cyclic_basis_from_bases({"blade": blade}, sectors, {
+    "tips": PointPairing("blade", "tip", "next_blade", "tip", normals=(1.0, 0.0))})
+system = fc.ContactSystem(
+    tips.basis, normal=PrescribedForce(1.0), friction=JenkinsFriction(2e4, 0.4),
+    load=fc.Load(forces=(fc.PointLoad("blade.tip", "y", signal=Harmonic(1.0, 450.0)),)))
 
-    return fc.ElasticBody(fc.Mesh(np.array(nodes), cells, {
-        "low": side(0), "high": side(columns)}), thickness=DEPTH)
-
-
-def blades() -> CyclicBasis:
-    """A wheel of blades that touch the next one at their tips."""
-    mesh = fc.generate(fc.Beam(LENGTH, HEIGHT, 0.5 * HEIGHT))
-    blade = fc.modal_basis(fc.ElasticBody(mesh, thickness=DEPTH, fixed={"left": "xy"}), 4,
-                           contact=(), B="", C="", damping=2e-3,
-                           points={"tip": (LENGTH, 0.5 * HEIGHT)})
-    return cyclic_basis_from_bases({"blade": blade}, N, {"tips": PointPairing(
-        "blade", "tip", "next_blade", "tip", normals=(1.0, 0.0))})
-
-
-def system(wheel: CyclicBasis, load: float, frequency_hz: float) -> fc.ContactSystem:
-    """The wheel with the tips pressed on each other [N]."""
-    return fc.ContactSystem(
-        wheel.basis, normal=PrescribedForce(load),
-        friction=JenkinsFriction(TANGENTIAL, COEFFICIENT),
-        load=fc.Load(forces=(fc.PointLoad("blade.tip", "y", signal=Harmonic(
-            FORCE, frequency_hz)),)))
-
-
-def stuck_hz(basis: fc.ModalBasis) -> float:
-    """Frequency of a blade with the springs of both contacts, of the wave of the order."""
-    row = basis.point_row("blade.tip", "y")
-    stiffness = np.diag(basis.angular_frequencies**2) + (
-        4.0 * TANGENTIAL * np.sin(np.pi * ORDER / N) ** 2 * np.outer(row, row))
-    return float(np.sqrt(np.linalg.eigvalsh(stiffness)[0])) / (2.0 * np.pi)
-
-
-def main(folder: Path = Path(), quick: bool = False) -> None:
-    """Prints frequencies and peaks; pictures in the folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    symmetry, diameters = CyclicSymmetry("low", "high", N), range(2, N // 2 + 1)
-    wheel = sector_modes(sector(), symmetry, 3)
-    print("first modes of 2 diameters and more:",
-          *(f"{wheel.frequencies_hz[k, 0]:.1f}" for k in diameters), "Hz")
-    turning = sector_modes(sector(), symmetry, 16, rotation=Rotation(SPEED)).rotation
-    forward, backward = turning.frequencies_hz(SPEED)
-    print(f"diameter {ORDER} at {SPEED:g} rad/s: {forward[ORDER, 0]:.1f} Hz forwards, "
-          f"{backward[ORDER, 0]:.1f} Hz backwards")
-    plot_diameters(wheel, speed=SPEED, path=folder / "wheel_diameters.png")
-    plot_wheel(wheel, [(2, 0), (4, 0), (6, 1)], path=folder / "wheel_modes.png")
-
-    tips = blades()
-    free, stuck = tips.basis.frequencies_hz.min(), stuck_hz(tips.basis)
-    bounds = (0.93 * free, 1.04 * stuck)
-    method = HarmonicBalance([0, 1, 3], 12 * N, stability=None, repeats=EngineOrder(
-        tips, ORDER))
-    name = "load.forces.0.signal.frequency_hz"
-    loads = np.array([1.0, 4.0, 1000.0]) if quick else np.array(
-        [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 1000.0])
-    with new_figure(7.0, 4.5, folder / "blade_tips.png") as figure:
-        axes = figure.subplots()
-        for load, colour in zip(loads, COLOURS, strict=False):
-            found = frequency_response(
-                system(tips, load, bounds[0]), bounds, name, observe=("blade.tip", "y"),
-                method=method, options=ContinuationOptions(points=1000, largest_step=0.03))
-            peak = found.peak()
-            print(f"{load:6.1f} N: peak {1e6 * found.amplitude().max():.2f} um at "
-                  f"{peak.parameter:.2f} Hz")
-            axes.semilogy(found.branches[0].parameter, 1e6 * found.amplitude(), color=colour,
-                          label=f"{load:g} N")
-        axes.set(xlabel="frequency [Hz]", ylabel="amplitude of a tip [µm]")
-        axes.legend(title="normal load")
-    print(f"free {free:.2f} Hz, stuck {stuck:.2f} Hz")
-
-
-if __name__ == "__main__":
-    main(*(Path(given) for given in sys.argv[1:] if given != "--quick"),
-         quick="--quick" in sys.argv)
+# %%
+# Responses to the engine order for several normal forces.
+responses = frequency_response(
+    system, (430.0, 520.0), "load.forces.0.signal.frequency_hz", observe=("blade.tip", "y"),
+    levels={"normal.force": [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 1000.0]},
+    method=HarmonicBalance([0, 1, 3], 144, stability=None, repeats=EngineOrder(tips, order)),
+    options=ContinuationOptions(points=1000, largest_step=0.03))
+for level, force in enumerate(responses.levels):
+    print(f"{force:6.1f} N: peak {1e6 * responses.amplitude(level).max():.2f} um at "
+          f"{responses.peak(level).parameter:.2f} Hz")
+plot_response(responses, path="blade_tips.png")

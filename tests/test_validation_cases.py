@@ -151,6 +151,11 @@ CASES = {
                                 (r"each cycle from (\S+) mm", 1.161, 0.06),
                                 (r"^held: \S+ Hz, (\S+) Hz", 65.1, 0.3)],
                      {"out/bolted_panel.png"}),
+    "bladed_wheel": (("out",), [(r"^1000.0 N: peak \S+ um at (\S+) Hz", 504.39, 0.02),
+                                (r"stuck (\S+) Hz", 504.39, 0.01),
+                                (r"^diameter 4 at .* (\S+) Hz backwards", 785.9, 0.5)],
+                     {f"out/{name}.png" for name in ("wheel_diameters", "wheel_modes",
+                                                     "blade_tips")}),
 }
 
 

@@ -98,7 +98,7 @@ def level_texts(response: FrequencyResponse) -> tuple[str, list[str]]:
     unit = unit.removesuffix("]") if words else ""
     factor, symbol = 1.0, unit
     if has_prefixes(unit):
-        factor, symbol = suitable_unit(float(np.abs(levels).max()), unit)
+        factor, symbol = suitable_unit(float(np.median(np.abs(levels))), unit)
     return words or label, [f"{level / factor:.4g} {symbol}".strip() for level in levels]
 
 
