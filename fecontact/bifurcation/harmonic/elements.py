@@ -1,9 +1,9 @@
 """Forces of elastic Coulomb elements in harmonic balance, node by node and one by one.
 
 Elements of plane bodies are followed exactly, see
-:mod:`fecontact.bifurcation.harmonic.stick_and_slip`; along two tangents they are marched, see
-:mod:`fecontact.bifurcation.harmonic.memory`, each by itself. Derivatives are those to a node's own
-coefficients, whatever the number of modes.
+:mod:`fecontact.bifurcation.harmonic.stick_and_slip`. Along two tangents they are found at the
+samples, each by itself, see :func:`fecontact.bifurcation.harmonic.memory.solve_around_limit`.
+Derivatives are those to a node's own coefficients, whatever the number of modes.
 """
 
 import math
@@ -13,8 +13,8 @@ import numpy as np
 from fecontact.bifurcation.harmonic.memory import (
     LEAK,
     element_law,
-    march_block,
     solve_around,
+    solve_around_limit,
     take_element,
 )
 from fecontact.bifurcation.harmonic.slip_path import Path, cut_pieces, moved_at
@@ -125,20 +125,19 @@ def _along_one_tangent(j, X, T, s, count, offsets, values, derivatives, r, z, ro
 
 @routine
 def _along_two_tangents(j, X, T, s, count, offsets, values, derivatives, r, z, rows):
-    """Forces of the ``count`` elements of a node in space, marched; see :func:`element_forces`."""
+    """Forces of the ``count`` elements of a node in space; see :func:`element_forces`."""
     N, L = values.shape
     series, moved, pressing = np.empty((3, L)), np.empty((N, 6)), np.empty(N)
     slopes = np.zeros((N, 3 * L))
     _, timed = _pressing_of(j, X, T, values, s, derivatives, series, moved, pressing, slopes)
     rate, leak = N / T, LEAK / T
     slip, target, path = np.empty((N, 3)), np.empty((N, 2)), np.empty((N, 2))
-    p, force, rates, nothing = np.empty(3), np.empty(12), np.empty((2, 6)), np.empty((0, 0))
-    times, blocks = np.empty(N), np.array([2])
+    p, force, rates, blocks = np.empty(3), np.empty(12), np.empty((2, 6)), np.array([2])
     by_z, change = np.empty((N, 1, 2, 2)), np.empty((N if derivatives else 0, 2, 3 * L))
     by_pair = np.empty((N, 2, 3))
     for n in range(N):
         ground = ground_motion(n * T / N, s)
-        times[n], slip[n, 2] = n * T / N, pressing[n]
+        slip[n, 2] = pressing[n]
         for c in range(2):
             slip[n, c] = rate * (1.5 * moved[n, 2 * c] - 2.0 * moved[n - 1, 2 * c]
                                  + 0.5 * moved[n - 2, 2 * c]) - ground_moved(
@@ -150,7 +149,7 @@ def _along_two_tangents(j, X, T, s, count, offsets, values, derivatives, r, z, r
         for n in range(N):
             for c in range(2):
                 target[n, c] = moved[n, 2 * c] + offsets[2 * i + c]
-        if march_block(j, True, times, nothing, s, T, slip, p, target, force, rates, path) == 0:
+        if solve_around_limit(j, s, T, slip, p, target, path) == 0:
             done = 0
         for n in range(N):
             element_law(j, slip[n], path[n], s, p, force, rates)

@@ -12,10 +12,12 @@ the part that it slid back then (:class:`Kept`). One that slides a little gives 
 it must. What is found repeats, so that its derivatives are those of these equations, cyclic, node
 by node and element by element.
 
-Elastic Coulomb elements are marched so along two tangents, and beside other internal variables;
-see :mod:`fecontact.bifurcation.harmonic.elements`.
+Elastic Coulomb elements are marched so beside other internal variables. Along two tangents the same
+equations are solved for all samples at once, see :func:`solve_around_limit`; elements that are
+followed one by one are in :mod:`fecontact.bifurcation.harmonic.elements`.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +42,11 @@ LEAK = 1e-6
 # Largest number of rounds, of Newton steps at a sample, and relative changes that end both.
 _ROUNDS, _STEPS = 60, 40
 _REPEATS, _SOLVED = 1e-12, 1e-14
+# Elements along two tangents: first return time as a part of the period, and by which it is divided
+# in turn, at least; largest number of Newton steps with each, change of a step that ends all but
+# the last, and roundings in what the equations leave.
+_SOFT, _STIFFER, _LEAST_STIFFER = 0.3, 10.0, 1.05
+_MOST, _NEARLY, _ROUNDINGS = 40, 1e-6, 4e-15
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,6 +323,86 @@ def march_block(j, alone, t, y, s, T, slip, p, target, force, rates, path):
     return 0
 
 
+@borrowing
+def _left_over(j, s, T, slip, p, target, force, rates, path, left, slopes):
+    """Fill ``left`` (N, 2, 1) with what the equations of an element leave, ``slopes`` with g_z.
+
+    Returns the largest of it, and the largest deflection.
+    """
+    N, b = path.shape
+    rate, most, largest = N / T, 0.0, 0.0
+    for n in range(N):
+        element_law(j, slip[n], path[n], s, p, force, rates)
+        for i in range(b):
+            left[n, i, 0] = (rates[i, 0] - LEAK / T * (path[n, i] - target[n, i])
+                             - rate * (1.5 * path[n, i] - 2.0 * path[n - 1, i]
+                                       + 0.5 * path[n - 2, i]))
+            most, largest = max(most, abs(left[n, i, 0])), max(largest, abs(path[n, i]))
+            for k in range(b):
+                slopes[n, 0, i, k] = rates[i, 3 + k]
+    return most, largest
+
+
+@borrowing
+def solve_around_limit(j, s, T, slip, p, target, path):
+    """Fill path (N, 2) with deflections of an element along two tangents that repeat; 1 if found.
+
+    p (3,) are the return time, the stiffness and the coefficient. Newton's method for all samples
+    at once, beginning with an element that never slides; if it does slide, with a return time that
+    is reduced in turn. With z the deflection and x the displacement the equations are monotone in z
+    - x: differences around a period give no energy, and the return to the limit is the gradient of
+    a convex function. An element that slides a little forgets next to nothing in a period, so that
+    marching around it does not end.
+    """
+    N, b = path.shape
+    final, own = p[0], np.empty(3)
+    left, slopes = np.empty((N, b, 1)), np.empty((N, 1, b, b))
+    force, rates = np.empty(2 * (4 + b)), np.empty((b, 4 + b))
+    for n in range(N):
+        for i in range(b):
+            path[n, i] = target[n, i]
+    own[0], own[1], own[2] = p[0], p[1], p[2]
+    enough = _ROUNDINGS * (3.0 * N / T + 1.0 / final)
+    most, largest = _left_over(j, s, T, slip, own, target, force, rates, path, left, slopes)
+    if most <= enough * largest:
+        return 1
+    own[0], factor = _SOFT * T, _STIFFER
+    known, before = path.copy(), own[0]
+    while own[0] > final:
+        own[0] = max(own[0] / factor, final)
+        enough = _ROUNDINGS * (3.0 * N / T + 1.0 / own[0])
+        nearly = _NEARLY if own[0] > final else _REPEATS
+        most, largest = _left_over(j, s, T, slip, own, target, force, rates, path, left, slopes)
+        solved = False
+        for _ in range(_MOST):
+            _solve_block(slopes, T, 0, 0, b, left)
+            change = 0.0
+            for n in range(N):
+                for i in range(b):
+                    path[n, i] += left[n, i, 0]
+                    change = max(change, abs(left[n, i, 0]))
+            most, largest = _left_over(j, s, T, slip, own, target, force, rates, path, left, slopes)
+            if change <= nearly * largest or most <= enough * largest:
+                solved = True
+                break
+        if solved:
+            factor = min(factor * factor, _STIFFER)
+        else:
+            # From the last one again, by a smaller step.
+            factor = math.sqrt(factor)
+            if factor < _LEAST_STIFFER:
+                return 0
+            own[0] = before
+        for n in range(N):
+            for i in range(b):
+                if solved:
+                    known[n, i] = path[n, i]
+                else:
+                    path[n, i] = known[n, i]
+        before = own[0]
+    return 1
+
+
 @kernel
 def march(
     t: Vector, y: Matrix, s: SystemArrays, T: float, blocks: IntegerVector, target: Matrix,
@@ -346,7 +433,10 @@ def march(
                 force, rates = np.empty(2 * (4 + b)), np.empty((b, 4 + b))
             path = np.empty((N, b))
             at = j * states + first
-            if march_block(j, alone, t, y, s, T, slip, p, target[:, at : at + b], force, rates,
+            if alone and b == 2:
+                if solve_around_limit(j, s, T, slip, p, target[:, at : at + b], path) == 0:
+                    done = 0
+            elif march_block(j, alone, t, y, s, T, slip, p, target[:, at : at + b], force, rates,
                             path) == 0:
                 done = 0
             for place in range(N):
