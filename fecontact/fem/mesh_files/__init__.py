@@ -37,6 +37,12 @@ from fecontact.fem.mesh_files.med import read_med
 from fecontact.fem.mesh_files.raw import RawMesh, body_mesh
 from fecontact.fem.pretension import cut_along
 
+# Cards of Nastran that stiffen a mesh of plane and solid elements, as regular expressions. Bars
+# without properties name lines.
+_STIFFENING = (r"PBARL?", r"PBE(?:AML?|AM3|ND)", "PROD", "CONROD", "PTUBE", r"CBUSH(?:1D|2D)?",
+               r"CELAS\d", r"CDAMP\d", "CVISC", "CGAP", "CWELD", "CFAST", "CSEAM", r"CMASS\d",
+               r"CONM\d", "RBE[123]", "RBAR1?", "RROD", "RTRPLT1?", "RSPLINE", "RJOINT", "MPC",
+               "DMIG")
 _BYTES_OF_A_GRID_POINT = 200.0  # coordinates and a cell of eight nodes, with copies
 
 
@@ -377,6 +383,15 @@ def _read_nastran(path: Path) -> RawMesh:
     if re.search(r"^C(?:TRIA|QUAD|TRAX|TETRA|HEXA|PENTA|PYRAM)\w*\s*\*", text, re.MULTILINE):
         raise MeshError("The file has elements in large fields (CQUAD4*), which are not read; "
                         "write elements in small fields.")
+    # Shells beside solids stiffen these; alone in a plane they are the body.
+    solid = re.search(r"^C(?:TETRA|HEXA|PENTA|PYRAM)", text, re.MULTILINE)
+    found = re.search(rf"^(?:{'|'.join(_STIFFENING)}{'|PSHELL|PCOMP' if solid else ''})\b", text,
+                      re.MULTILINE)
+    if found:
+        raise MeshError(f"The file holds {found[0]}, which is not read and would stiffen the mesh "
+                        f"or give it mass; mesh stiffeners with solid elements, or give a deck of "
+                        f"Abaqus or CalculiX, which may have couplings, equations, springs and "
+                        f"masses, or the matrices of a superelement (EXTSEOUT, read_matrix).")
     if not re.search(r"^\s*BEGIN BULK", text, re.MULTILINE):
         text = "BEGIN BULK\n" + text
     if not re.search(r"^ENDDATA", text, re.MULTILINE):

@@ -56,7 +56,13 @@ _FACES: dict[int, tuple[tuple[int, ...], ...]] = {
 
 # Keywords that stiffen or load the mesh by other means than its plane and solid elements.
 _UNREAD = ("DISTRIBUTING COUPLING", "SHELL TO SOLID COUPLING", "EMBEDDED ELEMENT",
-           "FASTENER", "CONNECTOR SECTION", "JOINT")
+           "FASTENER", "CONNECTOR SECTION", "JOINT", "USER ELEMENT", "SUBSTRUCTURE PROPERTY",
+           "MATRIX ASSEMBLE")
+# Sections of elements that bend or stretch outside of the solids that they are joined to.
+_STRUCTURAL = ("SHELL SECTION", "SHELL GENERAL SECTION", "MEMBRANE SECTION", "BEAM SECTION",
+               "BEAM GENERAL SECTION", "FRAME SECTION")
+# Letters behind the number of nodes of solid elements.
+_VARIANT = re.compile(r"[EHIMPRSTV]*(?:OF|CO)?$")
 _GENERATING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY")
 _KINDS = {"NSET": "nodes", "ELSET": "elements"}
 _PARALLEL = 1e-9  # sine of the angle between directions that span no plane
@@ -118,6 +124,12 @@ def read_inp(path: Path) -> RawMesh:
     if not bodies:
         raise MeshError("The file holds no *NODE or no *ELEMENT data.")
     deck.require_end()
+    for body in bodies:
+        if len(moved := body.numbered.moved_nodes):
+            of = f" of '{body.name}'" if body.name else ""
+            more = f", as are {len(moved) - 1} others" if len(moved) > 1 else ""
+            warnings.warn(f"{path}: node {moved[0]}{of} is given a second time, at another place"
+                          f"{more}; the last place counts.", ModelWarning, stacklevel=4)
     joined, unread, without = _constrained(assembly, bodies)
     count = sum(len(body.numbered.places) for body in bodies)
     unused = sum(body.part.unused_nodes for body in bodies) if deck.ends_with_elements else 0
@@ -433,6 +445,11 @@ class _Assembly:
                 self.current = None
             case "INSTANCE":
                 self._add_instance(options, lines)
+            case _ if keyword in _STRUCTURAL:
+                of = shown(options["ELSET"]) if "ELSET" in options else "some elements"
+                raise MeshError(f"The file holds shells or beams (*{keyword} of {of}), which are "
+                                f"not read; mesh them with solid elements, or leave elements and "
+                                f"section out if they stiffen nothing.")
             case "SOLID SECTION":
                 self.sections.append((part, options))
             case "MATERIAL":
@@ -808,8 +825,12 @@ class _NumberedMesh:
     def __init__(self, part: _Part) -> None:
         numbers = np.concatenate([numbers for numbers, _ in part.node_blocks])
         last = _last_of_each(numbers)
-        self.places = np.concatenate([places for _, places in part.node_blocks])[last]
+        places = np.concatenate([places for _, places in part.node_blocks])
+        self.places = places[last]
         self.nodes = _Index(numbers[last])
+        before = np.flatnonzero(~last)
+        elsewhere = (places[before] != self.places[self.nodes(numbers[before])]).any(axis=1)
+        self.moved_nodes = np.unique(numbers[before][elsewhere])
         last = _last_of_each(np.concatenate(
             [np.empty(0, np.int64), *(numbers for _, numbers, _ in part.element_blocks)]))
         blocks: dict[str, list[tuple[Integers, Integers]]] = {}
@@ -893,6 +914,9 @@ def _kind(name: str) -> str | None:
         raise MeshError(f"The file holds axisymmetric elements ({name}); fecontact's bodies are "
                         f"plane.")
     if match := _SOLID.match(name):
+        if not _VARIANT.match(name[match.end():]):
+            raise MeshError(f"The file holds elements of the unknown type {name}; correct the "
+                            f"type, such as C3D{match[1]}.")
         return _SOLID_KINDS.get(int(match[1]), "solid")
     if match := _LINE.match(name):
         return _LINE_KINDS[match[1], match[2]]

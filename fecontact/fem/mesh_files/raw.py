@@ -319,7 +319,10 @@ def _groups(raw: RawMesh, mesh: Mesh, number: Integers) -> Groups:
             boundaries[name] = mesh.outline[outer]
         elif rows:
             points.setdefault(name, np.unique(np.concatenate(met)))
-            inner[name] = np.concatenate([one.reshape(-1, mesh.outline.shape[1]) for one in met])
+            width = mesh.outline.shape[1]
+            inner[name] = np.concatenate([np.empty((0, width), np.int64), *(
+                one.reshape(-1, width) for one, block in zip(met, sides[name], strict=True)
+                if block.shape[1] == width or mesh.kind.simplex)])
     if mesh.dimension == 3:
         for name, group in raw.edges.items():
             nodes = np.unique(number[group[:, :2]])

@@ -1,0 +1,103 @@
+"""Decks that a stranger may give: shells and beams, unknown elements, numbers given twice."""
+
+import numpy as np
+import pytest
+
+from fecontact import ElasticBody, InputError, MeshError, ModelWarning, read_mesh
+
+PLACES = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+NODES = "*NODE\n" + "".join(f"{k}, {x}, {y}, {z}\n" for k, (x, y, z) in enumerate(PLACES, 1))
+BRICK = "*ELEMENT, TYPE=C3D8, ELSET=ALL\n1, 1, 2, 3, 4, 5, 6, 7, 8\n"
+STEEL = ("*MATERIAL, NAME=STEEL\n*ELASTIC\n2.1e11, 0.3\n*DENSITY\n7850.\n"
+         "*SOLID SECTION, ELSET=ALL, MATERIAL=STEEL\n")
+GRID = "".join(f"GRID,{k},,{x}.,{y}.,{z}.\n" for k, (x, y, z) in enumerate(PLACES, 1))
+HEXA = f"BEGIN BULK\n{GRID}GRID,9,,0.,0.,2.\nCHEXA,1,1,1,2,3,4,5,6\n+,7,8\n"
+
+
+def written(folder, name, text):
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize(("kind", "nodes", "section"), [
+    ("S4", "1, 2, 3, 4", "SHELL SECTION"), ("S4R", "1, 2, 3, 4", "SHELL SECTION"),
+    ("S3", "1, 2, 3", "SHELL GENERAL SECTION"), ("S8", "1, 2, 3, 4, 5, 6, 7, 8", "SHELL SECTION"),
+    ("B31", "1, 2", "BEAM SECTION"), ("B32", "1, 2, 3", "BEAM GENERAL SECTION"),
+])
+@pytest.mark.parametrize("solid", [BRICK, ""])
+def test_shells_and_beams_are_refused_with_the_way_round(tmp_path, kind, nodes, section, solid):
+    text = (f"{NODES}{solid}*ELEMENT, TYPE={kind}, ELSET=RIB\n2, {nodes}\n{STEEL}"
+            f"*{section}, ELSET=RIB, MATERIAL=STEEL\n0.01\n")
+    with pytest.raises(MeshError, match=rf"shells or beams \(\*{section} of 'RIB'\).*mesh them wi"):
+        read_mesh(written(tmp_path, "a.inp", text))
+
+
+@pytest.mark.parametrize(("kind", "nodes"), [("S4", "1, 2, 3, 4"), ("CPS3", "1, 2, 3")])
+def test_elements_without_a_section_name_faces(tmp_path, kind, nodes):
+    """As meshers write groups; a triangle on a brick is none of its faces, but names its nodes."""
+    mesh = read_mesh(written(
+        tmp_path, "a.inp", f"{NODES}{BRICK}*ELEMENT, TYPE={kind}, ELSET=SKIN\n2, {nodes}\n{STEEL}"))
+    if kind == "S4":
+        assert len(mesh.boundaries["SKIN"]) == 1
+    else:
+        assert mesh.points["SKIN"].tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize(("cards", "card"), [
+    ("CBAR,2,2,5,9,0.,1.,0.\nPBAR,2,1,.1,.1,.1\n", "PBAR"),
+    ("CBEAM,2,2,5,9,0.,1.,0.\nPBEAML,2,1,,ROD\n+,.1\n", "PBEAML"),
+    ("CQUAD4,2,2,5,6,7,8\nPSHELL,2,1,.01,1\n", "PSHELL"), ("RBE2,3,9,123456,5,6,7,8\n", "RBE2"),
+    ("RBE3,3,,9,123456,1.,123,5,6\n+,7,8\n", "RBE3"), ("MPC,1,1,1,1.,2,1,-1.\n", "MPC"),
+    ("CELAS2,4,1e5,1,1\n", "CELAS2"), ("CONM2,5,9,,1.\n", "CONM2"),
+])
+def test_cards_of_nastran_that_stiffen_are_refused_with_the_way_round(tmp_path, cards, card):
+    path = written(tmp_path, "a.bdf", f"{HEXA}{cards}ENDDATA\n")
+    with pytest.raises(MeshError, match=rf"holds {card}, which is not read.*deck of Abaqus"):
+        read_mesh(path)
+
+
+def test_shells_of_nastran_in_space_are_refused(tmp_path):
+    grid = GRID.replace("GRID,3,,1.,1.,0.", "GRID,3,,1.,1.,1.")
+    with pytest.raises(MeshError, match="surfaces only, in space"):
+        read_mesh(written(tmp_path, "a.bdf", f"BEGIN BULK\n{grid}CQUAD4,1,1,1,2,3,4\nENDDATA\n"))
+
+
+@pytest.mark.parametrize("kind", ["C3D8XYZ", "C3D10Q"])
+def test_unknown_variants_of_elements_are_named(tmp_path, kind):
+    with pytest.raises(MeshError, match=f"unknown type {kind}"):
+        read_mesh(written(tmp_path, "a.inp", NODES + BRICK.replace("C3D8", kind)))
+
+
+@pytest.mark.parametrize("kind", ["C3D8", "C3D8R", "C3D8I", "C3D8H", "C3D8RH", "C3D8IH", "C3D8T",
+                                  "C3D8HT", "C3D8RHT"])
+def test_known_variants_are_read(tmp_path, kind):
+    mesh = read_mesh(written(tmp_path, "a.inp", NODES + BRICK.replace("C3D8", kind)))
+    assert len(mesh.cells) == 1
+
+
+def test_nodes_given_twice_are_said(tmp_path):
+    text = NODES.rstrip() + "\n1, 0.0, 0.0, 0.1\n2, 1.0, 0.0, 0.0\n" + BRICK
+    with pytest.warns(ModelWarning, match=r"node 1 is given a second time, at another place; the"):
+        mesh = read_mesh(written(tmp_path, "a.inp", text))
+    assert np.abs(mesh.nodes - [0.0, 0.0, 0.1]).sum(axis=1).min() == 0.0
+    assert len(read_mesh(written(tmp_path, "a.inp", text.replace("0.1", "0.0"))).nodes) == 8
+
+
+def test_couplings_that_determine_a_node_twice_name_it(tmp_path):
+    points = NODES.rstrip() + "\n98, 0.5, 0.5, 2\n99, 0.5, 0.5, -1\n"
+    coupling = "*COUPLING, CONSTRAINT NAME=C{0}, REF NODE={1}, SURFACE=A\n*KINEMATIC\n"
+    text = (points + BRICK + STEEL + "*SURFACE, NAME=A\n1, S1\n" + coupling.format(1, 98)
+            + coupling.format(2, 99))
+    mesh = read_mesh(written(tmp_path, "a.inp", text))
+    with pytest.raises(InputError, match=r"'C2' and Coupling 'C1' determine .* at \(0, 0, 0\) i"):
+        _ = ElasticBody(mesh).expansion
+
+
+def test_names_with_spaces(tmp_path):
+    text = (NODES + BRICK.replace("ALL", '"all of it"') + STEEL.replace("ALL", '"all of it"')
+            + '*NSET, NSET="some nodes"\n1, 2\n*SURFACE, NAME="the face"\n1, S1\n')
+    mesh = read_mesh(written(tmp_path, "a deck.inp", text))
+    assert "some nodes" in mesh.points
+    assert len(mesh.boundaries["the face"]) == 1
+    assert list(mesh.materials) == ["all of it"]
