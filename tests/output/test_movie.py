@@ -27,7 +27,9 @@ from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.movie import frames_of
 from fecontact.output.render.overlay import Overlay
-from fecontact.output.render.scene import NODE_COLOURS, Scene, needed_height
+from fecontact.output.render.plane_parts import needed_height
+from fecontact.output.render.scene import NODE_COLOURS
+from fecontact.output.render.scenes import scene_of
 from fecontact.plot import STATE_COLOURS, picture
 
 SMALL = (480, 270)
@@ -77,7 +79,7 @@ def test_drawn_places_scale_the_displacements_and_stay_in_the_box():
     trajectory = run(times=21)
     motion = motion_of(trajectory, given_scale=400.0)
     field = trajectory.system.basis.mode_shapes
-    left, right, bottom, top = motion.box
+    (left, bottom), (right, top) = motion.bounds
     reached = []
     for frame, q in enumerate(trajectory.modal_coordinates):
         places, colours = motion.body(frame)
@@ -121,7 +123,7 @@ def test_flat_bodies_leave_room_for_a_chart_of_the_forces_with_a_cursor():
     # A tall picture of the same body has more room, one of a tall body none.
     assert Overlay(motion, 480, 640).chart_height > 0
     tall = motion_of(still(np.zeros((3, 5))))
-    object.__setattr__(tall, "box", (0.0, 0.1, 0.0, 0.1))
+    object.__setattr__(tall, "bounds", np.array([[0.0, 0.0], [0.1, 0.1]]))
     assert Overlay(tall, 960, 540).chart_height == 0
 
 
@@ -132,7 +134,7 @@ def test_nothing_is_left_blank_between_chart_and_body(size):
     motion = motion_of(run(basis(0.2, 0.012), times=21), frames=5)
     furniture = Overlay(motion, *size)
     assert furniture.chart_height > 0
-    with Scene(motion, size[0], furniture.scene_height) as scene:
+    with scene_of(motion, size[0], furniture.scene_height) as scene:
         blank = min(int((scene.image(frame) == 255).all(axis=(1, 2)).argmin())
                     for frame in range(5))
     assert 0 < blank < 45 * size[1] / 540
@@ -207,7 +209,7 @@ def test_body_moves_by_the_scaled_displacement_and_has_the_colour_of_its_size():
     q = np.zeros((3, 5))
     q[:, 0] = [0.0, 1e-5, 2e-5]
     motion = motion_of(still(q), given_scale=500.0)
-    with Scene(motion, 960, 430) as scene:
+    with scene_of(motion, 960, 430) as scene:
         images = [scene.image(frame) for frame in range(3)]
     viridis = 255.0 * colormaps["viridis"]([0.0, 0.5, 1.0])[:, :3]
     spans = []
@@ -232,7 +234,7 @@ def test_contact_nodes_show_their_states_and_forces():
     trajectory = replace(trajectory, modal_velocities=speeds)
     assert np.array_equal(trajectory.contact_state, [[0] * 5, [1] * 5, [2] * 5])
     motion = motion_of(trajectory)
-    with Scene(motion, 640, 300) as scene:
+    with scene_of(motion, 640, 300) as scene:
         images = [scene.image(frame) for frame in range(3)]
     forces = [(image[:, :, 0] > 150) & (image[:, :, 1] < 60) & (image[:, :, 2] < 80)
               for image in images]
@@ -278,7 +280,7 @@ def test_arrows_lean_with_the_slope_of_waves():
 @pytest.mark.parametrize(("length", "height"), [(0.2, 0.02), (0.02, 0.2), (0.1, 0.1)])
 def test_body_fills_the_frame_whatever_its_shape(length, height):
     trajectory = run(basis(length, height, columns=10, rows=10), times=11, size=1e-6)
-    with Scene(motion_of(trajectory), 960, 430) as scene:
+    with scene_of(motion_of(trajectory), 960, 430) as scene:
         for frame in range(11):
             coloured = np.ptp(scene.image(frame).astype(int), axis=2) > 50
             rows, columns = (np.flatnonzero(coloured.any(axis=k)) for k in (1, 0))

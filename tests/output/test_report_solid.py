@@ -11,7 +11,8 @@ from browsing import SOFTWARE_WEBGL, Opened, launched, sync_api
 from report_reading import Shown
 from solid_drawing import SIZE, box_surface, solid, write_solid
 
-from fecontact.output.report.drawing import along_edges, sharp_edges
+from fecontact.output.render.surfaces import sharp_edges
+from fecontact.output.report.drawing import along_edges
 
 SCALE = 50.0
 

@@ -33,7 +33,7 @@ from fecontact.output.render import offscreen
 from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import Motion, body_labels
 from fecontact.output.render.overlay import Overlay
-from fecontact.output.render.scene import Scene
+from fecontact.output.render.scenes import scene_of
 from fecontact.plot import (
     picture,
     plot_contact_map,
@@ -117,7 +117,7 @@ def test_feet_on_the_ground_are_not_drawn(trajectory):
     assert motion.contact_places(0).shape == motion.forces[0].shape == (29 + 8, 2)
     # The ground lies under the beam, although the block's nodes are contact nodes too.
     assert motion.ground_level == pytest.approx(0.0)
-    left, right, _, top = motion.box
+    (left, _), (right, top) = motion.bounds
     assert left < 0.0 < 0.2 < right
     assert top > 0.04
 
@@ -137,8 +137,8 @@ def test_names_stand_inside_their_bodies():
 @rendering
 def test_pictures_of_two_bodies_show_arrows_in_their_directions(leaning, tmp_path):
     motion = motion_of(leaning)
-    with Scene(motion, 480, 270) as scene:
-        corners = scene._arrow_corners(motion.contact_places(3), motion.forces[3])
+    with scene_of(motion, 480, 270) as scene:
+        corners = scene.parts[-1].arrow_corners(motion.contact_places(3), motion.forces[3])
     tails, tips = corners.reshape(-1, 7, 2)[:, [0, 3]].mean(axis=1), corners.reshape(-1, 7, 2)[:, 5]
     drawn, forces = tips - tails, motion.forces[3]
     drawn /= np.linalg.norm(drawn, axis=1)[:, None]
@@ -154,11 +154,11 @@ def test_pictures_of_two_bodies_show_arrows_in_their_directions(leaning, tmp_pat
 def test_names_are_written_into_the_scene(trajectory):
     """What differs from the picture without names lies about the nodes that carry them."""
     motion = motion_of(trajectory)
-    with Scene(motion, 960, 432) as scene:
+    with scene_of(motion, 960, 432) as scene:
         named = scene.image(4).astype(int)
         places = motion.body(4)[0][[node for _, node in motion.labels]]
-        pixels = [scene._pixel(place, named.shape) for place in places]
-        scene._names = []
+        pixels = [scene.camera.pixel(place, named.shape) for place in places]
+        scene.parts[0]._names = []
         plain = scene.image(4)
     changed = np.argwhere((named != plain).any(axis=2))
     near = np.min([np.abs(changed - pixel).max(axis=1) for pixel in pixels], axis=0)

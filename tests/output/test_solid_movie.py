@@ -15,10 +15,10 @@ from fecontact.output.files.frames import contact_forces, frame_indices
 from fecontact.output.plots.solids.plans import face_plans
 from fecontact.output.render import offscreen
 from fecontact.output.render.force_chart import ForceChart
-from fecontact.output.render.scene import NODE_COLOURS
+from fecontact.output.render.scene import NODE_COLOURS, Camera
+from fecontact.output.render.scenes import scene_of
 from fecontact.output.render.solid_motion import SolidMotion, motion_words
 from fecontact.output.render.solid_overlay import SolidOverlay
-from fecontact.output.render.solid_scene import Camera, SolidScene
 from fecontact.output.render.surfaces import shaded_surface, sharp_edges
 from fecontact.plot import picture, render_mode
 
@@ -88,7 +88,7 @@ def test_ground_travels_turns_and_waves():
 def test_camera_shows_every_place_of_all_frames():
     rng = np.random.default_rng(0)
     places = rng.uniform(-1.0, 3.0, (50, 3))
-    camera = Camera(np.array([0.4, -0.8, 0.4]), np.array([0.0, 0.0, 1.0]), places, 1.5)
+    camera = Camera.around(np.array([0.4, -0.8, 0.4]), np.array([0.0, 0.0, 1.0]), places, 1.5)
     rows, columns = np.array([camera.pixel(place, (400, 600, 3)) for place in places]).T
     assert rows.min() >= 0.04 * 400 <= 400 - rows.max() + 1
     assert columns.min() >= 0.04 * 600 <= 600 - columns.max() + 1
@@ -120,10 +120,10 @@ def test_sharp_edges_divide_the_surface_and_smooth_ones_do_not():
 @pytest.mark.parametrize("view", ["above", "below"])
 def test_the_camera_stands_still_and_the_body_moves(run, view):
     motion = motion_of(run, given_scale=300.0, view=view)
-    with SolidScene(motion, 240, 180) as scene:
-        before = (scene._plotter.camera.position, scene._plotter.camera.parallel_scale)
+    with scene_of(motion, 240, 180) as scene:
+        before = (scene.plotter.camera.position, scene.plotter.camera.parallel_scale)
         images = [scene.image(frame) for frame in (0, 4, 8)]
-        assert (scene._plotter.camera.position, scene._plotter.camera.parallel_scale) == before
+        assert (scene.plotter.camera.position, scene.plotter.camera.parallel_scale) == before
         again = scene.image(0)
     assert np.array_equal(images[0], again)
     changed = (np.abs(images[0].astype(int) - images[1]) > 30).any(axis=2)
@@ -139,11 +139,11 @@ def test_patches_are_painted_with_their_pressures(run):
     """From below each patch has the colour of its pressure where the camera shows its middle."""
     motion = motion_of(run, given_scale=1.0, view="below")
     pressed = int(run.normal_force.sum(axis=1).argmax())
-    with SolidScene(motion, 480, 360) as scene:
+    with scene_of(motion, 480, 360) as scene:
         image = scene.image(pressed)
         for node, place in enumerate(run.system.basis.contact_places):
             # Beside the middle, where lines of the facets do not run.
-            row, column = scene._camera.pixel(place + np.array([0.004, 0.003, 0.0]),
+            row, column = scene.camera.pixel(place + np.array([0.004, 0.003, 0.0]),
                                               image.shape)
             part = run.pressure[pressed, node] / run.pressure.max()
             assert close_to(image[row, column], colormaps["inferno"](part)[:3], 25), node

@@ -12,7 +12,8 @@ from fecontact.core.types import Array
 from fecontact.core.units import quantity
 from fecontact.output.plots.solids.plans import FacePlan, draw_arrows, draw_plan
 from fecontact.output.render.canvas import canvas_of
-from fecontact.output.render.scene import DARK, NODE_COLOURS
+from fecontact.output.render.pixels import DARK
+from fecontact.output.render.scene import NODE_COLOURS
 from fecontact.output.render.solid_motion import SolidMotion
 
 Image = NDArray[np.uint8]

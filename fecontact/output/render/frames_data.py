@@ -205,12 +205,6 @@ class Motion:
             self._largest["displacement"])
 
     @cached_property
-    def box(self) -> tuple[float, float, float, float]:
-        """Smallest and largest x, smallest and largest y that the drawn body reaches [m]."""
-        low, high = self.bounds
-        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
-
-    @cached_property
     def bounds(self) -> Array:
         """Smallest and largest coordinates (2, d) that the drawn body reaches [m]."""
         return np.stack([np.minimum(self.mode_shapes.nodes.min(axis=0), self._extremes[0]),

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +16,8 @@ from fecontact.output.render.frames_data import body_labels
 from fecontact.output.render.movie import MOVING, Image, Progress, target, write_images
 from fecontact.output.render.offscreen import require_rendering
 from fecontact.output.render.overlay import Strips, pixels
-from fecontact.output.render.scene import COLOUR_MAPS, BodyScene
-from fecontact.output.render.solid_scene import SolidScene
+from fecontact.output.render.scene import COLOUR_MAPS
+from fecontact.output.render.scenes import scene_of
 from fecontact.reduction.assembly.contact_faces import mode_names
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
@@ -74,12 +73,6 @@ class ModeMotion:
     def _reach(self) -> float:
         """Largest motion drawn [m]."""
         return self.extent * float(np.linalg.norm(np.ptp(self.mode_shapes.nodes, axis=0)))
-
-    @cached_property
-    def box(self) -> tuple[float, float, float, float]:
-        """Smallest and largest x, smallest and largest y that the drawn body reaches [m]."""
-        low, high = self.bounds
-        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
     @cached_property
     def bounds(self) -> Array:
@@ -199,8 +192,7 @@ def write_motion(
 def _images(motion: ModeMotion, size: tuple[int, int], title: str) -> Iterator[Image]:
     strips = _ModeStrips(*size, title)
     height = size[1] - strips.header_height - strips.footer_height
-    drawing: Any = BodyScene if motion.mode_shapes.nodes.shape[1] == 2 else SolidScene
-    with drawing(motion, size[0], height, line=1.2 * strips.size, fineness=MOVING) as scene:
+    with scene_of(motion, size[0], height, line=1.2 * strips.size, fineness=MOVING) as scene:
         for frame, phase in enumerate(motion.phases.tolist()):
             yield strips.around(scene.image(frame), phase)
 

@@ -22,10 +22,9 @@ from fecontact.output.render.encoder import encoder
 from fecontact.output.render.frames_data import Colour, Motion
 from fecontact.output.render.offscreen import require_rendering
 from fecontact.output.render.overlay import Overlay
-from fecontact.output.render.scene import Scene
+from fecontact.output.render.scenes import scene_of
 from fecontact.output.render.solid_motion import SolidMotion, View
 from fecontact.output.render.solid_overlay import SolidOverlay
-from fecontact.output.render.solid_scene import SolidScene
 
 Image = NDArray[np.uint8]
 Progress = Callable[[int, int], None]
@@ -239,18 +238,10 @@ def _images(motion: Motion, size: tuple[int, int], title: str | None, slowness: 
             only: int | None = None) -> Iterator[Image]:
     """Pictures (height, width, 3) of all frames of a motion, or of one."""
     fineness = MOVING if only is None else _STILL
-    furniture: Overlay
-    scene: Scene | SolidScene
-    if isinstance(motion, SolidMotion):
-        solid = SolidOverlay(motion, *size, title, slowness)
-        furniture = solid
-        scene = SolidScene(motion, solid.scene_width, solid.scene_height,
-                           line=1.2 * solid.size, fineness=fineness)
-    else:
-        furniture = Overlay(motion, *size, title, slowness)
-        scene = Scene(motion, size[0], furniture.scene_height, line=1.2 * furniture.size,
-                      fineness=fineness)
-    with scene:
+    kind = SolidOverlay if isinstance(motion, SolidMotion) else Overlay
+    furniture = kind(motion, *size, title, slowness)
+    with scene_of(motion, furniture.scene_width, furniture.scene_height,
+                  line=1.2 * furniture.size, fineness=fineness) as scene:
         for frame in range(len(motion.indices)) if only is None else (only,):
             yield furniture.around(scene.image(frame), frame)
 

@@ -11,13 +11,9 @@ from fecontact.core.units import quantity, suitable_unit
 from fecontact.output.render.canvas import canvas_of
 from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import COLOURS, Motion
-from fecontact.output.render.scene import (
-    COLOUR_MAPS,
-    DARK,
-    FORCE_COLOUR,
-    NODE_COLOURS,
-    needed_height,
-)
+from fecontact.output.render.pixels import DARK
+from fecontact.output.render.plane_parts import needed_height
+from fecontact.output.render.scene import COLOUR_MAPS, FORCE_COLOUR, NODE_COLOURS
 
 Image = NDArray[np.uint8]
 
@@ -134,8 +130,13 @@ class Overlay(Strips):
         return 2 * int(0.5 * left) if left >= _LEAST_CHART * self.size else 0
 
     @property
+    def scene_width(self) -> int:
+        """Width of the scene in pixels."""
+        return self.width
+
+    @property
     def scene_height(self) -> int:
-        """Size of the scene in pixels."""
+        """Height of the scene in pixels."""
         return self.height - self.header_height - self.footer_height - self.chart_height
 
     def around(self, scene: Image, frame: int) -> Image:

@@ -1,10 +1,13 @@
 """The ground below solids: a slab with lines that move with it, waves, and arrows of its motion."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.types import Array
+from fecontact.output.render.scene import Scene, move, shade
 from fecontact.output.render.solid_motion import SolidMotion
 from fecontact.output.render.surfaces import ShadedSurface
 
@@ -17,28 +20,35 @@ _FEWEST, _MOST = 4, 12  # lines over the longer side
 _SLOW = 1e-3  # of the largest speed, below which no arrow is drawn
 
 
-class GroundScene:
-    """The ground of a run of solids in a plotter."""
+def _extents(motion: SolidMotion) -> tuple[float, Array, Array]:
+    """Size of the bodies, and lower and upper corner (2,) of the ground that is drawn [m]."""
+    low, high = motion.bounds[:, :2]
+    extent = float((high - low).max())
+    return extent, low - _BESIDE * extent, high + _BESIDE * extent
 
-    def __init__(self, plotter: Any, motion: SolidMotion, line: float) -> None:
-        import pyvista
 
-        self._pyvista: Any = pyvista
-        self._plotter, self._motion = plotter, motion
-        low, high = motion.bounds[:, :2]
-        self._extent = float((high - low).max())
-        self._low, self._high = low - _BESIDE * self._extent, high + _BESIDE * self._extent
+def ground_corners(motion: SolidMotion) -> Array:
+    """Corners (4, 3) of the part that is drawn [m]."""
+    _, low, high = _extents(motion)
+    x, y = np.meshgrid(*np.stack([low, high], axis=1))
+    return np.column_stack([x.ravel(), y.ravel(), np.full(4, motion.ground_level)])
+
+
+class SolidGround:
+    """The ground of a run of solids."""
+
+    def __init__(self, scene: Scene, motion: SolidMotion) -> None:
+        self._scene, self._motion = scene, motion
+        self._extent, self._low, self._high = _extents(motion)
         self._wavy = motion.trajectory.system.ground.wavy
         self._lift = 1e-4 * self._extent
         self._add_slab()
-        self._add_lines(line)
+        self._add_lines()
         self._add_arrows()
 
-    @property
-    def corners(self) -> Array:
-        """Corners (4, 3) of the part that is drawn [m]."""
-        x, y = np.meshgrid(*np.stack([self._low, self._high], axis=1))
-        return np.column_stack([x.ravel(), y.ravel(), np.full(4, self._motion.ground_level)])
+    def names(self) -> Sequence[tuple[NDArray[np.float64], Array]]:
+        """None."""
+        return ()
 
     def draw(self, frame: int) -> None:
         """Bring everything to where it is at a frame."""
@@ -46,9 +56,7 @@ class GroundScene:
             heights = self._motion.ground_heights(frame, self._flat)
             self._top.points[:, 2] = heights
             self._top.GetPoints().Modified()
-            self._top.point_data["Normals"][:] = self._shaded.normals(
-                np.column_stack([self._flat, heights]))
-            self._top.GetPointData().GetNormals().Modified()
+            shade(self._top, self._shaded.normals(np.column_stack([self._flat, heights])))
             self._skirt.points[: len(self._around), 2] = heights[self._around]
             self._skirt.GetPoints().Modified()
         self._draw_lines(frame)
@@ -70,9 +78,8 @@ class GroundScene:
         bottom = motion.ground_level + min(motion.scale * low, 0.0) - _THICK * self._extent
         places = np.column_stack([self._flat, np.full(len(self._flat), motion.ground_level)])
         self._shaded = ShadedSurface(tops, np.arange(len(places)))
-        self._top = self._mesh(places, tops, 0.62)
-        self._top.point_data["Normals"] = self._shaded.normals(places).astype(np.float32)
-        self._top.point_data.active_normals_name = "Normals"
+        self._top = self._mesh(places, tops, 0.62, point_data={
+            "Normals": self._shaded.normals(places).astype(np.float32)})
         rim = places[self._around]
         foot = np.column_stack([rim[:, :2], np.full(len(rim), bottom)])
         here = np.arange(len(rim))
@@ -80,17 +87,11 @@ class GroundScene:
         self._skirt = self._mesh(np.concatenate([rim, foot]), np.column_stack(
             [here + len(rim), after + len(rim), after, here]), 0.50)
 
-    def _mesh(self, places: Array, facets: Any, diffuse: float) -> Any:
-        cells = np.hstack([np.full((len(facets), 1), 4), facets]).ravel()
-        mesh = self._pyvista.PolyData(places.astype(np.float32), faces=cells)
-        actor = self._plotter.add_mesh(
-            mesh, color=_COLOUR, lighting=True, ambient=0.42, diffuse=diffuse, specular=0.0,
-            reset_camera=False, copy_mesh=False, render=False)
-        actor.mapper.SetResolveCoincidentTopologyToPolygonOffset()
-        actor.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(2.0, 2.0)
-        return mesh
+    def _mesh(self, places: Array, facets: Any, diffuse: float, **options: Any) -> Any:
+        return self._scene.mesh(places, faces=facets, behind=2.0, color=_COLOUR, lighting=True,
+                                ambient=0.42, diffuse=diffuse, specular=0.0, **options)
 
-    def _add_lines(self, line: float) -> None:
+    def _add_lines(self) -> None:
         """Two families of lines fixed to the ground, as far apart as the eye can follow them."""
         travel, turn, _ = self._motion.ground_pose
         view = float((self._high - self._low).max())
@@ -101,11 +102,9 @@ class GroundScene:
         self._count = int(np.ceil(reach / self._spacing)) + 2
         self._parts = _PER_LINE if self._wavy else 2
         total = 2 * self._count * self._parts
-        number = np.arange(total).reshape(-1, self._parts)
-        cells = np.hstack([np.full((len(number), 1), self._parts), number]).ravel()
-        self._line_mesh = self._pyvista.PolyData(np.zeros((total, 3), np.float32), lines=cells)
-        self._plotter.add_mesh(self._line_mesh, color=_LINES, line_width=line, lighting=False,
-                               reset_camera=False, copy_mesh=False, render=False)
+        self._lines = self._scene.mesh(
+            np.zeros((total, 3)), lines=np.arange(total).reshape(-1, self._parts), color=_LINES,
+            line_width=self._scene.line)
 
     def _draw_lines(self, frame: int) -> None:
         travel, turn, centre = self._motion.ground_pose
@@ -126,9 +125,7 @@ class GroundScene:
         part = np.linspace(0.0, 1.0, self._parts)[:, None]
         flat = ends[:, :1] * (1.0 - part) + ends[:, 1:] * part
         heights = self._motion.ground_heights(frame, flat) + self._lift
-        self._line_mesh.points[:] = np.concatenate([flat, heights[..., None]], axis=-1).reshape(
-            -1, 3)
-        self._line_mesh.GetPoints().Modified()
+        move(self._lines, np.concatenate([flat, heights[..., None]], axis=-1).reshape(-1, 3))
 
     def _clipped(self, start: Array, along: Array) -> Array:
         """Ends (k, 2, 2) of lines through places (k, 2) in the rectangle; one place outside it."""
@@ -155,16 +152,13 @@ class GroundScene:
         speeds = [np.linalg.norm(self._motion.ground_velocity(frame, self._arrow_places), axis=1)
                   for frame in range(len(self._motion.times))]
         self._fastest = float(np.max(speeds))
-        points = np.zeros((21, 3), np.float32)
-        corners = np.concatenate([[4, *(7 * k + np.arange(4))] for k in range(3)]
-                                 + [[3, *(7 * k + np.arange(4, 7))] for k in range(3)])
-        self._arrows = self._pyvista.PolyData(points, faces=corners)
-        if self._fastest > 0.0:
-            self._plotter.add_mesh(self._arrows, color=_ARROW, lighting=False, reset_camera=False,
-                                   copy_mesh=False, render=False)
+        first = 7 * np.arange(3)[:, None]
+        self._arrows = [] if self._fastest == 0.0 else [
+            self._scene.mesh(np.zeros((21, 3)), faces=first + cells, color=_ARROW)
+            for cells in (np.arange(4), np.arange(4, 7))]
 
     def _draw_arrows(self, frame: int) -> None:
-        if self._fastest == 0.0:
+        if not self._arrows:
             return
         velocity = self._motion.ground_velocity(frame, self._arrow_places)
         speed = np.linalg.norm(velocity, axis=1, keepdims=True)
@@ -180,5 +174,5 @@ class GroundScene:
         heights = self._motion.ground_heights(frame, flat) + 4.0 * self._lift
         if self._wavy:
             heights[:] = heights.max() + 4.0 * self._lift
-        self._arrows.points[:] = np.column_stack([flat, heights])
-        self._arrows.GetPoints().Modified()
+        for mesh in self._arrows:
+            move(mesh, np.column_stack([flat, heights]))

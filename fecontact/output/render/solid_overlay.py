@@ -12,7 +12,8 @@ from fecontact.output.render.face_maps import PRESSURE_MAP, FaceMaps
 from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import COLOURS
 from fecontact.output.render.overlay import FONT, Overlay, pixels
-from fecontact.output.render.scene import COLOUR_MAPS, DARK, NODE_COLOURS, blend, label_image
+from fecontact.output.render.pixels import DARK, blend, label_image
+from fecontact.output.render.scene import COLOUR_MAPS, NODE_COLOURS
 from fecontact.output.render.solid_motion import SolidMotion, motion_words
 
 Image = NDArray[np.uint8]

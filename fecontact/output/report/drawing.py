@@ -15,6 +15,7 @@ from scipy.sparse.csgraph import connected_components, depth_first_order
 from fecontact.core.types import Array, Integers
 from fecontact.output.files.contact_facets import contact_facets
 from fecontact.output.render.frames_data import body_labels
+from fecontact.output.render.surfaces import sharp_edges
 from fecontact.reduction.assembly.contact_faces import mode_names
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
@@ -22,8 +23,6 @@ from fecontact.reduction.report import BasisReport
 
 # Stresses in their order, in the plane and in space.
 COMPONENTS = {4: ("xx", "yy", "zz", "xy"), 6: ("xx", "yy", "zz", "xy", "yz", "zx")}
-
-_SHARP = 0.85  # cosine of the angle of two triangles whose common edge is drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,17 +264,3 @@ def along_edges(bodies: DrawnBodies) -> DrawnBodies:
         stress=bodies.stress[order], edges=place[bodies.edges],
         triangles=triangles[np.lexsort((triangles.min(axis=1), bodies.touching))], owners=owners,
         labels=tuple((name, int(place[node])) for name, node in bodies.labels))
-
-
-def sharp_edges(nodes: Array, triangles: Integers) -> Integers:
-    """Edges (e, 2) of a surface in space where it ends or bends by more than 30 degrees."""
-    corners = nodes[triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-    pairs = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    found, which, counts = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
-    of_edge = np.argsort(which.ravel(), kind="stable") // 3
-    first = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    second = np.where(counts == 2, first + 1, first)
-    bent = (normals[of_edge[first]] * normals[of_edge[second]]).sum(axis=1) < _SHARP
-    return found[bent | (counts != 2)]

@@ -1,0 +1,50 @@
+"""Names in pictures, and pictures of fewer pixels."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+DARK = "#303030"
+
+
+def label_image(text: str, size: float) -> NDArray[np.float64]:
+    """A name in dark letters with a pale rim, (h, w, 4) from 0 to 1; ``size`` in pixels."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from matplotlib.patheffects import withStroke
+
+    rim = 0.28 * size
+    figure = Figure(figsize=((len(text) + 2) * size / 100.0, 2.0 * size / 100.0), dpi=100)
+    figure.patch.set_alpha(0.0)
+    canvas = FigureCanvasAgg(figure)
+    figure.text(0.5, 0.5, text, parse_math=False, ha="center", va="center", color=DARK,
+                family="DejaVu Sans",
+                fontsize=0.72 * size,
+                path_effects=[withStroke(linewidth=0.72 * rim, foreground="white", alpha=0.8)])
+    canvas.draw()
+    drawn = np.asarray(canvas.buffer_rgba()) / 255.0
+    rows, columns = (np.flatnonzero(drawn[..., 3].any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return drawn
+    return drawn[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+
+
+def blend(image: NDArray[np.uint8], label: NDArray[np.float64], row: int, column: int) -> None:
+    """Draw a label into a picture, centred at a pixel and moved inside where it would leave it."""
+    height, width = (min(given, room) for given, room in zip(label.shape, image.shape[:2],
+                                                             strict=False))
+    top = int(np.clip(row - height // 2, 0, image.shape[0] - height))
+    left = int(np.clip(column - width // 2, 0, image.shape[1] - width))
+    part, drawn = image[top : top + height, left : left + width], label[:height, :width]
+    alpha = drawn[..., 3:]
+    part[:] = np.round((1.0 - alpha) * part + 255.0 * alpha * drawn[..., :3])
+
+
+def reduced(image: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
+    """Means of factor x factor pixels of an image."""
+    rows = image[::factor].astype(np.uint16)
+    for k in range(1, factor):
+        rows += image[k::factor]
+    total = rows[:, ::factor].copy()
+    for k in range(1, factor):
+        total += rows[:, k::factor]
+    return ((total + factor**2 // 2) // factor**2).astype(np.uint8)
