@@ -11,6 +11,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
 from fecontact.laws.excitation import AXES, Drive, Load
 from fecontact.laws.friction.planar import along_slip
+from fecontact.laws.friction.stribeck import no_friction
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.signals.harmonic import Harmonic
 from fecontact.reduction.modal_basis import ModalBasis
@@ -42,6 +43,7 @@ def system_arrays(
     friction_groups = list(friction_groups)
     normal, normal_parameters = law_table(normal_groups)
     friction, friction_parameters = law_table(friction_groups)
+    friction[basis.spring_nodes] = no_friction.address
     _set_return_times(basis, friction_groups, friction_parameters)
     # Of a node at least, as kernels take the largest number; without contact no node has it.
     memory = np.zeros(max(n, 1), dtype=np.int64)

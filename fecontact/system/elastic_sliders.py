@@ -14,7 +14,8 @@ from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.laws.friction.planar import along_slip
-from fecontact.laws.signatures import friction_law, ground_at
+from fecontact.laws.friction.stribeck import no_friction
+from fecontact.laws.signatures import ground_at
 from fecontact.system.kernels import node_forces
 from fecontact.system.nodes import (
     SystemArrays,
@@ -189,12 +190,6 @@ def slider_counts(system: Any) -> Integers:
         if law.memory and law.sliders(share) is not None:
             counts[nodes] = law.memory
     return counts
-
-
-@friction_law
-def no_friction(v, F, p):
-    """Nothing: what nodes feel beside their elements."""
-    return 0.0, 0.0, 0.0
 
 
 def without_elements(arrays: SystemArrays) -> SystemArrays:

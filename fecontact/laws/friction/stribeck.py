@@ -368,3 +368,9 @@ class CubicFriction(SmoothedFriction):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_at_least(self, "static_coefficient", "minimum_coefficient")
+
+
+@friction_law
+def no_friction(v, F, p):
+    """Return R = 0, whatever the parameters: for nodes that cannot slide, such as springs."""
+    return 0.0, 0.0, 0.0
