@@ -254,7 +254,10 @@ def check_preload(names, printed, folder):
 def check_rotation(names, printed, folder):
     lines = printed.splitlines()
     assert [line.endswith(" []") for line in lines[:2]] == [True, False]
-    first = [float(re.search(r"\[ *([\d.]+)", line).group(1)) for line in lines[2:]]
+    first = [float(found[1]) for line in lines[2:] if (found := re.search(r"\[ *([\d.]+)", line))]
+    assert [line[-5:].strip() for line in lines if line.endswith(("True", "False"))] == [
+        "False", "False", "True"]
+    assert 0.1 < (names["flutter"].unstable > 0).mean() < 0.5
     # Clamped beam of 29.86 rad/s: 3.516, and sqrt(11.2023^2 - 10^2) at ten times that.
     unit = np.sqrt(2.1e11 * 0.02**2 / (12.0 * 7850.0)) / (2.0 * np.pi)
     assert first[0] == pytest.approx(3.516 * unit, rel=2e-3)

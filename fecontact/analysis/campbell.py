@@ -20,7 +20,7 @@ _ZERO = 1e-6
 @read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class CampbellDiagram(Summarised):
-    """Eigenvalues of a rotating body over its speed, seen in the frame that rotates with it.
+    """Eigenvalues of a rotating body over its speed, seen in the frame of its rotation.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class CampbellDiagram(Summarised):
 
     @property
     def frequencies_hz(self) -> Array:
-        """Frequencies (n, k) in the rotating frame [Hz]; zero where a mode does not oscillate."""
+        """Frequencies (n, k) in the frame of the rotation [Hz]; zero where none oscillates."""
         return np.abs(self.eigenvalues.imag) / (2.0 * np.pi)
 
     @property
@@ -59,7 +59,8 @@ class CampbellDiagram(Summarised):
         """Speeds at which a frequency is ``order`` times that of rotation, ascending [rad/s].
 
         A force at rest in space with ``order`` waves around the circumference excites the body
-        there; order 0 stands for a constant force of the rotating frame. Between the speeds of the
+        there; order 0 stands for a constant force of the frame, which in that at rest is a force at
+        rest. Between the speeds of the
         diagram frequencies count as linear. InputError for a negative order.
         """
         require_finite("critical_speeds", order=order)

@@ -2,15 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from fecontact.core.checks import as_direction, as_place, is_numeric
-from fecontact.core.errors import InputError, require_finite, shown
+from fecontact.core.errors import InputError, require_choice, require_finite, shown
 from fecontact.core.types import Array, Coordinates
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.standing_frame import convective_matrices
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,11 @@ class Rotation:
     P = -S S, which takes the part across the axis,
 
     .. math:: M u'' + 2 \Omega M S u' + (K + K_\sigma - \Omega^2 M P) u = \Omega^2 M P (X - c)
+
+    Bodies of revolution may be described in the frame at rest instead, as under a pad that stands:
+    M S and M P on the left become the convective terms of
+    :mod:`fecontact.fem.standing_frame`. Supports, contact, ground and loads stand then, and modal
+    damping is that of the surroundings.
 
     Parameters
     ----------
@@ -39,6 +45,8 @@ class Rotation:
         The geometric stiffness K_sigma of the stress under the centrifugal force.
     axis : (x, y, z)
         e, of any length above zero, of solids; in the plane z.
+    frame : 'rotating' or 'standing'
+        In which displacements, supports, contact and loads are given.
 
     Raises
     ------
@@ -53,9 +61,11 @@ class Rotation:
     spin_softening: bool = True
     stress_stiffening: bool = True
     axis: tuple[float, ...] = (0.0, 0.0, 1.0)
+    frame: Literal["rotating", "standing"] = "rotating"
 
     def __post_init__(self) -> None:
         require_finite("Rotation", speed=self.speed)
+        require_choice("Rotation", "frame", self.frame, ("rotating", "standing"))
         object.__setattr__(self, "centre", as_place(
             self.centre if is_numeric(self.centre) else (), "Rotation: centre"))
         for name in ("coriolis", "centrifugal_load", "spin_softening", "stress_stiffening"):
@@ -87,17 +97,28 @@ def cross_matrix(axis: Sequence[float]) -> Array:
 
 
 def coriolis_matrix(body: ElasticBody, rotation: Rotation) -> Any:
-    """``2 M S``, skew, sparse (d N, d N): the Coriolis matrix per speed, without supports [kg]."""
+    """``2 M S``, skew, sparse (d N, d N): the Coriolis matrix per speed, without supports [kg].
+
+    In the frame at rest twice the first of the convective matrices.
+    """
     import scipy.sparse as sp
 
+    if rotation.frame == "standing":
+        return sp.csc_array(sp.kron(convective_matrices(body, *rotation.at(body))[0],
+                                    2.0 * np.eye(body.dimension)))
     return sp.csc_array(sp.kron(body.component_mass, 2.0 * rotation.at(body)[0]))
 
 
 def softening_matrix(body: ElasticBody, rotation: Rotation) -> Any:
-    """``M P``, sparse (d N, d N): what softens the stiffness per squared speed [kg]."""
+    """``M P``, sparse (d N, d N): what softens the stiffness per squared speed [kg].
+
+    In the frame at rest the second of the convective matrices.
+    """
     import scipy.sparse as sp
 
-    S, _ = rotation.at(body)
+    S, centre = rotation.at(body)
+    if rotation.frame == "standing":
+        return sp.csc_array(sp.kron(convective_matrices(body, S, centre)[1], np.eye(len(S))))
     return sp.csc_array(sp.kron(body.component_mass, -S @ S))
 
 

@@ -39,6 +39,8 @@ class ModalRotation:
         Direction of the axis, and a point of it [m].
     stressed : bool
         Whether the stiffening includes that of the stress of the body, held by its supports alone.
+    standing : bool
+        Whether the frame is that at rest.
     """
 
     speed: float
@@ -48,6 +50,7 @@ class ModalRotation:
     axis: tuple[float, ...] = (0.0, 0.0, 1.0)
     centre: tuple[float, ...] = (0.0, 0.0, 0.0)
     stressed: bool = False
+    standing: bool = False
 
     def in_modes(self, modes: Array) -> "ModalRotation":
         """Rotation in other coordinates p, ``q = modes p`` with modes (m, k)."""
@@ -55,10 +58,11 @@ class ModalRotation:
                        stiffening=modes.T @ self.stiffening @ modes, load=self.load @ modes)
 
     def is_about_that_of(self, other: "ModalRotation") -> bool:
-        """True if both have the same axis and speed."""
+        """True if both have the same axis, speed and frame."""
         apart = np.cross(np.subtract(self.centre, other.centre), self.axis)
         size = 1e-9 * (1.0 + np.abs(self.centre).max())
-        return bool(self.speed == other.speed and np.abs(apart).max() <= size
+        return bool(self.speed == other.speed and self.standing == other.standing
+                    and np.abs(apart).max() <= size
                     and np.allclose(self.axis, other.axis, rtol=0.0, atol=1e-9))
 
 
@@ -93,7 +97,8 @@ def modal_rotation(
     if rotation.stress_stiffening:
         stiffening += _stress_stiffening(body, system, force, shapes)
     return ModalRotation(rotation.speed, coriolis, stiffening, load, rotation.axis,
-                         (*rotation.centre, 0.0)[:3], rotation.stress_stiffening)
+                         (*rotation.centre, 0.0)[:3], rotation.stress_stiffening,
+                         rotation.frame == "standing")
 
 
 def _stress_stiffening(

@@ -71,6 +71,9 @@ def require_common_axis(
 ) -> None:
     """Raise InputError for a rotation about another axis than that of the symmetry."""
     require_kind(owner, Rotation, rotation=rotation)
+    if rotation.frame != "rotating":
+        raise InputError(f"{owner}: rotation has frame = '{rotation.frame}'; sectors are those of "
+                         f"the frame that rotates with them, leave frame out.")
     apart = np.cross(np.subtract((*rotation.centre, 0.0)[:3], (*symmetry.centre, 0.0)[:3]),
                      symmetry.axis)
     aside = np.cross(rotation.axis, symmetry.axis)

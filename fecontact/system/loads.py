@@ -183,7 +183,7 @@ def load_summary(load: Load) -> str:
 
 
 def _inertia(basis: ModalBasis, what: str) -> Array:
-    if basis.rotation is not None:
+    if basis.rotation is not None and not basis.rotation.standing:
         raise InputError(f"Load: {what} cannot act on a body that rotates: its direction would "
                          f"turn in the frame of the body; give forces at points instead.")
     if basis.inertia_rows is None:

@@ -53,8 +53,9 @@ def test_slender_disc_on_a_long_shaft():
     """Deck rotor: each frequency lies between those of two kinds of 20-node bricks.
 
     Of reduced integration the first three are published with CalculiX' tests; the others, and all
-    of full integration, are output of CalculiX 2.20 for the same deck. The stress is that of the rotation at 2795.6 Hz, near which the first mode whirls: seen
-    from the rotor it is slow, the small difference of large numbers.
+    of full integration, are output of CalculiX 2.20 for the same deck. The stress is that of the
+    rotation at 2795.6 Hz, near which the first mode whirls: seen from the rotor it is slow, the
+    small difference of large numbers.
     """
     reduced = [0.810, 1868.10, 2313.45, 3721.27, 5546.77, 6106.52, 7168.06]
     full = [27.586, 1859.85, 2377.07, 3729.51, 5576.46, 6226.86, 7177.60]

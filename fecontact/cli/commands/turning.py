@@ -65,7 +65,7 @@ def campbell(
     """Frequencies and damping of a rotating body over its speed: NAME-campbell.png and .csv.
 
     The body is that of a study with [body.rotation], without contact; frequencies are those in the
-    frame that rotates with it.
+    frame of the rotation.
     """
     import numpy as np
 

@@ -61,7 +61,8 @@ class SlidingRotation:
     .. math:: V_{tj} = \Omega(t)\, t_j \cdot (e \times (r_j - c))
 
     at the places r_j of the contact nodes, about the axis e. Gyroscopic and convective terms of the
-    turning body are left out: valid far below its critical speeds.
+    turning body are left out, valid far below its critical speeds, unless its basis has them,
+    ``Rotation(speed, frame="standing")``.
 
     Parameters
     ----------

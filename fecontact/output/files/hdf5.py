@@ -340,7 +340,7 @@ def _read_rotation(group: Any, modes: int) -> ModalRotation:
     return ModalRotation(
         float(speed), bounded(group, "coriolis", (modes, modes)),
         bounded(group, "stiffening", (modes, modes)), bounded(group, "load", (modes,)), axis,
-        centre, bool(stressed))
+        centre, bool(stressed), bool(values(member(group, "standing")).item()))
 
 
 def _read_quality(

@@ -58,7 +58,7 @@ def plot_campbell(
             axis.annotate(f"{order:g}", (end, order * end / (2.0 * np.pi)), xytext=(3, 3),
                           textcoords="offset points", fontsize=9.0, color="#6a6a6a")
         axis.set(xlim=(speeds[0], speeds[-1]), ylim=(0.0, top), xlabel="speed [rad/s]",
-                 ylabel="frequency in the rotating frame [Hz]")
+                 ylabel="frequency [Hz]")
         minute = axis.secondary_xaxis("top", functions=(
             lambda x: np.multiply(x, 30.0 / np.pi), lambda x: np.multiply(x, np.pi / 30.0)))
         minute.set_xlabel("speed [1/min]")

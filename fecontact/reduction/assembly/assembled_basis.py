@@ -210,11 +210,14 @@ def _with_large_deflections(
 
 
 def _rotation(bases: Mapping[str, ModalBasis], places: "_Places") -> ModalRotation | None:
-    """The rotation that all bodies have in common."""
-    given = [one.rotation for one in bases.values() if one.rotation is not None]
-    if not given:
+    """The rotation that all bodies have in common, or those of them that rotate."""
+    common = next((one.rotation for one in bases.values() if one.rotation is not None), None)
+    if common is None:
         return None
-    return replace(given[0], coriolis=places.blocks([one.coriolis for one in given]),
+    given = [one.rotation or replace(
+        common, coriolis=np.zeros((one.modes, one.modes)), load=np.zeros(one.modes),
+        stiffening=np.zeros((one.modes, one.modes))) for one in bases.values()]
+    return replace(common, coriolis=places.blocks([one.coriolis for one in given]),
                    stiffening=places.blocks([one.stiffening for one in given]),
                    load=np.concatenate([one.load for one in given]))
 
@@ -394,8 +397,12 @@ def _check_bodies(bases: Mapping[str, ModalBasis]) -> None:
         if basis.parts:
             raise InputError(f"Body '{name}' consists of several bodies itself; give these one by "
                              f"one.")
-    (first, one), *_ = bases.items()
-    for name, basis in bases.items():
+    # In the frame at rest a body that rotates may touch others that do not.
+    alike = [(name, basis) for name, basis in bases.items() if basis.rotation is not None]
+    if not any(basis.rotation.standing for _, basis in alike if basis.rotation is not None):
+        alike = list(bases.items())
+    first, one = alike[0]
+    for name, basis in alike:
         if (basis.rotation is None) != (one.rotation is None) or (
                 basis.rotation is not None and one.rotation is not None
                 and not basis.rotation.is_about_that_of(one.rotation)):
@@ -403,7 +410,8 @@ def _check_bodies(bases: Mapping[str, ModalBasis]) -> None:
                              f"would turn against those of the other. Give all bodies the same "
                              f"axis and speed, or leave out rotation and prescribe the sliding "
                              f"of interfaces.")
-        if basis.rotation is not None and basis.rotation.stressed and len(bases) > 1:
+        if basis.rotation is not None and basis.rotation.stressed and len(bases) > 1 and (
+                not basis.rotation.standing):
             raise InputError(f"Body '{name}' rotates with the stress that its supports alone make, "
                              f"but bodies of an assembly pull on each other; give "
                              f"Rotation(..., stress_stiffening=False), and the stress of the "
