@@ -408,8 +408,8 @@ def _check_bodies(bases: Mapping[str, ModalBasis]) -> None:
                 and not basis.rotation.is_about_that_of(one.rotation)):
             raise InputError(f"Body '{name}' does not rotate as '{first}' does: rows in one frame "
                              f"would turn against those of the other. Give all bodies the same "
-                             f"axis and speed, or leave out rotation and prescribe the sliding "
-                             f"of interfaces.")
+                             f"axis and speed; or prescribe the sliding of interfaces and leave "
+                             f"out rotation, or give a body of revolution frame = 'standing'.")
         if basis.rotation is not None and basis.rotation.stressed and len(bases) > 1 and (
                 not basis.rotation.standing):
             raise InputError(f"Body '{name}' rotates with the stress that its supports alone make, "
