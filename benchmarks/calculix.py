@@ -5,7 +5,11 @@ frequencies; ``read_mesh`` reads it too. Ten-node tetrahedra and eight-node bric
 incompatible modes, have equal stiffness in both. CalculiX integrates the mass of tetrahedra at
 fewer points, and gives bricks with incompatible modes another mass.
 
-Usage: python benchmarks/calculix.py [--quick]
+Public decks, which are no part of this package, follow if their files are given: the blade of
+NASA's rotor 37 (one part of fifteen-node wedges, free, beside CalculiX), and the Brake-Reuss beam,
+whose parts CalculiX does not read (beside the frequencies that its author gives).
+
+Usage: python benchmarks/calculix.py [--quick] [DECK ...]
 """
 
 import re
@@ -26,6 +30,8 @@ from fecontact.reduction import eigenfrequencies_hz
 # Nodes of the sides S1, S2, ... of tetrahedra and of hexahedra.
 SIDES = {4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
          8: ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 4, 5), (1, 2, 5, 6), (2, 3, 6, 7), (0, 3, 4, 7))}
+# Set of all elements of the blade, and frequencies that the author of the beam's deck gives [Hz].
+ELEMENTS, BEAM = "Eall", (70.323, 151.26, 609.25)
 MATERIAL = "*MATERIAL, NAME=STEEL\n*ELASTIC\n2.1e11, 0.3\n*DENSITY\n7850.\n"
 HUB = "*NODE, NSET=HUB\n90001, 0.15, 0.03, 0.01\n*NODE, NSET=TURN\n90002, 0.15, 0.03, 0.01\n"
 RIGID = f"{HUB}*RIGID BODY, NSET=A_right_N, REF NODE=90001, ROT NODE=90002\n"
@@ -125,7 +131,24 @@ def compared(case: Case, folder: Path) -> tuple[float, float]:
             float(np.abs(eigenfrequencies_hz(body, 3) / frequencies - 1.0).max()))
 
 
-def main(quick: bool) -> None:
+def of_blade(deck: Path, folder: Path) -> np.ndarray:
+    """Relative differences (6,) of the elastic frequencies of a free deck in mm."""
+    titanium = (f"*MATERIAL, NAME=TITANIUM\n*ELASTIC\n115000., 0.3\n*DENSITY\n4.43e-9\n"
+                f"*SOLID SECTION, ELSET={ELEMENTS}, MATERIAL=TITANIUM\n")
+    modes = re.findall(r"^ +\d+((?: +\S+){4})$", calculix(
+        folder, f"{deck.read_text()}\n{titanium}*STEP\n*FREQUENCY\n12\n*END STEP\n"), re.MULTILINE)
+    expected = np.array([float(row.split()[2]) for row in modes[6:12]])
+    body = fc.ElasticBody(fc.read_mesh(deck, scale=1e-3), fc.Material(115e9, 0.3, 4430.0))
+    return eigenfrequencies_hz(body, 12)[6:] / expected - 1.0
+
+
+def of_beam(deck: Path) -> np.ndarray:
+    """Relative differences (3,) of the elastic frequencies of the Brake-Reuss beam."""
+    mesh = fc.read_mesh(deck)
+    return eigenfrequencies_hz(fc.ElasticBody(mesh, degree=1), 10)[7:] / BEAM - 1.0
+
+
+def main(quick: bool, public: list[Path]) -> None:
     """Prints a table."""
     if shutil.which("ccx") is None:
         print("CalculiX is not installed: there is no program ccx to compare with.")
@@ -135,7 +158,12 @@ def main(quick: bool) -> None:
         for case in cases(0.02 if quick else 0.01):
             displacement, frequencies = compared(case, Path(folder))
             print(f"{case.name:24} {displacement:12.1e} {frequencies:12.1e}")
+        for deck in public:
+            blade = "*PART" not in deck.read_text().upper()
+            off = of_blade(deck, Path(folder)) if blade else of_beam(deck)
+            beside = "" if blade else "  (published)"
+            print(f"{deck.stem:24} {'':12} {np.abs(off).max():12.1e}{beside}")
 
 
 if __name__ == "__main__":
-    main("--quick" in sys.argv)
+    main("--quick" in sys.argv, [Path(word) for word in sys.argv[1:] if word != "--quick"])

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+import fecontact as fc
 from fecontact import InputError, MissingLibraryError, basis_from_matrices
 from fecontact.io import read_matrix
-from fecontact.reduction import rows_from_dofs
+from fecontact.reduction import Recovery, rows_from_dofs
 
 SIZE = 8
 STIFFNESS = np.diag(np.r_[2.0 * np.ones(SIZE - 1), 1.0]) - np.eye(SIZE, k=1) - np.eye(SIZE, k=-1)
@@ -102,12 +103,12 @@ def test_matrices_of_output2(tmp_path):
         read_matrix(path)
 
 
-@pytest.mark.parametrize("suffix", [".op4", ".op2", ".full"])
+@pytest.mark.parametrize("suffix", [".op4", ".op2", ".full", ".rst"])
 def test_other_files_are_no_matrices(tmp_path, suffix):
     path = tmp_path / f"s{suffix}"
     path.write_bytes(b"\0\1\2 some text" * 9)
     with pytest.raises(InputError, match=r"s\.\w+: "):
-        read_matrix(path, "K")
+        read_matrix(path, "MODES" if suffix == ".rst" else "K")
 
 
 def test_equations_of_ansys():
@@ -125,9 +126,44 @@ def test_equations_of_ansys():
         read_matrix(examples.fullfile, "DAMPING")
 
 
+@pytest.mark.filterwarnings("ignore")  # of the reader
+def test_modes_of_ansys():
+    """Of the reader's example, a free bar, beside this package's on the mesh of its archive."""
+    examples = pytest.importorskip("ansys.mapdl.reader.examples")
+    modes, hertz, places = (read_matrix(examples.rstfile, name)
+                            for name in ("MODES", "frequencies", "PLACES"))
+    body = fc.ElasticBody(fc.read_mesh(examples.hexarchivefile))
+    shown = fc.ElasticBody(body.mesh, degree=1)
+    points = dict(zip(places.labels[::3, 0].tolist(), places.matrix.reshape(-1, 3), strict=True))
+    recovery = Recovery.of(shown, modes, points)
+    own = fc.modal_basis(body, 12, contact=())
+    # The example has a material in other units; bricks of 20 nodes differ from those of 27.
+    ratio = own.frequencies_hz[6:] / hertz.matrix[:, 0]
+    assert ratio == pytest.approx(ratio[0], rel=1.2e-2)
+    at = [int(np.linalg.norm(own.mode_shapes.nodes - place, axis=1).argmin())
+          for place in shown.nodes]
+    one = own.mode_shapes.shapes[at].reshape(-1, 12)[:, 6:]
+    other = recovery.matrix.toarray()
+    alike = (one.T @ other) ** 2 / np.outer((one**2).sum(axis=0), (other**2).sum(axis=0))
+    # Bending modes come in pairs, which may be turned.
+    for pair in ([0, 1], [2], [3, 4], [5]):
+        assert alike[np.ix_(pair, pair)].sum(axis=0) == pytest.approx(1.0, abs=2e-3)
+    # As a basis, with pictures: coordinates of the file are its six modes.
+    row = modes.labels.tolist().index([1, 3])
+    basis = fc.basis_from_modes(
+        modes.matrix, rows_from_dofs(963, [[row - 2, row - 1, row]], dimension=3), dimension=3,
+        frequencies_hz=hertz.matrix[:, 0], modal_mass=1.0, damping=0.01)
+    assert basis.contact_T[0, :3] == pytest.approx(
+        modes.matrix[row - 2 : row + 1] * np.sign(basis.contact_T[0, 2] * modes.matrix[row]))
+    with pytest.raises(InputError, match="'FREQUENCIES', 'MODES', 'PLACES'"):
+        read_matrix(examples.rstfile)
+    with pytest.raises(InputError, match="no matrix 'STRESS'"):
+        read_matrix(examples.rstfile, "STRESS")
+
+
 @pytest.mark.parametrize(("suffix", "extra", "module"), [
     (".op4", "nastran", "pyyeti.nastran.op4"), (".op2", "nastran", "pyyeti.nastran.op2"),
-    (".full", "ansys", "ansys.mapdl.reader")])
+    (".full", "ansys", "ansys.mapdl.reader"), (".rst", "ansys", "ansys.mapdl.reader")])
 def test_without_the_library_its_extra_is_named(tmp_path, monkeypatch, suffix, extra, module):
     path = tmp_path / f"s{suffix}"
     path.write_bytes(b"any")

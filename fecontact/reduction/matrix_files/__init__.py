@@ -14,7 +14,7 @@ from fecontact.core.files.hdf5_check import open_hdf5
 from fecontact.core.files.stored import array, npy_array, npz_arrays, reading, sound_sparse, values
 from fecontact.core.read_only import read_only_arrays
 from fecontact.reduction.matrix_files.abaqus import read_abaqus_matrix
-from fecontact.reduction.matrix_files.ansys import read_full
+from fecontact.reduction.matrix_files.ansys import read_full, read_rst
 from fecontact.reduction.matrix_files.names import chosen_name
 from fecontact.reduction.matrix_files.nastran import read_dmig, read_op2, read_op4
 from fecontact.reduction.matrix_files.substructure import HEADING, read_substructure
@@ -83,7 +83,8 @@ def read_matrix(path: str | Path, name: str | None = None) -> AssembledMatrix:
     displacements of the points that were asked for (see :class:`~fecontact.reduction.Recovery`),
     and labels if the punch file of the same name, .pch or .asm, lies beside it. By PyMAPDL's reader
     (``fecontact[ansys]``) the equations of Ansys (.full; named STIFFNESS, MASS), without the
-    degrees of freedom that are held.
+    degrees of freedom that are held, and results of its modal analyses (.rst; named MODES,
+    FREQUENCIES [Hz], PLACES).
 
     Parameters
     ----------
@@ -102,7 +103,7 @@ def read_matrix(path: str | Path, name: str | None = None) -> AssembledMatrix:
     path = as_path(path, "a matrix")
     readers = {".mtx": _read_mtx, ".mm": _read_mtx, ".mat": _read_mat, ".npz": _read_npz,
                ".npy": _read_npy, ".pch": read_dmig, ".dmig": read_dmig, ".op4": read_op4,
-               ".op2": read_op2, ".full": read_full}
+               ".op2": read_op2, ".full": read_full, ".rst": read_rst}
     if path.suffix.lower() in _UNREAD:
         raise InputError(f"{path}: {_UNREAD[path.suffix.lower()]}")
     if path.suffix.lower() not in readers:
