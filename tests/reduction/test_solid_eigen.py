@@ -319,3 +319,13 @@ def test_cantilever_plate():
     bending = material.youngs_modulus * h**3 / (12.0 * (1.0 - 0.3**2))
     found = 2.0 * np.pi * eigenfrequencies_hz(body, 5) * np.sqrt(material.density * h / bending)
     assert found == pytest.approx([3.4917, 8.5246, 21.429, 27.331, 31.111], rel=0.01)
+
+
+def test_factors_that_do_not_fit_say_what_to_do(monkeypatch):
+    def full(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setitem(sys.modules, "sksparse.cholmod", None)
+    monkeypatch.setattr("scipy.sparse.linalg.splu", full)
+    with pytest.raises(AnalysisError, match=r"of 81 unknowns are larger.*eigensolver = 'iterat"):
+        factorised(eye_array(81, format="csc"))

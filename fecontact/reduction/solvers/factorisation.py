@@ -89,7 +89,7 @@ def factorised(
     Raises
     ------
     AnalysisError
-        If it is singular or not positive definite.
+        If it is singular or not positive definite, or its factors are too large.
     """
     import scipy.sparse as sp
 
@@ -111,6 +111,11 @@ def factorised(
                          options={"SymmetricMode": True}))
         except RuntimeError:
             raise AnalysisError(trouble) from None
+        except MemoryError:
+            raise AnalysisError(
+                f"The factors of the stiffness of {matrix.shape[0]} unknowns are larger than "
+                f"memory, or than SuperLU can count; take eigensolver = 'iterative', a coarser "
+                f"mesh or degree = 1, or install fecontact[cholmod].") from None
         if trouble != SINGULAR and (found.factors.U.diagonal() <= 0.0).any():
             raise AnalysisError(trouble) from None
         return found
