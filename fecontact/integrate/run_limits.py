@@ -46,14 +46,7 @@ def work_of_jump(system: ContactSystem, before: float, after: float, y: Array) -
 
 def largest_motions(system: ContactSystem) -> Array:
     """Largest motion (m,) of each mode at any point; 1 for one that moves none."""
-    basis = system.basis
-    largest = np.abs(basis.T[:, : basis.dimension]).max(axis=(0, 1))
-    last = basis.contact_nodes
-    # Springs of large deflections are the last contact nodes.
-    for one in reversed(basis.large_deflections):
-        first = last - len(one.cubic)
-        rows = one.comparable(basis.contact_T[first:last, basis.dimension - 1])
-        largest, last = np.maximum(largest, np.abs(rows).max(axis=0)), first
+    largest = np.abs(system.basis.T[:, : system.basis.dimension]).max(axis=(0, 1))
     return np.where(largest > 0.0, largest, 1.0)
 
 

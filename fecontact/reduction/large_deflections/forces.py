@@ -20,7 +20,6 @@ Hill and Neild, Proc. R. Soc. A 476, 2020, of y = y^), and contact nodes follow.
 of powers of linear combinations of coordinates, the potentials of springs.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, permutations
 
@@ -37,23 +36,8 @@ from fecontact.reduction.polynomial_stiffness import polynomial_stiffness
 GROUP = "large deflections"
 # Part of the potential in the fitted range below which a spring is left out.
 _NO_SPRING = 1e-10
-# Part of an elongation that stretching adds to springs which feel both.
-_SHORT = 1e-5
 # Part of the energy of all linear coordinates below which one does not take part.
 _NO_PART = 1e-12
-
-
-@dataclass(frozen=True)
-class LargeDeflectionSprings(BilateralPolynomial):
-    """Law of springs that feel a small part of the stretching each, see :func:`_pulled`."""
-
-    @property
-    def penetration_scale(self) -> float:
-        """Elongation under about 1 N, were the part of the stretching not small [m]."""
-        softer = np.abs(np.asarray(self.quadratic_stiffness)) * _SHORT
-        stiffest = max(softer.max() ** 0.5, np.abs(np.asarray(self.cubic_stiffness)).max()
-                       ** (1.0 / 3.0))
-        return 1.0 / float(stiffest) if stiffest > 0.0 else 1.0
 
 
 @read_only_arrays
@@ -110,16 +94,11 @@ class LargeDeflectionForces(Summarised):
         ]
 
     @property
-    def law(self) -> LargeDeflectionSprings:
+    def law(self) -> BilateralPolynomial:
         """Normal law of the nodes."""
-        return LargeDeflectionSprings(
+        return BilateralPolynomial(
             stiffness=0.0, quadratic_stiffness=tuple(self.quadratic.tolist()),
             cubic_stiffness=tuple(self.cubic.tolist()))
-
-    def comparable(self, rows: Array) -> Array:
-        """Rows (n, m) of the springs in which stretching counts as much as deflection."""
-        own = self.coordinates.any(axis=0)
-        return np.asarray(np.where(own, rows, rows / _SHORT))
 
     def reach(self, coordinates: Array) -> float:
         """Largest coordinate in states (N, m), by the end of its fitted range, which is 1."""
@@ -186,68 +165,71 @@ def large_deflection_forces(
         scaled(fitted.cubic, 1.0 / largest), scaled(quartic, 1.0 / largest))
     own = np.zeros((d, m))
     own[np.arange(d), modes] = largest
-    springs = {tuple(direction): (second, third) for direction, second, third in zip(
-        rows[:, 1].astype(int).tolist(), np.asarray(law.quadratic_stiffness),
-        np.asarray(law.cubic_stiffness), strict=True)}
-    found: list[tuple[float, list[tuple[Array, float, float]]]] = []
-    for direction, pull, moved in _squares(stiff, response, largest, reach):
-        far = float(np.abs(direction) @ (reach * largest))
-        sizes = springs.pop(direction, (0.0, 0.0))
-        found.append((_energy(*sizes, far) + 0.5 * far**2 * moved, _pulled(
-            np.array(direction) @ own, *sizes, pull, _SHORT * far, moved)))
-    found += [(_energy(*sizes, float(np.abs(direction) @ (reach * largest))),
-               [(np.array(direction) @ own, *sizes)]) for direction, sizes in springs.items()]
-    most = max(energy for energy, _ in found)
-    kept = [spring for energy, own_springs in found if energy > _NO_SPRING * most
-            for spring in own_springs]
-    return LargeDeflectionForces(
+    springs = [(row, second, third) for row, second, third in zip(
+        rows[:, 1] @ own, np.asarray(law.quadratic_stiffness), np.asarray(law.cubic_stiffness),
+        strict=True)]
+    for i in range(d):
+        springs += _square_times(own[i], stiff[:, i, i] / largest[i] ** 2,
+                                 response[:, i, i] * reach[i] ** 2, reach[i] * largest[i])
+    for i, j in combinations(range(d), 2):
+        pull = stiff[:, i, j] / (largest[i] * largest[j])
+        moved, far = response[:, i, j] * reach[i] * reach[j], reach[i] * largest[i]
+        springs += _product(own[i], own[j], pull, moved, far)
+    reached = _reached(springs, fitted, response, reach)
+    kept = [one for one, size_of in zip(springs, reached, strict=True)
+            if size_of > _NO_SPRING * max(reached)]
+    found = LargeDeflectionForces(
         GROUP, np.array([one[1] for one in kept]), np.array([one[2] for one in kept]),
         np.eye(m)[modes], fitted.ranges, size, fitted.largest_strain, fitted.force_error,
-        fitted.displacement_error, fitted.stress_error, fitted.other_load_error, fitted.states,
-    ), np.array([one[0] for one in kept])
+        fitted.displacement_error, fitted.stress_error, fitted.other_load_error, fitted.states)
+    return found, np.array([one[0] for one in kept])
 
 
-def _energy(second: float, third: float, elongation: float) -> float:
-    """Largest energy of a spring up to an elongation."""
-    return abs(second) * elongation**3 / 3.0 + 0.25 * abs(third) * elongation**4
-
-
-def _squares(
-    stiff: Array, response: Array, largest: Array, reach: Array
-) -> Iterator[tuple[tuple[int, ...], Array, float]]:
-    """Directions r of coordinates s, rows z, and lengths that z reaches.
-
-    ``sum_r (r . s)^2 (z_r . x)`` is ``sum_ij s_i s_j (stiff_ij . x)``, as
-    ``2 s_i s_j = (s_i + s_j)^2 - s_i^2 - s_j^2``.
-    """
-    d = len(largest)
-    pull = stiff / np.outer(largest, largest)
-    far = np.einsum("kij,i,j->k", np.abs(response), reach, reach)
-    for i in range(d):
-        others = [j for j in range(d) if j != i]
-        row = pull[:, i, i] - pull[:, i, others].sum(axis=1)
-        yield tuple(int(k == i) for k in range(d)), row, float(np.abs(row) @ far)
-    for i, j in combinations(range(d), 2):
-        yield (tuple(int(k in (i, j)) for k in range(d)), pull[:, i, j],
-               float(np.abs(pull[:, i, j]) @ far))
-
-
-def _pulled(
-    row: Array, second: float, third: float, pull: Array, short: float, moved: float
+def _square_times(
+    row: Array, pull: Array, moved: Array, far: float
 ) -> list[tuple[Array, float, float]]:
-    """Springs with the potential ``second s^3 / 3 + third s^4 / 4 - s^2 z / 2``, s = row . x.
+    """Springs with the potential ``-(row . x)^2 (pull . x) / 2``.
 
-    z = pull . x is up to ``moved``, and c z up to ``short``, a small part of s:
-    ``(s + c z)^3 - (s - c z)^3 = 6 c s^2 z`` but for the square of this part, as in
-    ``(s + c z)^4 + (s - c z)^4 = 2 s^4``.
+    ``s^2 z = ((s + c z)^3 - (s - c z)^3 - 2 (c z)^3) / (6 c)``, where c makes both comparable:
+    ``moved`` is a displacement x that belongs to s = ``far``.
     """
-    if not moved:
-        return [(row, second, third)]
-    c = short / moved
+    c = _comparable(pull, moved, far)
     # A spring with the potential g e^3 has the tension 3 g e^2.
-    size = -0.25 / c
-    return [(row + c * pull, 0.5 * second + size, 0.5 * third),
-            (row - c * pull, 0.5 * second - size, 0.5 * third)]
+    size = -0.25 / c if c else 0.0
+    return [(row + c * pull, size, 0.0), (row - c * pull, -size, 0.0),
+            (c * pull, -2.0 * size, 0.0)] if c else []
+
+
+def _product(
+    first: Array, second: Array, pull: Array, moved: Array, far: float
+) -> list[tuple[Array, float, float]]:
+    """Springs with the potential ``-(first . x) (second . x) (pull . x)``.
+
+    ``24 a b c z = (a + b + c z)^3 - (-a + b + c z)^3 - (a - b + c z)^3 - (a + b - c z)^3``;
+    ``moved`` and ``far`` are those of :func:`_square_times`.
+    """
+    c = _comparable(pull, moved, far)
+    size = -0.125 / c if c else 0.0
+    return [(row, sign * size, 0.0) for row, sign in (
+        (first + second + c * pull, 1.0), (second - first + c * pull, -1.0),
+        (first - second + c * pull, -1.0), (first + second - c * pull, -1.0))] if c else []
+
+
+def _comparable(pull: Array, moved: Array, far: float) -> float:
+    """Factor that makes ``pull . x`` as long as ``far`` under the displacement ``moved``, or 0."""
+    along = abs(float(pull @ moved))
+    return far / along if along else 0.0
+
+
+def _reached(
+    springs: list[tuple[Array, float, float]], fitted: CondensedBody, response: Array, reach: Array
+) -> list[float]:
+    """Largest energy of each spring in the fitted range."""
+    state = 0.5 * np.abs(np.einsum("kij,i,j->k", np.abs(response), reach, reach))
+    state[fitted.modes] = reach
+    lengths = [float(np.abs(row) @ state) for row, _, _ in springs]
+    return [abs(second) * e**3 / 3.0 + 0.25 * abs(third) * e**4
+            for e, (_, second, third) in zip(lengths, springs, strict=True)]
 
 
 def _symmetric(tensor: Array) -> Array:
