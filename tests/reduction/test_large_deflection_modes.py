@@ -46,7 +46,8 @@ def first_mode(body, place, axis, size, modes, fitted, harmonics=4):
     basis = modal_basis(body, 3, contact=(), points={"seen": place},
                         large_deflections=LargeDeflections(fitted, modes))
     mode = nonlinear_mode(ContactSystem(basis), (0.02 * size, 1.15 * size),
-                          observe=("seen", "xyz"[axis]), method=HarmonicBalance(harmonics, stability=None))
+                          observe=("seen", "xyz"[axis]),
+                          method=HarmonicBalance(harmonics, stability=None))
     row = place_rows(body, place, "seen").matrix[[axis]].T.toarray()
     return basis, mode, WholeBody(body, row)
 
