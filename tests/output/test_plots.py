@@ -12,7 +12,7 @@ import fecontact
 from fecontact import InputError, Trajectory, basis_from_matrices
 from fecontact.fem import BodyFields
 from fecontact.integrate import Energies
-from fecontact.output.plots import run as plots
+from fecontact.output.plots import run_diagrams as plots
 from fecontact.plot import (
     STATE_COLOURS,
     plot_contact_map,

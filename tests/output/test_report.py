@@ -128,7 +128,7 @@ def test_curves_are_those_of_the_run(tmp_path):
     values = chart["factor"] * shown.array("charts", number, "values")
     for column, point in enumerate(("C", 2)):
         close(values[:, column], trajectory.velocity(point)[:, 1], 2e-4)
-    number, chart = charts["total friction force"]
+    number, chart = charts["total friction force in -x"]
     close(chart["factor"] * shown.array("charts", number, "values")[:, 0],
           trajectory.friction_force.sum(axis=1))
     energies = {chart["title"]: (number, chart) for number, chart in enumerate(

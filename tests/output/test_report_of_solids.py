@@ -97,15 +97,14 @@ def test_what_is_stored_is_the_run(trajectory, path):
         own, axis=2).max()
     assert shown.header["contact"]["areas"] == pytest.approx(run.system.basis.tributary)
     charts = {chart["title"]: chart for chart in shown.header["charts"]}
-    totals = run.friction_forces.sum(axis=1)
-    for title, expected in (
-            ("total friction force along -x", totals[:, 0]),
-            ("total friction force along -y", totals[:, 1]),
-            ("magnitude of the total friction force", np.hypot(*totals.T)),
-            ("displacement y", run.displacement("B")[:, 1]),
-            ("velocity z", run.velocity("B")[:, 2])):
+    totals, friction = run.friction_forces.sum(axis=1), "total friction on the body"
+    for title, column, expected in (
+            (friction, 0, np.hypot(*totals.T)), (friction, 1, -totals[:, 0]),
+            (friction, 2, -totals[:, 1]),
+            ("displacement y", 0, run.displacement("B")[:, 1]),
+            ("velocity z", 0, run.velocity("B")[:, 2])):
         k = list(charts).index(title)
-        found = shown.array("charts", k, "values")[:, 0] * charts[title]["factor"]
+        found = shown.array("charts", k, "values")[:, column] * charts[title]["factor"]
         assert found == pytest.approx(expected, abs=2e-4 * np.abs(expected).max()), title
     travel, w = shown.array("ground", "travel"), TURN * 47.75
     assert travel[:, 0] == pytest.approx(0.05 * run.time, abs=1e-8)

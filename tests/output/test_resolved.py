@@ -13,7 +13,7 @@ from fecontact.analysis.resolved import resolved
 from fecontact.cli import execute
 from fecontact.integrate import SetValued
 from fecontact.laws import ExponentialFriction, LinearContact, RoughSurface
-from fecontact.output.plots.run import thinned
+from fecontact.output.plots.run_diagrams import thinned
 from fecontact.plot import plot_contact_map, plot_friction_work, plot_history, plot_phase
 
 MASS, STIFFNESS, SPEED = 2.0, 1e6, 0.3

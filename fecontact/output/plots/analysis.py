@@ -26,7 +26,8 @@ from fecontact.core.units import count, listed, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.face_panels import abscissa_unit, face_panels, scale_row
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.run import direction_row, thinned
+from fecontact.output.plots.run import direction_row
+from fecontact.output.plots.run_diagrams import thinned
 from fecontact.output.plots.style import (
     COLOURS,
     DASHES,

@@ -18,7 +18,7 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.analysis import LOWEST_DECADES, end_of_content, spectrum_line
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.parameter_labels import name_axis
-from fecontact.output.plots.run import thinned
+from fecontact.output.plots.run_diagrams import thinned
 from fecontact.output.plots.style import distinct_colours, legend_label
 from fecontact.reduction.modal_basis import Component
 from fecontact.system.contact_system import ContactSystem

@@ -3,12 +3,11 @@
 from collections.abc import Sequence
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fecontact.analysis.histories import Point, is_relative, point_name
+from fecontact.analysis.histories import Point
 from fecontact.analysis.resolved import resolved
 from fecontact.analysis.summaries import usual_point
 from fecontact.core.checks import require_kind
@@ -17,31 +16,26 @@ from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.run_diagrams import (
+    AXES,
+    Curve,
+    Diagram,
+    energy_diagrams,
+    force_diagrams,
+    labelled,
+    motion_diagrams,
+)
 from fecontact.output.plots.style import (
     COLOURS,
-    ENERGY_COLOURS,
     add_note,
-    distinct_colours,
-    legend_label,
 )
-from fecontact.reduction.assembly.contact_faces import ContactFace, contact_faces
+from fecontact.reduction.assembly.contact_faces import contact_faces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Panels of energies: title, attribute of their sum, attributes of the terms.
-ENERGY_TERMS = (
-    ("stored energy", "stored", ("kinetic", "elastic", "drive_spring", "contact", "bristles")),
-    ("work put in", "work", ("drive_work", "belt_normal_work", "belt_friction_work", "load_work",
-                             "circulatory_work", "bristle_work")),
-    ("energy lost", "lost", ("modal_damping", "dashpots", "contact_damping", "friction")),
-)
-
-_AXES = ("x", "y", "z")
-
 _MOST_MIDDLES = 5  # of contact nodes shown without being asked for
-_LINE_BINS = 2000  # a long line is drawn by minimum and maximum of each
 
 
 def plot_history(
@@ -74,87 +68,40 @@ def plot_history(
     points = tuple(points) or usual_points(trajectory)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
-    colours, faces = distinct_colours(len(points)), contact_faces(trajectory.system.basis)
-    single = not faces or not faces[0].name
-    motions = [("displacement", "m", [trajectory.displacement(point) for point in points]),
-               ("velocity", "m/s", [trajectory.velocity(point) for point in points])]
-    motions = [(name, unit, _without_round_off(values)) for name, unit, values in motions]
-    d = trajectory.system.basis.dimension
-    moving = [row for row in range(d) if any(
-        value[:, row].any() for _, _, values in motions for value in values)] or [0]
-    rubs = bool(trajectory.friction_forces.any())
-    panels: list[Any] = [[f"{name} {_AXES[row]}" for name, _, _ in motions] for row in moving]
-    touches = bool(trajectory.system.basis.contact_nodes)
-    if touches:
-        panels.append(["normal force", "friction force" if rubs else "normal force"])
+    motions = motion_diagrams(trajectory, points)
+    moving = sorted({axis for (_, axis), one in motions.items() if one.curves}) or [0]
+    panels = [[motions["displacement", axis], motions["velocity", axis]] for axis in moving]
+    forces = force_diagrams(trajectory)[:2]
+    if forces:
+        panels.append([one for one in forces if one is forces[0] or one.largest > 0.0])
     with new_figure(10.0, 2.5 * len(panels), path) as figure:
         add_note(figure, drawn)
-        axes = figure.subplot_mosaic(panels, sharex=True)
-        for panel in chain.from_iterable(panels[:-1]):
-            axes[panel].tick_params(labelbottom=False)
-        time = _time([axes[panel] for panel in dict.fromkeys(panels[-1])], trajectory)
-        for quantity, unit, values in motions:
-            for row in moving:
-                axis = axes[f"{quantity} {_AXES[row]}"]
-                factor = _labelled(axis, f"{quantity} {_AXES[row]}", unit,
-                                   *(value[:, row] for value in values))
-                for number, (point, value) in enumerate(zip(points, values, strict=True)):
-                    axis.plot(*thinned(time, value[:, row] / factor), color=colours[number],
-                              linewidth=1.2 if number else 2.0,
-                              label=legend_label(_label(point, trajectory)))
-        normal = "normal force", "normal force", trajectory.normal_force
-        friction = ("friction force", f"friction force in -{'x' if single else 't'}",
-                    trajectory.friction_force)
-        if d == 3 and rubs:
-            _friction_in_space(axes["friction force"], trajectory, time, faces)
-        for panel, name, forces in (normal, friction)[: touches + (rubs and d == 2)]:
-            totals = [forces[:, face.nodes].sum(axis=1) for face in faces]
-            factor = _labelled(axes[panel], f"total {name}", "N", *totals)
-            for face, total, colour in zip(faces, totals, ["#303030"] if single else
-                                           distinct_colours(len(faces)), strict=True):
-                axes[panel].plot(*thinned(time, total / factor), color=colour,
-                                 label=legend_label(face.name))
-        for side in zip(*panels, strict=True):
-            figure.align_ylabels([axes[panel] for panel in side])
-        figure.legend(*axes[panels[0][0]].get_legend_handles_labels(), loc="outside upper center",
+        grid = figure.subplot_mosaic([[row[0].title, row[-1].title] for row in panels],
+                                     sharex=True)
+        bottom = [grid[one.title] for one in panels[-1]]
+        time = _time(bottom, trajectory)
+        for one in chain.from_iterable(panels):
+            one.draw(grid[one.title], time)
+            if grid[one.title] not in bottom:
+                grid[one.title].tick_params(labelbottom=False)
+        for side in (0, -1):
+            figure.align_ylabels([grid[row[side].title] for row in panels])
+        points_shown = {text: line for one in motions.values() if one.title in grid for line, text
+                        in zip(*grid[one.title].get_legend_handles_labels(), strict=True)}
+        figure.legend(points_shown.values(), points_shown, loc="outside upper center",
                       ncols=max(1, min(len(points), 6)))
-        if not single and touches:
-            # Above the forces: within the panel it would hide curves.
-            axes["normal force"].legend(loc="lower left", bbox_to_anchor=(-0.02, 0.98),
-                                        ncols=max(1, min(len(faces), 6)))
+        for one in forces:
+            if one.title in grid and len({curve.name for curve in one.curves} - {""}) > 0 and (
+                    one is forces[0] or one.curves[0].name != forces[0].curves[0].name):
+                # Above the forces: within the panel it would hide curves.
+                grid[one.title].legend(loc="lower left", bbox_to_anchor=(-0.02, 0.98),
+                                       ncols=max(1, min(len(one.curves), 6)))
     return figure
-
-
-def _without_round_off(values: list[Array]) -> list[Array]:
-    """Histories (N, k) with components below a billionth of the largest set to zero."""
-    d = 2 if values[0].shape[1] <= 3 else 3
-    largest = max(float(np.abs(value[:, :d]).max()) for value in values)
-    return [np.where(np.abs(value).max(axis=0) > 1e-9 * largest, value, 0.0) for value in values]
-
-
-def _friction_in_space(
-    axis: "Axes", trajectory: Trajectory, time: Array, faces: Sequence[ContactFace]
-) -> None:
-    """Total friction on the body of a solid along x and y, or the size of that of interfaces."""
-    forces = -np.einsum("fnk,nkd->fnd", trajectory.friction_forces,
-                        trajectory.system.basis.tangents)
-    totals = [forces[:, face.nodes].sum(axis=1) for face in faces]
-    sizes = [np.linalg.norm(total, axis=1) for total in totals]
-    if faces[0].name:
-        factor = _labelled(axis, "size of total friction", "N", *sizes)
-        for face, size, colour in zip(faces, sizes, distinct_colours(len(faces)), strict=True):
-            axis.plot(*thinned(time, size / factor), color=colour, label=legend_label(face.name))
-        return
-    factor = _labelled(axis, "total friction on the body", "N", totals[0], sizes[0])
-    axis.plot(*thinned(time, sizes[0] / factor), color="#b8b4ad", linewidth=2.4, label="size")
-    for row, colour in ((0, "#303030"), (1, COLOURS[1])):
-        axis.plot(*thinned(time, totals[0][:, row] / factor), color=colour, label=_AXES[row])
-    axis.legend(loc="lower left", bbox_to_anchor=(-0.02, 0.98), ncols=3)
 
 
 def direction_row(trajectory: Trajectory, component: str) -> int:
     """Row of a direction of motion; InputError for one that the bodies do not have."""
-    axes = _AXES[: trajectory.system.basis.dimension]
+    axes = AXES[: trajectory.system.basis.dimension]
     if component not in axes:
         raise InputError(f"component = {component!r} is not known; choose from {choices(axes)}.")
     return axes.index(component)
@@ -193,8 +140,9 @@ def plot_phase(
         x, v = trajectory.displacement(point)[:, row], trajectory.velocity(point)[:, row]
         unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
         plane.set_xlabel(f"displacement {component} [{symbol}]")
-        factor = _labelled(plane, f"velocity {component}", "m/s", v)
-        plane.plot(x / unit, v / factor, color=COLOURS[0], linewidth=1.0)
+        velocity = Diagram(f"velocity {component}", "m/s", (Curve("", COLOURS[0], v, 1.0),))
+        velocity.draw(plane, x / unit)
+        factor, _ = velocity.scale
         plane.plot(x[-1] / unit, v[-1] / factor, "o", color=COLOURS[1], label="end of the run")
         speed = _ground_speed(trajectory, row)
         # The speed of a much faster ground would flatten the curve.
@@ -202,7 +150,7 @@ def plot_phase(
             plane.axhline(speed / factor, color="#303030", linestyle=(0, (4, 3)), linewidth=1.0,
                           label="ground")
         plane.legend(loc="best")
-        plane.set_title(_label(point, trajectory))
+        plane.set_title(labelled(point, trajectory))
     return figure
 
 
@@ -237,26 +185,15 @@ def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> 
     imbalance = trajectory.energies.imbalance
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
-    energies = trajectory.energies
-    # Without drive, friction and damping nothing is put in or lost.
-    panels = [panel for panel in ENERGY_TERMS
-              if any(getattr(energies, name).any() for name in panel[2])] or ENERGY_TERMS[:1]
+    panels = energy_diagrams(trajectory)
     with new_figure(10.0, 0.5 + 2.5 * len(panels), path) as figure:
         add_note(figure, drawn)
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         time = _time([axes[-1]], trajectory)
-        for axis, (title, sum_of, names) in zip(axes, panels, strict=True):
-            total = getattr(energies, sum_of)
-            terms = {name: getattr(energies, name) for name in names}
-            shown = {name: term for name, term in terms.items() if term.any()}
-            factor = _labelled(axis, title, "J", total, *shown.values())
-            for name, term in shown.items():
-                axis.plot(*thinned(time, term / factor), color=ENERGY_COLOURS[name],
-                          label=name.removesuffix("_work").replace("_", " "))
-            if not shown:
+        for axis, diagram in zip(axes, panels, strict=True):
+            if len(diagram.curves) == 1:  # nothing but the total, which is zero
                 axis.set(ylim=(-1.0, 1.0), yticks=[0.0])
-            axis.plot(*thinned(time, total / factor), color="#303030", linewidth=1.8, label="total",
-                      zorder=1.5)
+            diagram.draw(axis, time)
             axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
         figure.align_ylabels(axes)
         axes[0].set_title(f"error of the energy balance: {imbalance:.1e} of the largest term")
@@ -272,13 +209,6 @@ def usual_points(trajectory: Trajectory) -> tuple[Point, ...]:
     return found or (usual_point(basis),)
 
 
-def _label(point: Point, trajectory: Trajectory) -> str:
-    """Name of a point, and whether its motion is relative to another body."""
-    basis = trajectory.system.basis
-    way = ", relative (t, n)" if basis.dimension == 2 else ", relative (t, t2, n)"
-    return point_name(point, basis) + way * is_relative(point, basis)
-
-
 def _time(bottom: Sequence["Axes"], trajectory: Trajectory) -> Array:
     """Times in a suitable unit, which the given axes name."""
     factor, symbol = suitable_unit(float(np.abs(trajectory.time).max()), "s")
@@ -287,39 +217,3 @@ def _time(bottom: Sequence["Axes"], trajectory: Trajectory) -> Array:
         if len(trajectory.time) > 1:
             axis.set_xlim(trajectory.time[0] / factor, trajectory.time[-1] / factor)
     return trajectory.time / factor
-
-
-def _labelled(axis: "Axes", name: str, unit: str, *values: Array) -> float:
-    """Label the y axis with a suitable unit, and return its factor."""
-    largest = max((float(np.abs(value).max()) for value in values), default=0.0)
-    factor, symbol = suitable_unit(largest, unit)
-    axis.set_ylabel(f"{name} [{symbol}]")
-    low = min((float(value.min()) for value in values), default=0.0)
-    high = max((float(value.max()) for value in values), default=0.0)
-    if 0.0 <= high - low < 1e-9 * largest:
-        # Do not magnify round-off about a constant.
-        axis.set_ylim((low - 0.05 * largest) / factor, (high + 0.05 * largest) / factor)
-    return factor
-
-
-def thinned(x: Array, y: Array) -> tuple[Array, Array]:
-    """A long line by what it is where it enters and leaves each of many narrow columns, and by its
-    lowest and highest points there, so that no peak is lost.
-    """
-    if len(x) < 4 * _LINE_BINS:
-        return x, y
-    columns = np.linspace(x[0], x[-1], _LINE_BINS + 1)[:-1]
-    starts = np.unique(np.searchsorted(x, columns))
-    low, high = (_places(extreme.reduceat(y, starts), y, starts)
-                 for extreme in (np.minimum, np.maximum))
-    ends = np.append(starts[1:], len(x)) - 1
-    chosen = np.unique(np.concatenate([starts, low, high, ends]))
-    return x[chosen], y[chosen]
-
-
-def _places(extremes: Array, y: Array, starts: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Index of the extreme in each column of points."""
-    counts = np.diff(np.append(starts, len(y)))
-    met = np.flatnonzero(y == np.repeat(extremes, counts))
-    columns = np.searchsorted(starts, met, side="right")
-    return np.asarray(met[np.unique(columns, return_index=True)[1]])

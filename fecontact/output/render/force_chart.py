@@ -11,7 +11,7 @@ from fecontact.analysis.resolved import resolved
 from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.plots.run import thinned
+from fecontact.output.plots.run_diagrams import thinned
 from fecontact.output.plots.style import COLOURS, DASHES, distinct_colours, legend_label
 from fecontact.output.render.canvas import canvas_of
 from fecontact.output.render.frames_data import Motion

@@ -12,8 +12,9 @@ from fecontact.analysis.summaries import usual_point
 from fecontact.core.units import UNITS
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.files.stored_system import library_versions
+from fecontact.output.plots.run_diagrams import Curve, Diagram
 from fecontact.output.plots.style import distinct_colours
-from fecontact.output.report.charts import spectrum_table, table_of_curves
+from fecontact.output.report.charts import chart_table, spectrum_table
 from fecontact.output.report.page import write_page
 from fecontact.output.report.payload import Payload
 from fecontact.output.report.run_report import require_page
@@ -77,9 +78,9 @@ def report_runs(
         if not any(one.values.any() for one in shown):
             continue
         if time is not None:
-            charts.append(table_of_curves(shown[0].title, shown[0].unit, [
-                (name, colour, np.interp(time, run.time, one.values))
-                for (name, run), one, colour in zip(runs.items(), shown, colours, strict=True)],
+            charts.append(chart_table(Diagram(shown[0].title, shown[0].unit, tuple(
+                Curve(name, colour, np.interp(time, run.time, one.values))
+                for (name, run), one, colour in zip(runs.items(), shown, colours, strict=True))),
                 payload))
         if wish[0] == "velocity":
             spectra.append(spectrum_table(shown[0].title, [
