@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def plot_diameters(
     found: SectorModes, *, speed: float | None = None, path: str | Path | None = None
 ) -> "Figure":
-    """Plot the frequencies of a wheel over its nodal diameters.
+    """Plot the frequencies of a wheel over its nodal diameters: the SAFE diagram.
 
     With a speed, a zigzag line shows excitation by forces at rest in space: engine order m has the
     frequency m times the speed, and acts on the diameter to which m folds, m or N - m up to N, and
