@@ -19,11 +19,13 @@ from fecontact import (
     equilibrium,
     generate,
     modal_basis,
+    simulate,
 )
 from fecontact.analysis import campbell, complex_modes
+from fecontact.bifurcation import ContinuationOptions, HarmonicBalance, frequency_response
 from fecontact.fem import CyclicSymmetry, Ring, Rotation
 from fecontact.io import read_basis, write_basis
-from fecontact.laws import Frictionless, LinearContact
+from fecontact.laws import Frictionless, Harmonic, LinearContact
 from fecontact.reduction import PointPairing, Spring, assembled_basis, linked, sector_modes
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
@@ -91,6 +93,30 @@ def test_a_spring_that_stands_on_a_disc(disc):
     diagram = campbell(basis, np.linspace(0.0, 1.1 * w / n, 23))
     # A constant force at rest excites the wave that it meets standing.
     assert diagram.critical_speeds(0)[0] == pytest.approx(w / n, rel=5e-3)
+
+
+@pytest.mark.parametrize("frame", ["standing", "rotating"])
+def test_forced_vibration_of_a_disc_that_turns(disc, frame):
+    """Harmonic balance and a run: |r_b (K - w^2 + i w C)^-1 r_a|, a force at one of two points.
+
+    Waves that run either way differ by which of the points is which.
+    """
+    basis = modal_basis(disc, 5, contact=(), damping=0.05, rotation=Rotation(W, frame=frame),
+                        points={"rim": (0.2, 0.0, 0.01), "side": (0.1, 0.17, 0.01)})
+    hertz, row, seen = 330.0, basis.point_row("rim", "z"), basis.point_row("side", "z")
+    system = ContactSystem(basis, load=Load(forces=(
+        PointLoad("rim", "z", signal=Harmonic(3.0, hertz)),)))
+    w = 2.0 * np.pi * hertz
+    dynamic = basis.stiffness_matrix - w**2 * np.eye(5) + 1j * w * basis.damping
+    exact, other = (3.0 * abs(seen @ np.linalg.solve(one, row)) for one in (dynamic, dynamic.T))
+    assert abs(exact / other - 1.0) > (0.05 if frame == "standing" else 1e-5)
+    found = frequency_response(
+        system, (hertz, 1.1 * hertz), "load.forces.0.signal.frequency_hz", observe=("side", "z"),
+        options=ContinuationOptions(points=1), method=HarmonicBalance([0, 1], 32, stability=None))
+    assert abs(found.harmonic(1)[0]) == pytest.approx(exact, rel=1e-8)
+    run = simulate(system, 40.0 / hertz, outputs=2001)
+    last = np.asarray(run.displacement("side"))[-51:, 2]
+    assert 0.5 * np.ptp(last) == pytest.approx(exact, rel=2e-3)
 
 
 def test_a_disc_that_turns_under_a_pad_that_stands(disc, tmp_path):

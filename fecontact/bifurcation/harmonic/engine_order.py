@@ -135,7 +135,8 @@ class EngineOrder:
                 getattr(one, name), Constant) for name in BOUNDARY_STRESSES)
             if varies and one.boundary not in self.wheel.loads:
                 raise InputError(f"EngineOrder: the load on '{one.boundary}' varies in time; make "
-                                 f"the wheel by cyclic_basis(..., loads=['{one.boundary}']).")
+                                 f"the wheel by cyclic_basis(..., loads=['{one.boundary}']), in a "
+                                 f"study by loads of [bodies.NAME.basis].")
         return replace(system, basis=self.basis)
 
     def field(self, field: VectorField) -> "WaveField":

@@ -119,7 +119,7 @@ def balance(u, T, loads, e, out):
         for i in range(m):
             place, speed = u[k * m + i], speed_coefficient(u, k, i, m, T)
             for j in range(m):
-                out[k * m + j] += linear[0, i, j] * place + linear[1, i, j] * speed
+                out[k * m + j] += linear[0, j, i] * place + linear[1, j, i] * speed
 
 
 @helper
@@ -491,7 +491,7 @@ def take_forces(p, e, forces):
                 forces[n, j] = push[n] + e.given[0, n, j] + p * e.given[1, n, j]
             for i in range(m):
                 places, speeds = room.motion[i], room.motion[m + i]
-                stiffness, damping = linear[0, i, j], linear[1, i, j]
+                stiffness, damping = linear[0, j, i], linear[1, j, i]
                 for n in range(N):
                     forces[n, j] -= stiffness * places[n] + damping * speeds[n]
     else:
@@ -501,7 +501,7 @@ def take_forces(p, e, forces):
             for i in range(m):
                 place, speed = room.x[n, i], room.x[n, m + i]
                 for j in range(m):
-                    forces[n, j] -= linear[0, i, j] * place + linear[1, i, j] * speed
+                    forces[n, j] -= linear[0, j, i] * place + linear[1, j, i] * speed
 
 
 @helper
