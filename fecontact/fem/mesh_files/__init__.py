@@ -34,6 +34,7 @@ from fecontact.fem.mesh_files.ansys import read_cdb
 from fecontact.fem.mesh_files.gmsh import read_msh, write_msh
 from fecontact.fem.mesh_files.groups import Box, named_boundaries, named_constraints, named_points
 from fecontact.fem.mesh_files.med import read_med
+from fecontact.fem.mesh_files.nastran_constraints import add_constraints
 from fecontact.fem.mesh_files.raw import RawMesh, body_mesh
 from fecontact.fem.pretension import cut_along
 
@@ -41,7 +42,7 @@ from fecontact.fem.pretension import cut_along
 # without properties name lines.
 _STIFFENING = (r"PBARL?", r"PBE(?:AML?|AM3|ND)", "PROD", "CONROD", "PTUBE", r"CBUSH(?:1D|2D)?",
                r"CELAS\d", r"CDAMP\d", "CVISC", "CGAP", "CWELD", "CFAST", "CSEAM", r"CMASS\d",
-               r"CONM\d", "RBE[123]", "RBAR1?", "RROD", "RTRPLT1?", "RSPLINE", "RJOINT", "MPC",
+               r"CONM\d", "RBE1", "RBAR1?", "RROD", "RTRPLT1?", "RSPLINE", "RJOINT", "MPCADD",
                "DMIG")
 _BYTES_OF_A_GRID_POINT = 200.0  # coordinates and a cell of eight nodes, with copies
 
@@ -64,8 +65,9 @@ def read_mesh(
     number (Nastran). Points are physical points, node sets, groups inside the body, and lines of
     solids. VTK files have no groups. Curved sides of second-order elements are kept, coincident
     nodes merged, nodes without a cell left out. Ties, couplings, equations and sections of bolts of
-    Abaqus files become ``mesh.constraints``, whose nodes are not merged; masses, springs and
-    dashpots become ``mesh.attachments``. Sections of Abaqus files, and materials of Ansys archives,
+    Abaqus files, RBE2, RBE3 and MPC of Nastran's become ``mesh.constraints``, whose nodes are not
+    merged; masses, springs and dashpots become ``mesh.attachments``. Sections of Abaqus files, and
+    materials of Ansys archives,
     become ``mesh.materials``, in SI units if the file's forces are in N and its mass fits to them,
     such as tonnes beside mm.
 
@@ -397,7 +399,9 @@ def _read_nastran(path: Path) -> RawMesh:
     if not re.search(r"^ENDDATA", text, re.MULTILINE):
         raise MeshError("The file has no line ENDDATA, so it may be cut off; add one if it is "
                         "complete.")
-    return _raw_mesh(_by_meshio("nastran", io.StringIO(text)))
+    raw = _raw_mesh(_by_meshio("nastran", io.StringIO(text)))
+    add_constraints(path, text, raw)
+    return raw
 
 
 def _by_meshio(format_name: str, source: Path | io.StringIO) -> Any:

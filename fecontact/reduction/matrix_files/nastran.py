@@ -22,6 +22,7 @@ from fecontact.core.checks import as_path, require_regular_file
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.extras import optional
 from fecontact.core.types import Array, Integers
+from fecontact.fem.mesh_files.nastran_cards import cards, real, whole
 from fecontact.reduction.matrix_files.names import chosen_name
 
 _SYMMETRIC, _SQUARE = "6", "1"
@@ -45,7 +46,7 @@ def read_dmig(path: Path, name: str | None) -> tuple[Any, Integers]:
 
     headings: dict[str, list[str]] = {}
     entries: dict[str, list[tuple[int, int, int, int, float]]] = {}
-    for line, fields in _cards(path, "DMIG"):
+    for line, fields in cards(path, "DMIG"):
         own, rest = fields[0].upper(), fields[1:]
         if rest[0] == "0":
             headings[own] = rest
@@ -114,11 +115,11 @@ def read_op2(path: Path, name: str | None) -> tuple[Any, None]:
 
 def _external(path: Path) -> Integers | None:
     """Points and components (d, 2) of an external superelement; None without a card EXTRN."""
-    for line, fields in _cards(path, "EXTRN"):
+    for line, fields in cards(path, "EXTRN"):
         words = [word for word in fields if word]
         if len(words) % 2:
             raise InputError(f"Card EXTRN of line {line} of {path} ends after a point.")
-        points = [_whole(line, word) for word in words[::2]]
+        points = [whole(line, word) for word in words[::2]]
         return np.array([(point, int(digit)) for point, digits in zip(points, words[1::2],
                                                                      strict=True)
                          for digit in digits], np.int64)
@@ -127,7 +128,7 @@ def _external(path: Path) -> Integers | None:
 
 def _recovered(path: Path, table: str) -> Integers | None:
     """Points and components (k, 2) of the rows of a recovery matrix; None without its table."""
-    for line, fields in _cards(path, "DTI"):
+    for line, fields in cards(path, "DTI"):
         if [fields[0].upper(), fields[1]] != [table, "2"]:
             continue
         words = [word for word in fields[2:] if word]
@@ -135,7 +136,7 @@ def _recovered(path: Path, table: str) -> Integers | None:
         if len(words) % 4:
             raise InputError(f"Card DTI, {table}, 2 of line {line} of {path} has no groups of "
                              f"type, point, components and row.")
-        numbers = np.array([_whole(line, word) for word in words], np.int64).reshape(-1, 4)
+        numbers = np.array([whole(line, word) for word in words], np.int64).reshape(-1, 4)
         labels = [(point, one + 1) for _, point, count, _ in numbers.tolist()
                   for one in range(count)]
         starts = np.concatenate([[0], np.cumsum(numbers[:, 2])])[:-1] + 1
@@ -176,14 +177,14 @@ def grid_places(path: str | Path, scale: float = 1.0) -> dict[int, Array]:
     require_positive("grid_places", scale=scale)
     found: dict[int, Array] = {}
     try:
-        for line, fields in _cards(path, "GRID"):
+        for line, fields in cards(path, "GRID"):
             number, system, *place, displaced = (fields + [""] * 6)[:6]
             if {system or "0", displaced or "0"} != {"0"}:
                 raise InputError(f"Card of line {line}: point {number} is in the local coordinate "
                                  f"system {displaced or system}; write places and displacements "
                                  f"in the basic one.")
-            at = scale * np.array([_real(line, word or "0.0") for word in place])
-            point = _whole(line, number)
+            at = scale * np.array([real(line, word or "0.0") for word in place])
+            point = whole(line, number)
             if np.abs(found.setdefault(point, at) - at).max() > 0.0:
                 raise InputError(f"Card of line {line}: point {point} is given a second time, at "
                                  f"another place.")
@@ -196,7 +197,7 @@ def grid_places(path: str | Path, scale: float = 1.0) -> dict[int, Array]:
 
 def _column(line: int, fields: list[str]) -> Iterator[tuple[int, int, int, int, float]]:
     """Point and component of a column, then of a row, and the value, of one card."""
-    point, component = (_whole(line, word) for word in fields[:2])
+    point, component = (whole(line, word) for word in fields[:2])
     # Rows have four fields: point, component, real and imaginary part.
     for start in range(3, len(fields), 4):
         group = fields[start : start + 3]
@@ -205,56 +206,5 @@ def _column(line: int, fields: list[str]) -> Iterator[tuple[int, int, int, int, 
         if len(group) < 3:
             raise InputError(f"Card of line {line} ends within an entry of a DMIG, so the file may "
                              f"be cut off.")
-        yield point, component, _whole(line, group[0]), _whole(line, group[1]), _real(
+        yield point, component, whole(line, group[0]), whole(line, group[1]), real(
             line, group[2])
-
-
-def _cards(path: Path, name: str) -> Iterator[tuple[int, list[str]]]:
-    """Fields of each card of a name, with continuations, and the line of its begin."""
-    card: list[str] | None = None
-    begin = 0
-    text = path.read_text(encoding="utf-8", errors="replace")
-    for number, raw in enumerate(text.splitlines(), start=1):
-        line = raw.partition("$")[0].rstrip()
-        if not line.strip():
-            continue
-        head, fields = _fields(line)
-        if card is not None and head[:1] in ("", "+", "*"):
-            card += fields
-            continue
-        if card is not None:
-            yield begin, card
-        card, begin = (fields if head.rstrip("*").upper() == name else None), number
-    if card is not None:
-        yield begin, card
-
-
-def _fields(line: str) -> tuple[str, list[str]]:
-    """First field of a line and its others: 4 wide ones after ``*``, else 8."""
-    if "," in line:
-        head, *fields = (word.strip() for word in line.split(","))
-        count = 4 if "*" in head else 8
-        return head, (fields + [""] * count)[:count]
-    head = line[:8].strip()
-    width, count = (16, 4) if "*" in head else (8, 8)
-    return head, [line[8 + width * k : 8 + width * (k + 1)].strip() for k in range(count)]
-
-
-def _whole(line: int, word: str) -> int:
-    try:
-        return int(word)
-    except ValueError:
-        raise InputError(f"Card of line {line}: {word[:40]!r} is no number of a point or "
-                         f"component.") from None
-
-
-def _real(line: int, word: str) -> float:
-    """A number, also with D for E, or without either, as 1.5-3."""
-    plain = word.upper().replace("D", "E")
-    sign = max(plain.rfind("+"), plain.rfind("-"))
-    if "E" not in plain and sign > 0:
-        plain = f"{plain[:sign]}E{plain[sign:]}"
-    try:
-        return float(plain)
-    except ValueError:
-        raise InputError(f"Card of line {line}: {word[:40]!r} is not a number.") from None

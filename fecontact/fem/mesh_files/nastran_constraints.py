@@ -1,0 +1,145 @@
+"""Constraints of Nastran's bulk data: RBE2, RBE3 and MPC, and the nodes of its supports.
+
+RBE2 lets nodes follow a grid point as a rigid body, RBE3 gives a grid point the mean motion of
+nodes, MPC are linear equations. Nodes of SPC and SPC1 become groups, such as ``SPC 7`` of set 7.
+"""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from fecontact.core.errors import MeshError, choices
+from fecontact.core.types import Integers
+from fecontact.fem.constraints import Constraint, Coupling, LinearEquation, Term
+from fecontact.fem.mesh_files.nastran_cards import cards, real, whole
+from fecontact.fem.mesh_files.raw import RawMesh
+
+_CARDS = re.compile(r"^(?:RBE[23]|MPC|SPC1?)\b", re.MULTILINE | re.IGNORECASE)
+
+
+def add_constraints(path: Path, text: str, raw: RawMesh) -> None:
+    """Add constraints of a file to its contents, and groups of nodes that these and supports name.
+
+    The points of ``raw`` are in the order of the cards GRID; ``text`` is that of the file.
+
+    Raises
+    ------
+    MeshError
+        For points that the file does not hold, and constraints of kinds that are not read.
+    """
+    if not _CARDS.search(text):
+        return
+    row = {whole(line, fields[0]): number for number, (line, fields) in enumerate(
+        cards(path, "GRID"))}
+    found = [*_rigid(path, row, raw), *_means(path, row, raw), *_equations(path, row, raw)]
+    raw.constraints += found
+    raw.apart = raw.apart or bool(found)
+    for name, nodes in _supported(path, row).items():
+        raw.nodes.setdefault(name, np.array(sorted(nodes), np.int64))
+
+
+def _rows(line: int, words: list[str], row: dict[int, int], card: str) -> Integers:
+    """Rows of points, which may be ranges (THRU); words that are reals end them."""
+    found: list[int] = []
+    wanted = [word for word in words if word]
+    while wanted:
+        word = wanted.pop(0)
+        if "." in word:
+            break
+        if word.upper() == "THRU":
+            last = whole(line, wanted.pop(0)) if wanted else found[-1]
+            found += [point for point in range(found[-1] + 1, last + 1) if point in row]
+            continue
+        found.append(whole(line, word))
+    missing = [point for point in found if point not in row]
+    if missing or not found:
+        what = f"the point {missing[0]}, which the file does not hold" if missing else "no points"
+        raise MeshError(f"The card {card} of line {line} names {what}; correct its numbers.")
+    return np.array([row[point] for point in found], np.int64)
+
+
+def _reference(line: int, word: str, row: dict[int, int], raw: RawMesh, card: str) -> str:
+    """Name of the group of a point that others follow."""
+    node = _rows(line, [word], row, card)
+    raw.nodes.setdefault(f"point {word}", node)
+    return f"point {word}"
+
+
+def _axes(components: str) -> list[list[float]] | None:
+    """Directions of the displacements among components, None for all three."""
+    chosen = [k for k in range(3) if str(k + 1) in components]
+    return None if len(chosen) == 3 else np.eye(3)[chosen].tolist()
+
+
+def _rigid(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constraint]:
+    for line, fields in cards(path, "RBE2"):
+        name, components = f"RBE2 {fields[0]}", fields[2]
+        reference = _reference(line, fields[1], row, raw, name)
+        if not set(components) & set("123"):
+            raise MeshError(f"The card {name} of line {line} holds the components {components!r}, "
+                            f"no displacements, which are 1, 2 and 3.")
+        raw.nodes[name] = _rows(line, fields[3:], row, name)
+        yield Coupling(name, reference, tuple(raw.points[raw.nodes[reference][0]]),
+                       axes=_axes(components), name=name)
+
+
+def _means(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constraint]:
+    for line, fields in cards(path, "RBE3"):
+        name = f"RBE3 {fields[0]}"
+        reference = _reference(line, fields[2], row, raw, name)
+        weights, points = [], []
+        words = [word for word in fields[4:] if word]
+        while words and words[0].upper() not in ("UM", "ALPHA"):
+            word = words.pop(0)
+            if "." in word:
+                weights.append(real(line, word))
+                if not words or not set("123") <= set(words.pop(0)):
+                    raise MeshError(f"The card {name} of line {line} has weights of other "
+                                    f"components than 1, 2, 3 together, which are not read.")
+            else:
+                points.append(word)
+        if len(set(weights)) != 1 or "UM" in map(str.upper, words):
+            raise MeshError(f"The card {name} of line {line} has different weights or a list UM, "
+                            f"which are not read; write one weight for all its points.")
+        raw.nodes[name] = _rows(line, points, row, name)
+        yield Coupling(name, reference, tuple(raw.points[raw.nodes[reference][0]]), "distributing",
+                       name=name)
+
+
+def _equations(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constraint]:
+    sets: dict[str, int] = {}
+    for line, fields in cards(path, "MPC"):
+        name = f"MPC of line {line}"
+        sets.setdefault(fields[0], line)
+        words = [word for k in range(0, len(fields), 8) for word in fields[k + 1 : k + 7]]
+        terms = []
+        for point, component, factor in zip(*(words[k::3] for k in range(3)), strict=False):
+            if not point:
+                continue
+            node, way = int(_rows(line, [point], row, name)[0]), whole(line, component) - 1
+            if not 0 <= way < 6:
+                raise MeshError(f"The card {name} has the component {component}, which must be 1 "
+                                f"to 6.")
+            value = (real(line, factor) * np.eye(6)[way]).tolist()
+            if way > 2:
+                _reference(line, point, row, raw, name)
+            terms.append(Term(node, tuple(value[:3]), tuple(value[3:]) if way > 2 else ()))
+        yield LinearEquation(tuple(terms), name)
+    if len(sets) > 1:
+        raise MeshError(f"The file has the sets {choices(sets)} of MPC; leave those out that do "
+                        f"not act.")
+
+
+def _supported(path: Path, row: dict[int, int]) -> dict[str, set[int]]:
+    """Nodes by the name of their support."""
+    found: dict[str, set[int]] = {}
+    for line, fields in cards(path, "SPC1"):
+        found.setdefault(f"SPC {fields[0]}", set()).update(
+            _rows(line, fields[2:], row, "SPC1").tolist())
+    for line, fields in cards(path, "SPC"):
+        points = [fields[k] for k in (1, 4) if k < len(fields) and fields[k]]
+        found.setdefault(f"SPC {fields[0]}", set()).update(
+            _rows(line, points, row, "SPC").tolist())
+    return found
