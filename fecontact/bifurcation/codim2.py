@@ -66,15 +66,15 @@ def codim2_curve(
 ) -> Branch:
     """Follow a special point over two parameters, such as the border of flutter or stick-slip.
 
-    docs/bifurcation.md lists what the points store, and the special points of each kind of curve.
+    The page docs/bifurcation.md lists the stored values and special points of each kind of curve.
 
     Parameters
     ----------
     field : VectorField
         The system, with both parameters. For equilibria its rates must not depend on time.
     point : FoldPoint, HopfPoint, PeriodDoublingPoint, NeimarkSackerPoint, DiscontinuityPoint
-        A point of a branch over the first parameter, of orbits by collocation or between events.
-        Or a point of codimension two of a curve, such as 'zero-Hopf', for others there.
+        A point of a branch over the first parameter, of orbits by collocation or between events; or
+        a point of codimension two, such as 'zero-Hopf', where other curves begin.
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional

@@ -63,7 +63,8 @@ class Shooting:
     """Multiple shooting with the compiled integrator, for contact systems only.
 
     Suited to steep friction, impacts and many states, where collocation needs many intervals.
-    Extremes are those of samples; normal forms by ``with_normal_form``, none of set-valued orbits.
+    Extremes are those of samples. ``with_normal_form`` computes normal forms, except of set-valued
+    orbits.
 
     Parameters
     ----------
@@ -76,9 +77,9 @@ class Shooting:
         fast modes that the motion hardly excites, 1e-2 saves most of the time and affects only
         their small multipliers; with impacts it makes all multipliers inaccurate.
     solver : Auto, Rodas5P, Radau or SetValued
-        What runs the segments. With SetValued orbits have friction without smoothing, from a motion
-        of the same solver; they go from event to event, whatever ``segments`` says, where their
-        events are known (docs/set-valued.md), else derivatives are differences of its runs.
+        Solver of the segments. SetValued is for friction without smoothing and starts from a motion
+        of the same solver. Its orbits are split at their events in place of ``segments``; if this
+        is not possible (docs/set-valued.md), derivatives are differences of runs.
 
     Raises
     ------

@@ -79,12 +79,11 @@ def branch_tree(
     both: bool = True, options: ContinuationOptions | None = None,
     bounds: tuple[float, float] | None = None,
 ) -> BranchTree:
-    """Follow the branches that begin on some, those that begin on these, and so on.
+    """Follow all branches that bifurcate from given ones, then from these, to a given depth.
 
-    At Hopf points the orbits that are born there, at period doublings those of twice the period, at
-    branch points the other branch, both of its halves. A branch that a special point
-    shares with one that is known already, at its other end or where both cross, is not followed
-    again.
+    Followed are the orbits that emerge at Hopf points, those of twice the period at period
+    doublings, and both halves of the other branch at branch points. A branch that is known already,
+    from its other end or from the other side of a crossing, is not followed again.
 
     Parameters
     ----------
@@ -93,14 +92,13 @@ def branch_tree(
     first : Branch, sequence or mapping of name to Branch
         Branches of equilibria or orbits over one parameter, also read from a file.
     depth : int
-        How often to go over from a branch to those that begin on it.
+        Number of generations of branches.
     switch : sequence of str
-        Kinds of special points at which to go over: 'Hopf', 'period doubling', 'branch point'.
+        Kinds of special points at which to switch: 'Hopf', 'period doubling', 'branch point'.
     method : Collocation, Shooting or HarmonicBalance, optional
         Of the orbits born at Hopf points, by default collocation; others keep theirs.
     both : bool
-        Follow both halves at branch points; one is enough where the system has a symmetry, of which
-        the other half is the mirror image.
+        Follow both halves at branch points; one is enough if the other is its mirror image.
     options : ContinuationOptions, optional
         Steps, tolerances and stopping conditions of each branch.
     bounds : (float, float), optional
@@ -109,8 +107,8 @@ def branch_tree(
     Returns
     -------
     BranchTree
-        With the first branches; 'orbits 2' is born at the second Hopf point, 'orbits 2, doubled'
-        goes on from there.
+        The first branches and those found, by name: 'orbits 2' begins at the second Hopf point,
+        'orbits 2, doubled' at a period doubling of these.
 
     Raises
     ------

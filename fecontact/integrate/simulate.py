@@ -86,13 +86,13 @@ def simulate(
     outputs : int or (N,) array
         Number of equally spaced output times, both ends included, or ascending times [s].
     solver : Auto, Rodas5P, Radau, PowerSeries, SetValued, EventDriven, TimeStepping, Scipy or CVODE
-        The default takes one of the three that follow; set-valued friction and rigid stops; stiff
-        reference solvers.
+        Auto, the default, chooses one of the next three (docs/integrator.md). The next three are
+        for set-valued friction and rigid stops; Scipy and CVODE are references.
     rtol : float
         Relative tolerance; absolute ones follow from it and the scales of laws, or of states.
     max_step : float, optional
-        Longest step [s]; at most a fraction of the shortest period of drive, loads and waves.
-        What acts briefly in a field without a period needs a ``max_step``.
+        Longest step [s]; by default a fraction of the shortest period of drive, loads and waves.
+        Give it for a vector field with a brief excitation.
     events : ContactEvents, Crossing, Event or sequence of them, optional
         Located within the steps and stored in :attr:`Trajectory.events`.
     keep_steps : bool
@@ -103,8 +103,8 @@ def simulate(
     Returns
     -------
     Trajectory or FieldRun
-        Also if the run ended early, by Ctrl-C or because the solver failed; see its ``status``.
-        ModelWarnings name values that are likely an error, ``limits_exceeded``, and friction that
+        Its ``status`` says why it ended, also after Ctrl-C or a failure of the solver. A
+        ModelWarning names values that are likely an error, ``limits_exceeded``, and friction that
         gave energy to the motion, as LuGre friction with large bristle damping can.
 
     Raises

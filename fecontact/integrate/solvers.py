@@ -99,11 +99,11 @@ class CompiledSolver(Solver):
 class Auto(CompiledSolver):
     """The fastest of the compiled solvers for a system and a tolerance; the default.
 
-    It takes :class:`PowerSeries` where they can be used, with up to four modes and nodes, unless a
-    mode is several hundred times faster than the slowest motion; else :class:`Radau` where it can
-    be used, if ``rtol`` is 1e-7 or less; else :class:`Rodas5P`. Runs that carry derivatives along
-    are not by series; vector fields are run by Rodas5P. ``statistics["method"]`` of a run says
-    which one it was.
+    Auto chooses, in this order: :class:`PowerSeries` if the system allows them and has up to four
+    modes and nodes, no derivatives are asked for, and no mode is several hundred times faster than
+    the slowest motion; :class:`Radau` if the system allows it and ``rtol`` is 1e-7 or less;
+    :class:`Rodas5P`. Vector fields are run by Rodas5P. ``statistics["method"]`` of a run names the
+    solver.
     """
 
     method: ClassVar[str] = "auto"
@@ -143,8 +143,8 @@ class Radau(CompiledSolver):
 class PowerSeries(CompiledSolver):
     """Power series in time between switches of contacts, exact to nearly round-off.
 
-    Where laws are polynomials piece by piece, the coefficients of the motion follow from one
-    another. They need a plane system on flat ground without friction, with
+    If laws are polynomials piece by piece, the coefficients of the motion follow from a recursion.
+    Series need a plane system on flat ground without friction, with
     :class:`~fecontact.laws.RoughSurface` or :class:`~fecontact.laws.LinearContact`, or
     :class:`~fecontact.laws.PowerContact` or :class:`~fecontact.laws.TwoSidedStop` with exponents 1
     or 2, constant or harmonic drives and loads, and no events other than ContactEvents.

@@ -50,10 +50,10 @@ class HarmonicBalance:
         default 5e-4 for forced orbits if ``samples`` are not given, up to 4096 samples; if they
         are, ``branch.message`` warns of an error above 5e-3.
     stability : 'transitions', 'Koopman-Hill' or None
-        How Floquet multipliers are found: from the linearised equations along the orbit, or by the
-        projection of Bayer and Leine with 2 H harmonics, which suits smooth systems of few states.
-        None for none: folds alone are found then, but points take a fraction of the time. Branches
-        whose folds show that multipliers are wrong have none either, and say so.
+        Computation of Floquet multipliers: from the linearised equations along the orbit, or by the
+        projection of Bayer and Leine with 2 H harmonics, for smooth systems of few states. None
+        leaves multipliers out: points take a fraction of the time, and of special points only folds
+        are found. If the folds show that multipliers are wrong, ``branch.message`` says so.
     repeats : EngineOrder, optional
         The wave in which the sectors of a wheel move as one of them does, at other times. With
         ``stability = None`` alone.

@@ -244,8 +244,8 @@ def frequency_response(
     start : float, optional
         Where branches start, by default the lower end; inside, they are followed both ways.
     preload : LoadHistory, RestState or (d,) array, optional
-        State [q, q', z] that elements keep which never slide; without it they have no deflection
-        where the body rests under the loads' means without friction.
+        State [q, q', z] of elements that never slide. Default: no deflection where the body rests
+        under the mean loads without friction.
 
     Raises
     ------

@@ -271,8 +271,8 @@ def nonlinear_mode(
     .. math:: M x'' + C x' + K x + f(x, x') - \xi M x' = f_{static},
 
     with :math:`\Omega` and :math:`\xi` unknown; :math:`\xi / (2 \Omega)` is the damping ratio.
-    Without losses xi is zero. The branch starts with the linear mode about the static deflection,
-    friction with memory sticking. Drives and loads in time are left out.
+    Without losses xi is zero. The branch starts from the linear mode about the static deflection,
+    in which friction with memory sticks. Drives and loads in time are left out.
 
     Parameters
     ----------
@@ -289,8 +289,8 @@ def nonlinear_mode(
         ``repeats=EngineOrder(wheel, m)`` a travelling wave as under engine order m, counted among
         the modes of its nodal diameter.
     options : ContinuationOptions, optional
-        By default up to 2000 points, step 0.02, largest_step 0.06, longer with many modes: changes
-        relative to amplitude, a fifth of the frequency, a damping ratio of 0.1.
+        By default up to 2000 points, step 0.02, largest_step 0.06 (longer with many modes), in
+        units of the amplitude, a fifth of the frequency, and a damping ratio of 0.1.
     preload : LoadHistory, RestState or (d,) array, optional
         As for responses.
     unfolding : str, optional

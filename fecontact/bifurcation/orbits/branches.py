@@ -82,14 +82,14 @@ def orbit_branch(
     field : VectorField
         The system; that of the branch if ``start`` is a point of one.
     start : BranchPoint, PeriodicMotion, Trajectory, FieldRun or (times, states)
-        A Hopf point of equilibria, a period doubling or branch point of orbits, a resonance 1:3 or
-        1:4 of a curve; another point of a branch of orbits, to continue it; or a settled motion.
+        A Hopf point of equilibria; a period doubling or branch point of orbits; a resonance 1:3 or
+        1:4 of a curve; any other point of a branch of orbits, to continue it; or a steady periodic
+        motion.
     parameter : str, optional
         The parameter to vary; by default that of the point, or the only one of the field.
     method : Collocation, Shooting or HarmonicBalance, optional
-        By default that of the point's branch, with twice the intervals, segments or harmonics
-        beyond a period doubling; else collocation. From any point by any method: harmonic balance
-        finds special points of others again with its own harmonics.
+        Default: the method of the point's branch, with twice the intervals, segments or harmonics
+        after a period doubling; else collocation. Every method starts from points of the others.
     options, bounds : ContinuationOptions and (float, float), optional
         Step lengths, tolerances, stopping conditions; range of the parameter in place of theirs.
     scales : (d,) sequence, optional
@@ -101,7 +101,7 @@ def orbit_branch(
         Sign of the first change of the parameter from a motion; from a point, 1 goes forward along
         its branch and -1 back, or to either side of a branch point or resonance.
     both : bool
-        Follow the branch in both directions, not from Hopf points and period doublings.
+        Follow the branch in both directions; not for Hopf points and period doublings.
 
     Raises
     ------
