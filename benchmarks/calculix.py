@@ -159,7 +159,7 @@ def main(quick: bool, public: list[Path]) -> None:
             displacement, frequencies = compared(case, Path(folder))
             print(f"{case.name:24} {displacement:12.1e} {frequencies:12.1e}")
         for deck in public:
-            blade = "*PART" not in deck.read_text().upper()
+            blade = "*SYSTEM" not in deck.read_text().upper()
             off = of_blade(deck, Path(folder)) if blade else of_beam(deck)
             beside = "" if blade else "  (published)"
             print(f"{deck.stem:24} {'':12} {np.abs(off).max():12.1e}{beside}")
