@@ -1,7 +1,7 @@
 """One sector of a wheel under engine order beside the whole wheel: time and difference, in one run.
 
-The wheel has the 12 blades and the disc of examples/platform_damper.py. Friction elements join the
-sides of the platforms under a constant normal force. The whole wheel has the modes of all
+The wheel has the 12 blades and the disc of docs/validation/cases/platform_damper.py. Friction
+elements join the sides of the platforms under a constant normal force. The whole wheel has the modes of all
 diameters, 12 times the contacts, and follows the same points by the same harmonic balance.
 
 Usage: python benchmarks/wheel.py [--quick]
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "validation" / "cases"))
 
 import platform_damper as example
 

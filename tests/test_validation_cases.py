@@ -156,6 +156,13 @@ CASES = {
                                 (r"^diameter 4 at .* (\S+) Hz backwards", 785.9, 0.5)],
                      {f"out/{name}.png" for name in ("wheel_diameters", "wheel_modes",
                                                      "blade_tips")}),
+    # A stuck blade with the springs of both contacts, in closed form.
+    "platform_damper": (("out",), [(r"^ 3000.0 N: peak \S+ um at (\S+) Hz", 702.29, 0.03),
+                                   (r"^ 3000.0 N: peak (\S+) um", 102.47, 0.1),
+                                   (r"stuck: \S+ um at (\S+) Hz", 702.29, 0.02)],
+                        {"out/platform_damper.png", "out/platform_damper.mp4"}),
+    # The deck is not part of the package.
+    "brake_reuss_beam": ((), [], set()),
 }
 
 
@@ -166,10 +173,17 @@ def test_every_case_is_here():
 
 @pytest.mark.parametrize("name", CASES)
 def test_case(name, tmp_path, monkeypatch, capsys):
-    if name == "sliding_beam" and (reason := rendering_problem()) is not None:
+    if name in ("sliding_beam", "platform_damper") and (reason := rendering_problem()) is not None:
         pytest.skip(reason)
     arguments, numbers, files = CASES[name]
     printed, left = run_script(f"docs/validation/cases/{name}.py", arguments, tmp_path, monkeypatch,
                                capsys)
     check_numbers(printed, numbers)
     assert left == files
+
+
+def test_a_case_without_its_deck_asks_for_it(tmp_path, monkeypatch, capsys):
+    printed, _ = run_script("docs/validation/cases/brake_reuss_beam.py", (), tmp_path, monkeypatch,
+                            capsys)
+    assert printed.startswith("Give the deck of the Brake-Reuss beam")
+    assert printed.count("\n") == 1

@@ -165,7 +165,7 @@ def responses(folder: Path) -> dict[str, Path]:
 def blades(folder: Path) -> dict[str, Path]:
     """Responses of two blades with a damper between them."""
     case(folder, "blade_pair", ".")
-    example(folder, "platform_damper")
+    case(folder, "platform_damper", ".")
     return {name: folder / f"{name}.png" for name in ("blade_pair", "platform_damper")}
 
 

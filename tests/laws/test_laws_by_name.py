@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from friction_conformance import check_friction_law
 from law_values import REQUIRED
-from own_law import LogarithmicFriction
 
 import fecontact as fc
 from fecontact import Study
@@ -24,6 +23,7 @@ from fecontact.laws import (
     Signal,
     law_names,
 )
+from fecontact.laws.registry import law_class
 from fecontact.laws.synonyms import _WORDS
 
 # Values for parameters that have no defaults.
@@ -336,8 +336,10 @@ def test_documentation_names_every_law():
 
 
 def test_example_law_conforms():
-    check_friction_law(LogarithmicFriction())
-    check_friction_law(LogarithmicFriction(0.2, 0.1, 1e-3, 1e5))
+    path = Path(__file__).parents[2] / "examples" / "own_law.py"
+    law = law_class(FrictionLaw, f"{path}:LogarithmicFriction", "")
+    check_friction_law(law())
+    check_friction_law(law(0.2, 0.1, 1e-3, 1e5))
 
 
 def test_example_in_the_documentation_is_the_example():
