@@ -526,4 +526,4 @@ def test_links_of_the_pages_lead_somewhere():
 def test_what_is_not_run_has_a_reason():
     reasons = [found["reason"] for text in TEXTS.values() for found in BLOCK.finditer(text)
                if found["reason"]]
-    assert reasons == ["needs mpi4py and mpiexec"]
+    assert sorted(reasons) == ["needs files of Nastran", "needs mpi4py and mpiexec"]
