@@ -1,8 +1,9 @@
 """One sector of a wheel under engine order beside the whole wheel: time and difference, in one run.
 
 The wheel has the 12 blades and the disc of docs/validation/cases/platform_damper.py. Friction
-elements join the sides of the platforms under a constant normal force. The whole wheel has the modes of all
-diameters, 12 times the contacts, and follows the same points by the same harmonic balance.
+elements join the sides of the platforms under a constant normal force. The whole wheel has the
+modes of all diameters, 12 times the contacts, and follows the same points by the same harmonic
+balance.
 
 Usage: python benchmarks/wheel.py [--quick]
 """

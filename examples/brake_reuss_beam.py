@@ -8,6 +8,7 @@ Processing 192, 2023, 110210) and is not part of this package. It is read, reduc
 first bending mode is followed over its amplitude, with friction in the lap.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -30,9 +31,11 @@ body = fc.ElasticBody(fc.read_mesh(deck), degree=1)
 lap = pair_faces({"beam": body}, "beam.BOTBEAM_INSURF", "beam.TOPBEAM_INSURF", nodes=(12, 3))
 threads = [(f"BPT-{k}_Set-1", f"NPT-{k}_Set-1") for k in (1, 2, 3)]
 points = [name for pair in threads for name in pair]
-bases = reduce_bodies({"beam": body}, [lap], modes=14, tolerance=0.02, damping=8.7e-4, each={
+bases = reduce_bodies({"beam": body}, [lap], modes=14, tolerance=0.02, each={
     "beam": {"points": {name: name for name in points} | {"out": "OutNodes"}, "loads": points}})
 basis = assembled_basis(bases, {"lap": lap})
+# Damping of the material: a ratio of 8.7e-4 at 168.5 Hz.
+basis = replace(basis, damping=4.0 * np.pi * 168.5 * 8.7e-4 * np.eye(basis.modes))
 free = basis.frequencies_hz[basis.frequencies_hz > 10.0]
 print("free, without contact:", ", ".join(f"{hertz:.2f}" for hertz in free[:3]), "Hz")
 
