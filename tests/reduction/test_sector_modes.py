@@ -167,6 +167,16 @@ def test_axis_may_point_anywhere():
     assert found.diameters == (1, 3)
 
 
+def test_an_axis_between_nodes_is_told():
+    """Half a plate with an odd number of edges on its cut, of which one crosses the axis."""
+    half = Mesh.grid(np.linspace(-1.0, 1.0, 8), np.linspace(0.0, 1.0, 4))
+    cut = half.boundary("bottom")
+    x = half.nodes[cut, 0].mean(axis=1)
+    mesh = Mesh(half.nodes, half.cells, {"high": cut[x < 0.1], "low": cut[x > 0.1]})
+    with pytest.raises(MeshError, match="nodes off the axis"):
+        sector_modes(ElasticBody(mesh, STEEL), CyclicSymmetry("low", "high", 2), 3)
+
+
 def test_bad_sectors_are_refused():
     sector = ElasticBody(ring_sector(8), STEEL)
     for symmetry, words in (

@@ -22,7 +22,16 @@ from fecontact import (
     simulate,
 )
 from fecontact.analysis import campbell, complex_modes
-from fecontact.bifurcation import ContinuationOptions, HarmonicBalance, frequency_response
+from fecontact.bifurcation import (
+    Collocation,
+    ContinuationOptions,
+    HarmonicBalance,
+    contact_field,
+    frequency_response,
+    observe,
+    orbit_branch,
+    periodic_motion,
+)
 from fecontact.fem import CyclicSymmetry, Ring, Rotation
 from fecontact.io import read_basis, write_basis
 from fecontact.laws import Frictionless, Harmonic, LinearContact
@@ -117,6 +126,26 @@ def test_forced_vibration_of_a_disc_that_turns(disc, frame):
     run = simulate(system, 40.0 / hertz, outputs=2001)
     last = np.asarray(run.displacement("side"))[-51:, 2]
     assert 0.5 * np.ptp(last) == pytest.approx(exact, rel=2e-3)
+
+
+def test_orbits_of_a_disc_that_turns(disc):
+    """Collocation over the frequency of a force, beside the linear response."""
+    basis = modal_basis(disc, 3, contact=(), damping=0.05, rotation=standing(W),
+                        points={"rim": (0.2, 0.0, 0.01), "side": (0.1, 0.17, 0.01)})
+    hertz, name = 330.0, "load.forces.0.signal.frequency_hz"
+    system = ContactSystem(basis, load=Load(forces=(
+        PointLoad("rim", "z", signal=Harmonic(3.0, hertz)),)))
+    field = contact_field(system, [name])
+    orbits = observe(field, orbit_branch(
+        field, periodic_motion(system, transient=40.0 / hertz), name, bounds=(hertz, 1.02 * hertz),
+        method=Collocation(intervals=8), options=ContinuationOptions(points=3)), "side", "z")
+    row, seen = basis.point_row("rim", "z"), basis.point_row("side", "z")
+    for point in orbits.points:
+        w = 2.0 * np.pi * point.parameter
+        dynamic = basis.stiffness_matrix - w**2 * np.eye(3) + 1j * w * basis.damping
+        exact = 3.0 * abs(seen @ np.linalg.solve(dynamic, row))
+        assert point.values["observed_amplitude"] == pytest.approx(exact, rel=1e-3)
+        assert point.values["stable"]
 
 
 def test_a_disc_that_turns_under_a_pad_that_stands(disc, tmp_path):
