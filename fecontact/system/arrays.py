@@ -88,7 +88,7 @@ def system_arrays(
 
 
 def drive_arrays(basis: ModalBasis, drive: Drive) -> dict[str, Any]:
-    """Those of the arrays that depend on the drive, by name."""
+    """Entries of :class:`SystemArrays` that depend on the drive, by name."""
     d = basis.dimension
     B = basis.T[0, :d]
     stiffness, damping = np.array(basis.stiffness_matrix), basis.damping.copy()
@@ -104,14 +104,14 @@ def drive_arrays(basis: ModalBasis, drive: Drive) -> dict[str, Any]:
 
 
 def _motion_arrays(basis: ModalBasis, drive: Drive) -> dict[str, Any]:
-    """Those that depend on the motions of the drive."""
+    """Entries of :class:`SystemArrays` that depend on the motions of the drive, by name."""
     motions = drive.motions[: basis.dimension]
     return {"drive_parameters": _rows([motion.parameters() for motion in motions]),
             "drive": _addresses(motion.kernel for motion in motions)}
 
 
 def load_arrays(basis: ModalBasis, load: Load) -> dict[str, Any]:
-    """Those of the arrays that depend on the loads, by name."""
+    """Entries of :class:`SystemArrays` that depend on the loads, by name."""
     constant_load, load_shapes = load_rows(basis, load)
     signals = load.signals.values()
     return {"constant_load": basis.centrifugal_load + constant_load, "load_shapes": load_shapes,

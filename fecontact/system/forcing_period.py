@@ -47,7 +47,7 @@ def drive_sets_period(system: ContactSystem) -> bool:
 
 
 def _periods(system: ContactSystem) -> list[tuple[str, float]]:
-    """What repeats in time, with its period [s]."""
+    """Names of the excitations that repeat in time, each with its period [s]."""
     drive, ground = system.drive, system.ground
     given: list[tuple[str, Any]] = [
         (f"drive.motion_{axis}", motion)

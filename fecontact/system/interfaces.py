@@ -41,7 +41,7 @@ _PARTS = ("normal", "friction", "sliding")
 
 @dataclass(frozen=True, eq=False)
 class Interface:
-    """Where two bodies, or a body and the ground, may touch each other.
+    """Contact interface of two bodies, or of a body and the ground.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Interface:
     friction : friction law, optional
         Required if its contact nodes can move along each other.
     sliding : SlidingTranslation or SlidingRotation, optional
-        Prescribed motion of the other side; on the ground instead of the ground's.
+        Prescribed motion of the other side; on the ground it replaces the ground's motion.
     gap : float, (n,) sequence, Crown or function of x
         Added to the gaps of the pairing, zero or above [m].
 
@@ -175,7 +175,7 @@ def slides(basis: ModalBasis) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, eq=False)
 class MotionSource:
-    """What moves the other side of some contact nodes, ``V_tj = along_j V(t)``.
+    """Prescribed motion of the other side of some contact nodes, ``V_tj = along_j V(t)``.
 
     ``along`` is (k,), in space (k, 2), for k nodes.
     """
@@ -188,7 +188,7 @@ class MotionSource:
 
     @property
     def moves(self) -> bool:
-        """Whether its speed can differ from zero."""
+        """True if the speed can differ from zero."""
         return self.motion is not None or self.speed != 0.0
 
 
@@ -280,7 +280,7 @@ def checked_sliding(
     ------
     InputError
         For unknown interfaces, values of another type, and waves of the ground below contact nodes
-        whose normal leans.
+        whose normal is not the vertical axis.
     """
     require_kind("ContactSystem", Mapping, sliding=sliding)
     names = [group for group, _ in basis.groups if group not in basis.springs]

@@ -228,10 +228,11 @@ def batch_derivatives(
     t: Vector, x: Matrix, s: SystemArrays, r: SystemArrays, h: float, f: Matrix, J: Block,
     P: Matrix,
 ) -> None:
-    """As :func:`batch_rates`, and fill J (N, d, d), d = 2 m + n s, with dy'/dy and P with dy'/dp.
+    """Fill f as :func:`batch_rates`, J (N, d, d) with dy'/dy, and P (N, d) with dy'/dp.
 
-    r holds the derivatives of all arrays to the parameter p, h is the step of differences in it,
-    for laws; P is (N, d), or (0, 0) where no derivative to a parameter is wanted.
+    The state has d = 2 m + n s entries. r holds the derivatives of all arrays to the parameter p,
+    h is the step of differences in it, for laws; P is (0, 0) where no derivative to a parameter is
+    wanted.
     """
     _, d, m = s.rows.shape
     states = s.memory.max()

@@ -432,7 +432,7 @@ def _unit_rows(rows: Array) -> Array:
 
 
 def named_motion(basis: ModalBasis, direction: Array) -> tuple[str, str]:
-    """What moves along modal coordinates (m,), and how: 'the body', 'a rotation'."""
+    """Moving body and kind of motion along modal coordinates (m,): 'the body', 'a rotation'."""
     d = basis.dimension
     if not basis.parts:
         largest = np.abs(basis.contact_T @ direction).max(axis=0)

@@ -156,7 +156,7 @@ def ground_motion(t, s):
 
 @helper
 def moved_along(j, first, second, s):
-    """What two motions of the ground are along the first tangent of node j."""
+    """Component of two motions of the ground along the first tangent of node j."""
     total = s.sliding[j] * first
     if in_space(s):
         total += s.sliding_across[1, j] * second
@@ -165,7 +165,7 @@ def moved_along(j, first, second, s):
 
 @helper
 def moved_across(j, first, second, s):
-    """What two motions of the ground are along the second tangent of node j."""
+    """Component of two motions of the ground along the second tangent of node j."""
     return s.sliding_across[0, j] * first + s.sliding_across[2, j] * second
 
 
@@ -210,7 +210,7 @@ def change_by(row, j, x, s):
 
 @helper
 def node_contact(j, motion, moved, s):
-    """Where node j of a plane body is above the other side, which has ``moved`` as prescribed."""
+    """Contact kinematics of node j of a plane body; ``moved`` is the motion of the ground."""
     place = s.abscissa[j] + motion.along - s.sliding[j] * moved.travel
     ground, slope, curvature = 0.0, 0.0, 0.0
     if s.on_ground[j]:

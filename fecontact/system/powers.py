@@ -156,5 +156,5 @@ def set_powers(t, y, s, stick_speed, out, nodes):
 def powers(
     t: float, y: Vector, s: SystemArrays, stick_speed: Vector, out: Vector, nodes: Vector,
 ) -> None:
-    """As :func:`set_powers`."""
+    """Compiled entry point of :func:`set_powers`."""
     set_powers(t, y, s, stick_speed, out, nodes)

@@ -59,7 +59,7 @@ def surface_under(place, across, a, b, profile, surface, p):
 
 @helper
 def contact_in_space(motion, moved, laws, side, profile_parameters):
-    """Where a node is above the other side, which has ``moved`` as prescribed."""
+    """Contact kinematics of a node in space; ``moved`` is the motion of the other side."""
     place = side[ABSCISSA] + motion.along - (side[ALONG] * moved.travel
                                              + side[ALONG_SECOND] * moved.second_travel)
     across = side[ORDINATE] + motion.across - (side[ACROSS] * moved.travel
@@ -99,11 +99,12 @@ def _normal_part(contact, F_u, F_v, out):
 
 def _space_node(motion, moved, laws, z, side, normal_parameters, friction_parameters,
                 profile_parameters, scale_parameters, force, rates):
-    """Fill ``force`` and ``rates`` of friction in two directions, and behind it what is told.
+    """Fill ``force`` and ``rates`` of friction in two directions, and append the contact's results.
 
-    That is the :class:`~fecontact.system.nodes.NodeContact`, F, and derivatives (4, 6) as
-    :func:`fecontact.system.kernels.node_gradients` gives them; these are left out where ``force``
-    has no room for them.
+    The friction results in ``force`` are followed by the
+    :class:`~fecontact.system.nodes.NodeContact`, F, and derivatives (4, 6) as in
+    :func:`fecontact.system.kernels.node_gradients`. The derivatives are left out where ``force``
+    is too short for them.
     """
     states = len(rates)
     second, told = 4 + states, 2 * (4 + states)

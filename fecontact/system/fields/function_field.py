@@ -114,7 +114,7 @@ class FunctionField(VectorField):
     def checked(
         self, t: Array, x: Array, values: Array, active: Integers
     ) -> tuple[Array, Array, Array, Integers]:
-        """As :meth:`derivatives`, with counts (d + a,) of failures of the complex step."""
+        """Derivatives as in :meth:`derivatives`, and counts (d + a,) of failed complex steps."""
         n, d = x.shape
         # Products of states beside zero would underflow in the complex step.
         x = np.where(np.abs(x) < _NOTHING * self._scales, 0.0, x)
@@ -164,7 +164,7 @@ class FunctionField(VectorField):
         return f, J, P
 
     def as_new(self) -> Self:
-        """The same field, of which no complex step was wrong yet."""
+        """Copy of the field without a record of failed complex steps."""
         made = copy(self)
         made._was_wrong = False
         return made

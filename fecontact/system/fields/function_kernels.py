@@ -44,7 +44,7 @@ _EPS = 2.220446049250313e-16
 
 
 class Places(NamedTuple):
-    """Where derivatives are wanted, and to what.
+    """Points at which derivatives are computed, and which derivatives.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Places(NamedTuple):
     active : (a,) integer array
         Parameters to which derivatives are wanted.
     states : bool
-        Whether those to the states are wanted.
+        Whether derivatives to the states are wanted.
     """
 
     t: Vector
@@ -401,7 +401,10 @@ def central_differences(
 def unchecked_complex_steps(
     complex_address: int, places: Places, complex_room: ComplexMatrix, J: Block, P: Block,
 ) -> None:
-    """As :func:`complex_steps`, without the comparison, which takes nearly all of the time."""
+    """Fill J and P as :func:`complex_steps`, without the comparison with differences.
+
+    The comparison takes nearly all of the time of :func:`complex_steps`.
+    """
     complex_function = complex_rates_at(complex_address)
     t, x, p, active = places.t, places.x, places.p, places.active
     d, k = x.shape[1], len(p)

@@ -1,4 +1,4 @@
-"""What can be run in time: contact systems, and vector fields."""
+"""Systems that can be integrated in time: contact systems and vector fields."""
 
 from typing import Any
 
@@ -8,13 +8,13 @@ from fecontact.core.errors import InputError
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
 
-# What moves, for annotations and for checks.
+# Systems that can be integrated in time, for annotations and for checks.
 Moving = TypeAliasType("Moving", ContactSystem | VectorField)
 MOVING = (ContactSystem, VectorField)
 
 
 def in_time(owner: str, given: Any) -> Moving:
-    """What runs in time: a contact system, also that of a contact field, or a vector field.
+    """System to integrate in time: a contact system, also that of a contact field, or a field.
 
     Raises
     ------

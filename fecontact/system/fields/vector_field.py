@@ -50,15 +50,15 @@ class VectorField(ABC):
         self, t: Array, x: Array, values: Array, active: Iterable[int], sizes: Array,
         step: float | None,
     ) -> tuple[Array, Array, Array] | None:
-        """As :meth:`derivatives` without checks, where that takes much less time, or None.
+        """Derivatives as in :meth:`derivatives` without checks; None if that saves little time.
 
-        Plain differences over a step in ``sizes`` (d,) of the states may serve too, but where the
-        step is None.
+        Plain differences over a step in ``sizes`` (d,) of the states may be used too, unless
+        ``step`` is None.
         """
         return None
 
     def as_new(self) -> Self:
-        """The same field without what earlier calls have shown of it."""
+        """Field without results of earlier calls; the field itself if it keeps none."""
         return self
 
     def parameter_label(self, name: str) -> str:
@@ -74,7 +74,7 @@ class VectorField(ABC):
         return np.ones(self.dimension)
 
     def in_time(self) -> "VectorField | ContactSystem":
-        """What runs in time: this field, or the contact system that it is made of."""
+        """System to integrate in time: this field, or the contact system that it is made of."""
         return self
 
     def kernel(self) -> Any:
@@ -88,7 +88,7 @@ class VectorField(ABC):
     def with_(
         self, changes: Mapping[str, float] | None = None, /, **by_name: float
     ) -> Self:
-        """The same field with other base values of some parameters.
+        """Copy of the field with other base values of some parameters.
 
         Raises
         ------

@@ -131,7 +131,7 @@ def travel_forces(system: ContactSystem, forces: Array) -> Array:
 
 
 def _sides(system: ContactSystem) -> tuple[list[MotionSource], list[MotionSource]]:
-    """What moves the ground, and interfaces that slide."""
+    """Motion sources of the ground, and of the interfaces that slide."""
     sources = motion_sources(system.basis, system.ground, system.sliding)
     count = len(sources) - len(system.sliding)
     return sources[:count], sources[count:]

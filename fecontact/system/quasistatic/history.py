@@ -213,7 +213,7 @@ class LoadHistory(Summarised):
 
     @property
     def loss(self) -> Array:
-        """What friction has lost so far (N,) [J]."""
+        """Energy dissipated by friction so far (N,) [J]."""
         return self.node_loss.sum(axis=1)
 
     @property

@@ -185,7 +185,7 @@ def _push(away, F, along, T, rounding, room):
 
 @helper
 def _stretched(j, tangent, sliders, pose):
-    """What the springs of node j would do along a tangent by the places of their sliders alone."""
+    """Sum of stiffness times |displacement| of the sliders of node j along a tangent [N]."""
     elements = sliders.stiffness.shape[1]
     tangents = pose.left.shape[1] // elements
     total = 0.0

@@ -118,9 +118,9 @@ def _begin(j, e, old, new, sliders):
 
 @helper
 def _slid(j, e, old, new, sliders):
-    """What slider e of node j loses between two poses, in proportional motion; and its work.
+    """Friction loss and work of slider e of node j between two poses, in proportional motion.
 
-    The work is that of the mean force on the way of the slider.
+    The work is the mean force times the displacement of the slider.
     """
     tangents = old.force.shape[1] // sliders.stiffness.shape[1]
     way, work = 0.0, 0.0

@@ -73,7 +73,7 @@ def prestressed_modes(
         planar=np.full_like(arrays.planar, planar_follower.address))
     full = np.empty((2 * m, 2 * m))
     jacobian(0.0, np.concatenate([rest.modal_coordinates, np.zeros(m)]), arrays, full)
-    # What holds each slider (n, e, k, k): across the direction of sliding, or all around.
+    # Directions (n, e, k, k) in which each slider holds: across its sliding, or all.
     holding = closed[..., None, None] * (np.eye(tangents.shape[1])
                                          - along[..., :, None] * along[..., None, :])
     stiffness = np.where(sliders.rigid == 0.0, sliders.stiffness, 0.0)
