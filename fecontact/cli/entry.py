@@ -124,7 +124,7 @@ def _execute(tokens: list[str]) -> int:
 
 
 def _wrong_line(error: CycloptsError) -> str:
-    """What is wrong with a command line, and where its arguments are explained."""
+    """Message for a wrong command line, with the command whose help explains its arguments."""
     command = " ".join(("fecontact", *(error.command_chain or ())))
     message = str(error)
     if isinstance(error, UnusedCliTokensError):

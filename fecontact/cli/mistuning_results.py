@@ -37,7 +37,7 @@ class _Excited:
 
     @classmethod
     def of(cls, study: "Study") -> "_Excited":
-        """Those of ``[response]`` and the first force; InputError for what is missing."""
+        """Settings of ``[response]`` and the first force; InputError if one is missing."""
         wave = study.wave()
         if wave is None:
             raise InputError(f"{study.title}: [mistuning] is for one sector of a wheel; describe "

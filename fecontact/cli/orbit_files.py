@@ -27,7 +27,7 @@ _OUTPUTS = 1001  # of an orbit
 
 @dataclass(frozen=True)
 class OrbitChoice:
-    """Which orbit of a file is meant.
+    """Choice of one orbit of a file.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class OrbitChoice:
     at : float or None
         Value of the parameter, of a frequency in Hz.
     which : int
-        Which of several there, counted along the branch.
+        Index among several orbits at this value, counted along the branch.
     """
 
     branch: str | None = None
@@ -105,7 +105,7 @@ def _motion(
     amplitudes = np.asarray(branch.column("observed_amplitude"))
     wanted = amplitudes.max() if choice.at is None else choice.at
     point = branch.points[int(np.argmin(np.abs(amplitudes - wanted)))]
-    # What makes the motion periodic is a damping of the sign reversed.
+    # Mass damping of negative sign makes the motion periodic.
     system = with_mass_damping(unforced(model.system), point.parameter)
     return point, sampled_run(system, point.orbit(samples=_OUTPUTS))
 
@@ -142,7 +142,7 @@ def _numbered(named: "dict[str, Branch]") -> list[str]:
 
 
 def _called(name: str, branch: "Branch") -> str:
-    """What a branch is called before the place of a point on it."""
+    """Name of a branch and its level, put before the place of a point on the branch."""
     if "level" not in branch.attributes:
         return f"{name}, "
     level_name = str(branch.attributes["level_name"])

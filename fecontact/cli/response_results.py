@@ -26,7 +26,7 @@ _COLUMNS = ("level", "kind", "parameter", "frequency_hz", "stable", "amplitude",
 
 
 def response_file(study: "Study", folder: Path) -> Path:
-    """Where the response of a study is stored."""
+    """Path of the file that stores the response of a study."""
     return folder / f"{study.name}-response.h5"
 
 

@@ -71,7 +71,7 @@ def show_in_paraview(file: Path, program: Path | None) -> None:
     if not has_frames(file):
         raise InputError(f"{file} holds no fields over the body for ParaView; run the study with "
                          f"'frames' in [output] above zero.")
-    # As an absolute path no name can be taken for an option.
+    # An absolute path cannot be mistaken for an option.
     _started.append(subprocess.Popen(
         [str(program), str(file.resolve())], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL, start_new_session=True))

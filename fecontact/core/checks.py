@@ -207,7 +207,7 @@ def as_direction(values: Any, what: str) -> Coordinates:
     length = float(np.hypot(*direction) if len(direction) == 2 else np.linalg.norm(direction))
     if not 0.0 < length < np.inf:
         raise InputError(f"{what} = {shown(values)} must be longer than zero.")
-    # What has length one stays the same when it is written to a file and read back.
+    # A vector of length one within rounding stays unchanged when it is written and read back.
     unit = direction if abs(length - 1.0) <= 1e-12 else direction / length
     return cast(Coordinates, tuple(unit.tolist()))
 

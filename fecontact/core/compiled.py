@@ -228,12 +228,12 @@ def kernel(
 ) -> Any:
     """Compile a function for the types of its annotations, at its first call; kept on disk.
 
-    Records and arrays belong to the caller, so that the function has references to them. Sums may
-    be reordered (so that they vectorise), but NaN and infinity keep their meaning. The stored code
+    Records and arrays belong to the caller; the function only has references to them. Sums may be
+    reordered, which lets them vectorise, but NaN and infinity keep their meaning. The stored code
     is renewed when the function changes, or anything that it is compiled from, see
-    :func:`source_digest`. With ``constants`` of :func:`fecontact.core.constants.constants` it
-    serves for records with these values only. ``signature`` says what annotations cannot. One
-    that is called ``by_address`` gets references from compiled functions, and has no entry for
+    :func:`source_digest`. With ``constants`` of :func:`fecontact.core.constants.constants` the code
+    is valid only for records with these values. ``signature`` gives types that annotations cannot
+    express. A kernel ``by_address`` gets references from compiled functions, and has no entry for
     Python.
     """
     if function is None:
@@ -258,15 +258,15 @@ def helper(function: Callable[..., Any]) -> Any:
 
 
 def routine(function: Callable[..., Any]) -> Any:
-    """As :func:`helper`, for long functions: they are not copied, and optimised by themselves."""
-    # Said, lest it be as in the function for which it is compiled first.
+    """Compile a long function that kernels share: called instead of copied, optimised alone."""
+    # Explicit, because the caller that is compiled first would otherwise set these options.
     return part(function, error_model="numpy", fastmath=_FASTMATH, forceinline=False)
 
 
 def borrowing(function: Callable[..., Any]) -> Any:
-    """As :func:`routine`; as a kernel, it counts no references to arrays that it is given.
+    """Compile like :func:`routine`, without counting references to the arrays that are passed in.
 
-    It must not return any of them.
+    The function must not return any of these arrays.
     """
     return part(function, borrows=True, error_model="numpy", fastmath=_FASTMATH, forceinline=False)
 
@@ -344,7 +344,7 @@ def _arguments(function: Callable[..., Any]) -> str:
 
 
 def _raising(function: Callable[..., Any], seen: set[Any] | None = None) -> str | None:
-    """Where a function raises: "" for itself, " in NAME" for one that it calls, None for nowhere.
+    """Name the function that raises: "" for itself, " in NAME" for one it calls, None for none.
 
     Behind an address exceptions are printed and lost, and the function returns zeros. ``seen``
     are functions that need no second look; an attribute may have the name of one of them.

@@ -94,7 +94,7 @@ def solve(a, pivots, x):
 
 @helper
 def solve_rows(a, pivots, b):
-    """As :func:`solve` for a matrix b (k, columns) of right sides, row by row."""
+    """Solve like :func:`solve` for a matrix b (k, columns) of right sides, row by row."""
     count, columns = b.shape
     for k in range(count):
         row = pivots[k]
@@ -126,7 +126,7 @@ def reduce_row(a, count, row, weights):
 
 @helper
 def factorise_within(a, reach, starts, pivots):
-    """As :func:`factorise` for a (k, k) whose columns and rows end early.
+    """Factorise a matrix a (k, k) whose columns and rows end early, like :func:`factorise`.
 
     ``reach`` (2, k) holds the ends of the columns, which must not descend, and of the rows with
     fill-in: a row ends where the rows that may be its pivot row end. ``starts`` (k,) is filled with

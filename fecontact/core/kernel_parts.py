@@ -35,7 +35,7 @@ for _kind, _dimensions in product(
 
 
 class _NoMachineCode:
-    """A code generator whose libraries are not loaded, so that they have no environment."""
+    """A code generator whose libraries are not loaded and therefore have no environment."""
 
     def __init__(self, codegen: Any) -> None:
         self._codegen = codegen

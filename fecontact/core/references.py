@@ -119,7 +119,7 @@ def _array(context: Any, builder: Any, field: Any, name: str, value: Any, index:
 
 def _asked(builder: Any, name: str, value: Any, *place: int) -> Any:
     """A number or an address of a tuple, by a function that ``constants`` may replace."""
-    # What is read does not change: loops need not read it again after each number they store.
+    # The fields do not change: loops need not read them again after each number they store.
     kind = builder.gep(value, [_I32(0), *map(_I32, place)]).type.pointee
     function = builder.module.globals.get(name)
     if function is None:
@@ -170,10 +170,10 @@ def _reference(context: Any, builder: Any, given: Any, wanted: Any, value: Any) 
 
 @intrinsic
 def borrowed(typingctx: Any, array: Any) -> Any:
-    """The same array, without reference counts, or a reference to a named tuple of arrays.
+    """Return the array without reference counts, or a reference to a named tuple of arrays.
 
-    Only for what the caller of the kernel holds: an array made inside it is freed after its last
-    use under its own name.
+    Use it only for what the caller of the kernel holds: an array made inside the kernel is freed
+    after its last use under its own name.
     """
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:

@@ -12,5 +12,5 @@ ComplexArray = TypeAliasType("ComplexArray", NDArray[np.complex128])
 # A place in the plane, or in space [m].
 Coordinates = tuple[float, float] | tuple[float, float, float]
 
-# What NumPy makes an array of.
+# Objects that NumPy converts to an array.
 ArrayLike = TypeAliasType("ArrayLike", npt.ArrayLike)

@@ -231,7 +231,7 @@ def _reference_places(element_nodes: int, dimension: int) -> Array:
 
 
 def _affine_cells(nodes: Array, corners: Integers, dimension: int) -> Any:
-    """Which cells (c,) are affine images of the reference cell."""
+    """Boolean mask (c,) of the cells that are affine images of the reference cell."""
     if corners.shape[1] == dimension + 1:
         return np.ones(len(corners), dtype=bool)
     places = _reference_places(corners.shape[1], dimension)

@@ -241,7 +241,7 @@ def _outline_tangents(mesh: Mesh) -> tuple[Array, Array]:
     along = chord / length[:, None]
     after = _followers(outline, len(mesh.nodes))
     before = _inverted(after)
-    # What follows stands for the node at the end of each edge.
+    # Values at an edge belong to the node at its end from here on.
     turn = np.arctan2(_cross(along, along[after]), np.einsum("kx,kx->k", along, along[after]))
     turn[np.abs(turn) < _FLAT] = 0.0
     bent = turn / np.minimum(length, length[after])

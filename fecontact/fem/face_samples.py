@@ -40,11 +40,11 @@ class Samples:
         return out
 
     def only(self, which: NDArray[np.bool_]) -> "Samples":
-        """Those that are marked."""
+        """Samples selected by a mask (k,)."""
         return Samples(*(getattr(self, name)[which] for name in Samples.__dataclass_fields__))
 
     def closest(self, other: Face, reach: float) -> Closest:
-        """Their partners on another face."""
+        """Closest places of the samples on another face."""
         return other.closest(self.places, self.looks, reach, _FACING, _SLACK)
 
 
@@ -72,7 +72,7 @@ class Marks:
 
 
 def opposite_ends(face: Face, other: Face, reach: float) -> Marks:
-    """Where the shape functions of the other face have their kinks."""
+    """Places on a face opposite to the kinks of the other face's shape functions."""
     ends = node_samples(other, np.unique(other.nodes[:, [0, -1]]))
     found = ends.closest(face, reach)
     return Marks(found.edges[found.valid], found.s[found.valid])

@@ -78,7 +78,7 @@ def element_kind(dimension: int, count: int) -> CellKind:
 
 
 def _curved(nodes: Array, elements: Integers, kind: CellKind) -> Array:
-    """Which elements (E,) are curved."""
+    """Boolean mask (E,) of the curved elements."""
     if elements.shape[1] == kind.corners:
         return np.zeros(len(elements), bool)
     rank = {corner: k for k, corner in enumerate(kind.order)}

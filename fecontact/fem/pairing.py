@@ -88,7 +88,7 @@ class Pairing(Summarised):
     swapped: bool = False
 
     def summary(self) -> list[tuple[str, str]]:
-        """That of the report."""
+        """Names and values of the report."""
         return self.report.summary()
 
     @property
@@ -117,7 +117,7 @@ class TwoPassPairing(Summarised):
     second: Pairing
 
     def summary(self) -> list[tuple[str, str]]:
-        """Those of the reports of both passes."""
+        """Names and values of the reports of both passes."""
         return [(f"{name}, pass {number}", text) for number, one in enumerate(self.passes, start=1)
                 for name, text in one.report.summary()]
 

@@ -1,4 +1,4 @@
-"""What came of the pairing of two faces, and messages where nothing did."""
+"""Report on the pairing of two faces, and messages for faces that cannot be paired."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ _TINY = 1e-12  # [m], less than an atom: shown as zero
 @read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class PairingReport(Summarised):
-    """What came of the pairing of two faces.
+    """Result of the pairing of two faces: contact nodes, coverage and gaps.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def _beyond(value: float, least: float) -> float:
 
 
 def no_partner(samples: Samples, found: Closest, face: Face, other: Face, limit: float) -> str:
-    """What is wrong if no node within ``limit`` has a partner, as a message."""
+    """Message that says why no node within ``limit`` has a partner."""
     names = f"pair_faces: no node of '{face.label}' has a partner on '{other.label}'"
     wide = samples.closest(other, np.inf)
     if wide.valid.any() and not found.valid.any():

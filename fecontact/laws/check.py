@@ -189,7 +189,7 @@ def _check_normal(law: NormalLaw, p: Array) -> None:
     damping = (force - still[:, 0]) * v
     _require(law, "(u, v)", points, damping >= -1e-12 * np.abs(force * v), damping,
              "must not give energy off by damping: (F(u, v) - F(u, 0)) v < 0")
-    # As dF/du and dF/dv below: what is at rest has no size of its own.
+    # Sizes for difference quotients dF/du and dF/dv; near zero a lower bound replaces |u|, |v|.
     sizes = np.column_stack([np.maximum(np.abs(u), 1e-3 * scale), np.maximum(np.abs(v), 1e-5)])
     _check_derivatives(law, "(u, v)", points, sizes, forces, values[:, None, 1:],
                        ("F",), ("u", "v"))

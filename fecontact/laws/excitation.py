@@ -321,7 +321,7 @@ class Load:
 
     @property
     def signals(self) -> dict[str, Signal]:
-        """What is given in time, by its dotted name: forces, base acceleration, boundary loads."""
+        """Signals by dotted name: forces, base acceleration, boundary loads."""
         given: list[tuple[str, Any]] = [
             (f"forces.{k}", force.signal) for k, force in enumerate(self.forces)]
         given += [(name, getattr(self, name))

@@ -1,4 +1,4 @@
-"""What the laws are called elsewhere, so that those with a Stribeck curve are found."""
+"""Other names of the laws, for searches by word: 'stribeck' finds the laws with that curve."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -52,7 +52,7 @@ _WORDS: Mapping[str, tuple[str, ...]] = {
 
 
 def laws_called(word: str, laws: Iterable[type]) -> list[type]:
-    """Those of some laws that a word stands for, or whose summary has it.
+    """Laws that a word stands for, or whose summary contains the word.
 
     Case, spaces, hyphens and a trailing "law", "friction", "contact", "model" or "curve" do not
     matter: ``Hunt-Crossley model`` is looked up as ``huntcrossley``.

@@ -238,7 +238,10 @@ def rigid_modes(body: ElasticBody) -> Array:
 
 
 def free_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
-    """The same over the free degrees of freedom: frequencies (m,) and shapes (f, m)."""
+    """Lowest modes over the free degrees of freedom: frequencies (m,) and shapes (f, m).
+
+    Frequencies are angular [rad/s], zero for rigid modes; shapes are mass-normalised.
+    """
     unknowns = system.stiffness.shape[0]
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= unknowns:
         raise InputError(f"modes = {count!r} must be a whole number from 1 to the number of "

@@ -1,4 +1,4 @@
-"""What a modal basis holds of its bodies: shapes, quality of the reduction, blocks of modes."""
+"""Mode shapes of a modal basis, quality of its reduction, and blocks of modes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -174,10 +174,10 @@ class Recovery:
 
     @property
     def _displacements(self) -> Any:
-        """Which displacement of a node each degree of freedom is, sparse (d, dimension N).
+        """Nodal displacement that equals each degree of freedom, sparse (d, dimension N).
 
-        Degrees of freedom that are none, such as rotations and coordinates of modes, have rows
-        of zeros.
+        Degrees of freedom that are no displacement, such as rotations and modal coordinates, have
+        rows of zeros.
         """
         import scipy.sparse as sp
 

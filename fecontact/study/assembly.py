@@ -28,7 +28,7 @@ from fecontact.system.gap import Crown, gap_values
 
 
 class Described(Protocol):
-    """What of a study makes a contact system."""
+    """Sections of a study that make a contact system."""
 
     @property
     def normal(self) -> NormalLaw | None:
@@ -44,7 +44,7 @@ class Described(Protocol):
 
     @property
     def links(self) -> Mapping[str, LinkSettings]:
-        """What joins several bodies."""
+        """Links between bodies."""
 
     @property
     def ground(self) -> Ground:

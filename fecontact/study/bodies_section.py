@@ -213,7 +213,7 @@ class InterfaceSettings:
 
 
 class Bodies(Protocol):
-    """What of a study describes several bodies."""
+    """Sections of a study that describe several bodies."""
 
     @property
     def bodies(self) -> Mapping[str, BodySections]:
@@ -221,11 +221,11 @@ class Bodies(Protocol):
 
     @property
     def interfaces(self) -> Mapping[str, InterfaceSettings]:
-        """Where they may touch."""
+        """Interfaces at which bodies may touch."""
 
     @property
     def links(self) -> Mapping[str, LinkSettings]:
-        """What joins them."""
+        """Links between bodies."""
 
     @property
     def symmetry(self) -> CyclicSymmetry | None:

@@ -20,7 +20,7 @@ _IN_SPACE: Mapping[str, tuple[str, ...]] = {
 
 
 class Acting(Protocol):
-    """What of a study acts on its bodies."""
+    """Sections of a study that act on its bodies."""
 
     @property
     def ground(self) -> Ground:
@@ -36,7 +36,7 @@ class Acting(Protocol):
 
     @property
     def interfaces(self) -> Mapping[str, InterfaceSettings]:
-        """Where bodies touch, and how their other sides slide."""
+        """Interfaces of the bodies, with the sliding of their other sides."""
 
 
 def require_dimension(study: Acting, basis: ModalBasis, title: str) -> None:

@@ -62,7 +62,7 @@ _MADE_FROM: Mapping[str, Callable[["StudyModels"], Any]] = {
 
 
 class StudyModels:
-    """What of a study is made from geometry, bodies and bases: all but laws and run."""
+    """Models that a study makes from geometry, bodies and bases: all but laws and run."""
 
     geometry: Geometry | None
     body: BodySettings
@@ -232,7 +232,7 @@ class StudyModels:
                 vars(self)[made] = vars(other)[made]
 
     def refined(self) -> Self:
-        """The same study on meshes whose cells are cut into four."""
+        """Copy of the study on meshes whose cells are cut into four."""
         finer = copy(self)
         for made in _MADE_FROM:
             vars(finer).pop(made, None)

@@ -66,7 +66,7 @@ class MistuningSettings:
 
 
 class Sector(Protocol):
-    """What of a study describes one sector of a wheel."""
+    """Sections of a study that describe one sector of a wheel."""
 
     @property
     def symmetry(self) -> CyclicSymmetry | None:
@@ -82,7 +82,7 @@ class Sector(Protocol):
 
     @property
     def interfaces(self) -> Mapping[str, InterfaceSettings]:
-        """Where they touch."""
+        """Interfaces at which the bodies touch."""
 
     @property
     def response(self) -> ResponseSettings:

@@ -411,7 +411,7 @@ class Study(Summarised, StudyModels):
             return self.preload.load(system)
 
     def initial(self) -> Initial:
-        """What a run begins from: ``[simulation]``'s ``initial``, or the end of ``[preload]``."""
+        """Start of a run: ``[simulation]``'s ``initial``, or the end of ``[preload]``."""
         given = self.simulation.initial
         return self.load_history() if given == "preload" else given
 

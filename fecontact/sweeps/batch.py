@@ -165,7 +165,7 @@ def _run(batch: Batch, base: Study, case: SweepCase) -> tuple[Trajectory, Study]
 
 
 def changed(study: Study, changes: Mapping[str, Any]) -> Study:
-    """As ``study.with_(**changes)``, but ten times faster if only parameters of laws change."""
+    """Study with changes; ten times faster than ``with_`` if only parameters of laws change."""
     values = {}
     for name, value in changes.items():
         present = _present(study, name)

@@ -111,7 +111,7 @@ def _summary(name: str, values: Any) -> dict[str, Any]:
 
 
 def _row(table: SweepTable, case: int) -> list[str]:
-    """What is told of a case, in the order of the headings."""
+    """Texts of the cells of a case, in the order of the headings."""
     def text(value: Any) -> str:
         return f"{value:.7g}" if isinstance(value, float) else str(value)
 

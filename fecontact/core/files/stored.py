@@ -109,7 +109,7 @@ def bounded(group: Any, name: str, shape: Shape, largest: float = 1e60) -> NDArr
 
 
 def indices(group: Any, name: str, shape: Shape, end: int) -> NDArray[np.int64]:
-    """As :func:`array` of integers, each from 0 to below ``end``."""
+    """Array of integers from 0 to below ``end``, read by :func:`array`."""
     found = array(group, name, shape, "i")
     _require_within(found, 0, end)
     return found

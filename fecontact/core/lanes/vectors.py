@@ -99,7 +99,7 @@ def gather(typingctx: Any, values: Any, places: Any, further: Any) -> Any:
 
 @intrinsic
 def spread(typingctx: Any, number: Any) -> Any:
-    """The same number eight times."""
+    """Vector with a number in each of its eight SIMD lanes."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return _spread(builder, args[0])

@@ -11,7 +11,7 @@ from fecontact.fem.elements.cell_kinds import CellKind, numbered_rows, shape_fun
 
 
 class _Cells(Protocol):
-    """What of a mesh is needed to refine it."""
+    """Parts of a mesh that refinement needs."""
 
     @property
     def nodes(self) -> Array: ...

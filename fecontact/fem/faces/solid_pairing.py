@@ -119,7 +119,7 @@ def _at(corners: Array, local: Array) -> tuple[Array, Array, Array]:
 def paired_solids(
     face: SolidFace, other: SolidFace, count: Count, reach: float | None, overlap: float,
 ) -> dict[str, Any]:
-    """What :class:`fecontact.fem.Pairing` holds of two faces of solids.
+    """Arguments of :class:`fecontact.fem.Pairing` for two faces of solids.
 
     Raises
     ------
@@ -184,7 +184,7 @@ def paired_solids(
 def grounded_solid(
     face: SolidFace, count: Count, reach: float | None, overlap: float
 ) -> dict[str, Any]:
-    """The same of a face above the ground, z = 0."""
+    """Arguments of :class:`fecontact.fem.Pairing` for a face above the ground, z = 0."""
     surface = face.surface
     check_facets_down(surface, face.boundary)
     whole = contact_patches(surface, face.boundary, count, _COUNT)

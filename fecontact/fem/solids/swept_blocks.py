@@ -93,10 +93,10 @@ def swept_mesh(
 
 def _bent(nodes: Array, ends: Integers, middles: Array, faces: Integers, areas: Array,
           owner: Array) -> Array:
-    """Which edges (E,) are curved: those of curved faces, and those where two names meet.
+    """Boolean mask (E,) of the curved edges: on curved faces, or where two names meet.
 
-    All others stay straight: elements with straight edges represent products of coordinates, those
-    of bending and torsion, better.
+    All others stay straight, because elements with straight edges represent products of
+    coordinates, as in bending and torsion, better.
     """
     off = middles - nodes[ends].mean(axis=1)
     sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2)

@@ -252,7 +252,7 @@ class DahlFriction(LimitedFriction):
     exponent: OneOrAbove = 1.0
 
     def bristle_stiffness_of(self, share: Array) -> Array:
-        """That of z is sigma F."""
+        """Stiffness sigma F of the internal variable z: a = 0, b = sigma [1/m]."""
         stiffness = np.zeros((2, len(share), 1))
         stiffness[1, :, 0] = self.presliding_stiffness
         return stiffness
@@ -328,7 +328,7 @@ class LuGreFriction(MemoryFriction):
         require_at_least(self, "static_coefficient", "kinetic_coefficient")
 
     def bristle_stiffness_of(self, share: Array) -> Array:
-        """That of z is sigma_0 F."""
+        """Stiffness sigma_0 F of the internal variable z: a = 0, b = sigma_0 [1/m]."""
         stiffness = np.zeros((2, len(share), 1))
         stiffness[1, :, 0] = self.bristle_stiffness
         return stiffness
@@ -391,7 +391,7 @@ class BoucWenFriction(LimitedFriction):
     exponent: OneOrAbove = 1.0
 
     def bristle_stiffness_of(self, share: Array) -> Array:
-        """That of z is mu F u_s."""
+        """Stiffness mu F u_s of the internal variable z [J]: a = 0, b = mu u_s [m]."""
         stiffness = np.zeros((2, len(share), 1))
         stiffness[1, :, 0] = np.multiply(self.friction_coefficient, self.yield_displacement)
         return stiffness

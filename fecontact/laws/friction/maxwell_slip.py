@@ -164,7 +164,7 @@ class _MaxwellSlip(LimitedFriction):
                           coefficient * limits])
 
     def bristle_stiffness_of(self, share: Array) -> Array:
-        """The springs', whose deflections the internal variables are."""
+        """Stiffness a of the springs, whose deflections are the internal variables; b = 0."""
         stiffness = np.zeros((2, len(share), self.memory))
         stiffness[0] = self.table(share)[:, 1 : 1 + self.memory]
         return stiffness

@@ -98,7 +98,7 @@ class FourierSeries(Profile):
 
     @property
     def shortest_wavelength(self) -> float | None:
-        """That of the last wave whose amplitude is not zero [m]; None when flat."""
+        """Wavelength of the last wave whose amplitude is not zero [m]; None when flat."""
         orders = np.nonzero(np.array(self.amplitudes))[0]
         return self.wavelength / float(orders[-1] + 1) if len(orders) else None
 

@@ -155,7 +155,7 @@ class Ground:
 
     @property
     def in_space(self) -> bool:
-        """Whether it moves or varies in ways that only solids above it feel."""
+        """True if the ground moves or varies along the second tangent, which only solids use."""
         return bool(self.speed_y or self.motion_y is not None or self.rotation_speed
                     or self.wave_direction != (1.0, 0.0) or self.height_map is not None)
 

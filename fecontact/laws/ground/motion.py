@@ -191,5 +191,5 @@ class SpeedRamp(GroundMotion):
         return max(abs(float(self.kernel.python(t, p)[1])) for t in (t0, t1))
 
     def largest_acceleration(self, speed: float, t0: float, t1: float) -> float:
-        """That of the ramp [m/s2]."""
+        """Acceleration during the ramp [m/s2]."""
         return abs(self.end_speed - speed) / self.duration

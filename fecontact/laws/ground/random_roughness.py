@@ -93,7 +93,7 @@ class RandomRoughness(Profile):
                              tuple((2.0 * np.pi * phases).tolist()))
 
     def parameters(self) -> Array:
-        """Those of the series."""
+        """Parameters of the Fourier series."""
         return self.series.parameters()
 
     @property

@@ -174,7 +174,7 @@ class Harmonics(Signal):
 
     @property
     def shortest_period(self) -> float | None:
-        """That of the highest frequency [s]."""
+        """Period of the highest frequency [s]."""
         return 1.0 / self._heard[-1] if self._heard else None
 
     @property
@@ -270,7 +270,7 @@ class SweptSine(Signal):
 
     @property
     def shortest_period(self) -> float | None:
-        """That of the highest frequency [s]."""
+        """Period of the highest frequency [s]."""
         highest = max(self.start_frequency_hz, self.end_frequency_hz)
         return 1.0 / highest if highest > 0.0 and self.amplitude != 0.0 else None
 

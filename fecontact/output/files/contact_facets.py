@@ -39,7 +39,7 @@ class ContactFacets:
 
     @cached_property
     def patches(self) -> "ContactFacets":
-        """Those of the patches alone."""
+        """Facets of the patches, without those of the other side."""
         return ContactFacets(self.facets[self.own], self.owner[self.own], self.own[self.own])
 
     def at_nodes(self, count: int) -> Integers:
@@ -52,7 +52,7 @@ class ContactFacets:
         return found
 
     def at_cells(self, cells: Integers, count: int) -> Integers:
-        """Which of the facets (M,) each cell has, -1 for none."""
+        """Index (c,) of the facet of each cell, -1 for none."""
         import scipy.sparse as sp
 
         found = np.full(len(cells), -1)

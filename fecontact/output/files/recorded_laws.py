@@ -165,7 +165,7 @@ def recorded_system(
     normal, friction, penetration, slip = (contact[:, :, k] for k in (
         NORMAL_FORCE, FRICTION_FORCE, PENETRATION, SLIP_VELOCITY))
     if basis.dimension == 3:
-        # As contact states ask for them: sizes of what has two directions.
+        # Contact states need magnitudes: friction and slip have two components in space.
         friction, slip = (np.linalg.norm(contact[:, :, [k, across]], axis=-1) for k, across in (
             (FRICTION_FORCE, FRICTION_ACROSS), (SLIP_VELOCITY, SLIP_ACROSS)))
     return RecordedSystem(

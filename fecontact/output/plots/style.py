@@ -84,7 +84,7 @@ def beyond_words(peak: str) -> str:
 
 
 def stress_limit(sizes: Array) -> float:
-    """Where the colours of a stress end, from its sizes at the nodes: their largest, or their 99th
+    """Upper end of the colours of a stress: the largest of its sizes at the nodes, or their 99th
     percentile where few nodes have much more than all others.
     """
     largest = float(sizes.max(initial=0.0))

@@ -145,7 +145,7 @@ class Motion:
 
     @cached_property
     def sliding(self) -> tuple[str, ...]:
-        """What slides by prescription, and which way, such as ``disc ↺ 3 rad/s``.
+        """Bodies with prescribed sliding, and its direction, such as ``disc ↺ 3 rad/s``.
 
         A body whose sliding varies in time has no number; it stands still in the picture.
         """

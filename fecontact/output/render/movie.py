@@ -130,7 +130,7 @@ def frames_of(
 
 
 def target(path: str | Path, fps: float, size: tuple[int, int]) -> tuple[Path, bool]:
-    """Where to draw to, and whether that is a movie.
+    """Path to draw to, and a flag: True for a movie.
 
     Raises
     ------

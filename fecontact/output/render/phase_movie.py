@@ -35,7 +35,7 @@ def render_phase_space(
 ) -> Path:
     """Draw motions in phase space as a movie or as numbered pictures, whole or not at all.
 
-    A dot moves along each curve and draws a trail behind it, all in the same time.
+    A dot with a trail moves along each curve; all dots share one time.
 
     Parameters
     ----------

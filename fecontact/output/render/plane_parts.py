@@ -46,7 +46,7 @@ def plane_camera(motion: Shown, aspect: float) -> Camera:
         return Camera.facing(middle, 0.5 * (bottom + top - height), height)
     body, below = _reach(motion)
     height = max(width / aspect, _needed(body, below))
-    # What is left over goes to the ground: blank above the body it would look like a gap.
+    # Spare height goes to the ground: left blank above the body it would look like a gap.
     depth = max(_DEPTH * height, _LOW * (height - body), below + 2.0 * MARGIN * height)
     return Camera.facing(middle, motion.ground_level - depth, height)
 
@@ -104,7 +104,7 @@ class PlaneBodies:
         paint(self._body.point_data, colours)
 
     def names(self) -> Sequence[tuple[NDArray[np.float64], Array]]:
-        """Those of several bodies, where they are."""
+        """Names and places of several bodies in the frame drawn last."""
         return [(name, self._body.points[node, :2]) for name, node in self._names]
 
 

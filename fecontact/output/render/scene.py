@@ -33,7 +33,7 @@ class Shown(Protocol):
 
     @property
     def colour(self) -> str:
-        """What the bodies are coloured by, one of :data:`COLOUR_MAPS`."""
+        """Quantity that colours the bodies, one of :data:`COLOUR_MAPS`."""
 
     @property
     def largest_colour(self) -> float:
@@ -115,13 +115,13 @@ class Camera:
 
 
 class Part(Protocol):
-    """What a scene is made of."""
+    """Part of a scene."""
 
     def draw(self, frame: int) -> None:
         """Bring everything to where it is at a frame."""
 
     def names(self) -> Sequence[tuple[NDArray[np.float64], Array]]:
-        """Names, as pictures, and the places of their middles in the frame drawn last."""
+        """Names, as pictures, and the places of their centres in the frame drawn last."""
 
 
 class Scene:

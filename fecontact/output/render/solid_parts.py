@@ -130,7 +130,7 @@ class SolidBodies:
             move(mesh, self._places)
 
     def names(self) -> Sequence[tuple[NDArray[np.float64], Array]]:
-        """Those of several bodies, where they are."""
+        """Names and places of several bodies in the frame drawn last."""
         return [(name, self._places[node]) for name, node in self._names]
 
 

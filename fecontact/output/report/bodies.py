@@ -26,14 +26,14 @@ _SHAPES = 8e-5
 _ALONE = 1e-4  # error of a mode that is shown alone, of its largest value
 # Largest error of von Mises stress per error of its components, (4 + 3 k)^(1/2) with k shears.
 _VON_MISES = {4: 7.0**0.5, 6: 13.0**0.5}
-# What contact faces of solids are painted with.
+# Quantities that colour contact faces of solids.
 PRESSURE, STATE = "contact pressure", "contact state"
 _BLOCK = 2**18  # numbers of a field over nodes and times that stay in cache
 
 
 @dataclass(frozen=True, eq=False)
 class _Reached:
-    """What a field reaches over time: its largest size (P,), lowest and highest values (P, c)."""
+    """Range of a field over time: largest size (P,), lowest and highest values (P, c)."""
 
     largest: Array
     low: Array
@@ -42,9 +42,9 @@ class _Reached:
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """What a page shows of modal coordinates (N, m): their ranges over bodies and time.
+    """Motions that a page shows: modal coordinates (N, m), and ranges over bodies and time.
 
-    Behind them stand the products (N, p) of nonlinear stress, see
+    In ``coordinates`` the products (N, p) of nonlinear stress follow the modal coordinates, see
     ``ModeShapes.stress_coordinates``. ``drift`` (m,) or (2, m) is the motion along x (and y) that
     is not magnified.
     """
@@ -148,7 +148,7 @@ class Motions:
 
 
 def _reached(field: Array, q: Array, size: Callable[[Any], Array]) -> _Reached:
-    """What the sums of a field (P, c, m) over the modes reach at coordinates q (N, m).
+    """Range over time of the sums of a field (P, c, m) over modes with coordinates q (N, m).
 
     ``size`` gives one number of values (c, ...). Times are sought in single precision, in blocks of
     nodes that stay in cache; the largest sizes are those of the sums in double precision there.

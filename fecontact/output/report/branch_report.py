@@ -94,7 +94,7 @@ def report_branches(
 def shown_of(
     field: ContactField, observe: tuple[str | int, str], usable_hz: float = np.inf
 ) -> Shown:
-    """What is shown of the points of branches of a field."""
+    """Texts, coordinates and motions that a page shows of points on branches of a field."""
     basis, (point, component) = field.system().basis, observe
     row = field.displacement_row(point, component)[: basis.modes]
     return Shown(basis, row, f"displacement {component} of {point}",

@@ -160,7 +160,7 @@ def drawn_ground(motion: Motion, box: Sequence[float]) -> DrawnGround | None:
         travel = np.column_stack([way, [across.travel(float(time)) for time in run.time],
                                   ground.rotation_speed * run.time])
         along = travel[:, :2] @ direction
-        # Heights are told along a direction over the box around the bodies.
+        # Heights are stored along a direction over the box around the bodies.
         corners = np.array([(x, y) for x in box[:2] for y in box[2:4]]) @ direction
         ends = [float(corners.min()), float(corners.max())]
     profile, first, spacing = np.zeros(1), 0.0, 1.0

@@ -35,9 +35,9 @@ Motion = tuple[float, Array]  # period [s], and states (SAMPLES, d) at equal dis
 
 @dataclass(frozen=True, eq=False)
 class Diagram:
-    """What is drawn of all branches: x (N,) and y (N, ...) of each, in the units of the labels.
+    """Curves of all branches in one diagram: x (N,) and y (N, ...), in the units of the labels.
 
-    With ``decades`` x are common logarithms, which the axis shows as the numbers themselves.
+    With ``decades`` x holds common logarithms; the axis shows the numbers themselves.
     """
 
     x_label: str
@@ -50,21 +50,21 @@ class Diagram:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What is shown when a point is chosen.
+    """Data and functions that show a chosen point.
 
     Attributes
     ----------
     basis : ModalBasis
     row : (m,) array
-        Of the displacement that is drawn over time.
+        Row of the displacement that is drawn over time.
     observed : str
-        Its name.
+        Name of this displacement.
     motion : callable
         The motion of a point.
     columns : tuple of str
-        Headings of what is told of a point.
+        Headings of the texts of a point.
     texts : callable
-        That, in the same order.
+        Texts of a point, in the same order.
     alike : bool
         Whether all motions are magnified to the same size, as shapes of modes are.
     """

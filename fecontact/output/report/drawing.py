@@ -1,6 +1,6 @@
-"""What the player of a page draws, as plain arrays: the same in the plane and in space.
+"""Plain arrays that the player of a page draws, in the plane (d = 2) and in space (d = 3).
 
-In the plane d = 2, in space d = 3; there the axis z points away from the ground.
+In space the axis z points away from the ground.
 """
 
 from dataclasses import dataclass, replace
@@ -169,7 +169,7 @@ class DrawnGround:
 
     @property
     def wavy(self) -> bool:
-        """Whether it has waves."""
+        """True if the ground has waves."""
         return len(self.profile) > 1 or self.heights is not None
 
 
@@ -179,7 +179,7 @@ def drawn_bodies(basis: ModalBasis) -> DrawnBodies:
     assert field is not None
     ratios = [f"{50.0 * rate / w:.3g} %" if w > 0.0 else ""
               for rate, w in zip(np.diag(basis.damping), basis.angular_frequencies, strict=True)]
-    # The modes that complete the bases of several bodies are not told from vibrations.
+    # Vibration modes and modes that complete the bases of several bodies are not distinguished.
     kinds = [kind if kind == "rigid" or not basis.parts else ""
              for kind in BasisReport(basis).kinds]
     modes = [[name, f"{hz:.6g}", ratio, kind] for name, hz, ratio, kind in zip(
@@ -243,11 +243,11 @@ def as_triangles(facets: Integers) -> Integers:
 
 
 def along_edges(bodies: DrawnBodies) -> DrawnBodies:
-    """The same bodies with their nodes in the order of a walk along edges of their triangles.
+    """Renumber the nodes of the bodies by a walk along edges of their triangles.
 
     Triangles of patches stay behind the others.
 
-    Fields differ little from one node to the next, so that large surfaces take half of the room.
+    Fields differ little from one node to the next, which halves the size of large surfaces.
     """
     count = len(bodies.nodes)
     pairs = bodies.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)

@@ -96,7 +96,7 @@ def _motion(point: BranchPoint) -> tuple[float, Any]:
 
 
 def _texts(point: BranchPoint, unit: str, lossless: bool) -> list[str]:
-    """What is told of a motion, in the order of the columns."""
+    """Texts of a motion, in the order of the columns."""
     period = float(point.values["period"])
     ratio = point.parameter * period / (4.0 * np.pi)
     stable = point.values.get("stable") if lossless else None

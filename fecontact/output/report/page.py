@@ -73,7 +73,7 @@ def page(title: str, block: bytes, kind: Kind = "run") -> str:
 
 
 def write_page(path: Path, title: str, block: bytes, kind: Kind = "run") -> Path:
-    """Write a page, whole or not at all; a ModelWarning tells of a file that is large."""
+    """Write a page, whole or not at all; a ModelWarning says if the file is large."""
     text = page(title, block, kind)
     if len(text) > LARGE:
         warnings.warn(f"{path} has {len(text) / 1e6:.0f} MB, which browsers open slowly; store "

@@ -160,7 +160,7 @@ def run_block(
 def moving_tables(
     motions: Motions, scale: float, box: list[float], ground: DrawnGround | None, payload: Payload
 ) -> dict[str, Any]:
-    """What the player needs besides the contact."""
+    """Table of the data that the player needs, except for the contact."""
     return {
         "bodies": bodies_table(motions, payload),
         "coordinates": payload.add(motions.coordinates, motions.coordinate_steps()),

@@ -96,7 +96,7 @@ def _tokens(text: str) -> list[tuple[str, str]]:
 
 
 def _roles(tokens: list[tuple[str, str]]) -> list[str]:
-    """What each token is: 'property', 'short' for a property and its value at once, or 'plain'."""
+    """Role of each token: 'property', 'short' for a property with its value, or 'plain'."""
     places = [place for place, (kind, _) in enumerate(tokens) if kind != "blank"]
     code, roles, brackets = [tokens[place] for place in places], [""] * len(tokens), [""]
     for at, (kind, token) in enumerate(code):
@@ -165,7 +165,7 @@ def _together(tokens: list[tuple[str, str]]) -> list[tuple[str, str]]:
             declares.append(False)
         elif token in ")]}":
             declares.pop()
-            # What a block ends is no declaration, but an object may end one.
+            # A block's closing brace does not belong to a declaration; an object's may end one.
             begins = token == "}" and not declares[-1]
         elif token == ";" and declares[-1]:
             ahead = next((k for k in range(at, len(tokens)) if tokens[k][0] != "blank"), at)

@@ -251,7 +251,7 @@ class _Places:
         return found
 
     def nodal(self, sides: Sequence[tuple[Any, _Side]], rows: int) -> Any:
-        """The same over the nodes, sparse (rows, d N)."""
+        """Sparse rows (rows, d N) over the nodes: the sum of factors times those of sides."""
         import scipy.sparse as sp
 
         found = sp.csr_array((rows, self.dimension * self.nodes))

@@ -100,7 +100,10 @@ def contact_faces(basis: ModalBasis) -> tuple[ContactFace, ...]:
 
 
 def _passes(basis: ModalBasis) -> tuple[ContactFace, ...]:
-    """As :func:`contact_faces`, but one for each pass of interfaces of two, with whole lengths."""
+    """Faces as in :func:`contact_faces`, but one for each pass of a two-pass interface.
+
+    Their tributary lengths are not halved.
+    """
     x, length = basis.contact_x, np.array(basis.tributary)
     if not several_bodies(basis) or not len(x):
         return (ContactFace("", (), slice(0, len(x)), x, "x", length),)
@@ -145,7 +148,7 @@ def touching_faces(basis: ModalBasis, what: str) -> tuple[ContactFace, ...]:
 
 
 def shown_faces(basis: ModalBasis, what: str) -> tuple[ContactFace, ...]:
-    """As :func:`touching_faces`, of a single body one for each of several contact groups."""
+    """Faces of :func:`touching_faces`; a single body has one for each of several contact groups."""
     found = touching_faces(basis, what)
     if several_bodies(basis) or len(basis.groups) < 2:
         return found

@@ -85,7 +85,7 @@ class InterfaceCompliance(Summarised):
 
     @property
     def recommendation(self) -> str:
-        """What to do in one sentence; empty if enough is resolved."""
+        """Advice in one sentence; empty if enough of the compliance is resolved."""
         if self.enough:
             return ""
         axis = int(np.argmin(np.minimum(self.uniform, self.nodes.min(axis=0))))

@@ -38,7 +38,7 @@ def _product(first, last, indptr, indices, blocks, x, y):
 
 
 def _scalar_product(first, last, indptr, indices, data, x, y):
-    """The same for a matrix of numbers that acts on each of the three components."""
+    """Rows first ... last of y = A x, for numbers that act on each of the three components."""
     width = x.shape[2]
     for i in range(first, last):
         y[i] = 0.0
@@ -50,7 +50,7 @@ def _scalar_product(first, last, indptr, indices, data, x, y):
 
 
 def _diagonal_product(first, last, blocks, x, y):
-    """The same for the 3 x 3 blocks (N, 3, 3) of a diagonal."""
+    """Rows first ... last of y = D x for a diagonal D of 3 x 3 blocks (N, 3, 3)."""
     for i in range(first, last):
         for p in range(3):
             a, b, d = blocks[i, p, 0], blocks[i, p, 1], blocks[i, p, 2]
@@ -152,7 +152,7 @@ class BlockRows:
                    np.ascontiguousarray(matrix.data, dtype=dtype))
 
     def single(self) -> "BlockRows":
-        """The same in single precision."""
+        """Copy of the matrix in single precision."""
         return BlockRows(self.indptr, self.indices, self.blocks.astype(np.float32))
 
     def product(self, x: Any) -> Any:

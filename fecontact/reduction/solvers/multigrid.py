@@ -123,7 +123,7 @@ def multigrid(fine: Any, coarse: Any, interpolation: Any, rigid: Array) -> Multi
 
 
 def with_finest(cycle: Multigrid, matrix: Any, interpolation: Any) -> Multigrid:
-    """The same for another finest matrix of 3 x 3 blocks, interpolated (n, m) from the next one."""
+    """Multigrid with another finest matrix of 3 x 3 blocks, interpolated (n, m) from the next."""
     return Multigrid([_nodal_level(matrix, interpolation), *cycle.levels[1:]], cycle.coarsest)
 
 

@@ -95,9 +95,9 @@ class NearSolver:
                    np.linalg.inv(blocks).astype(np.float32))
 
     def missing(self, forces: Array, found: Array) -> Array:
-        """What the works (k,) of forces on displacements (3 n, k) lack, by estimate.
+        """Estimated error of the works (k,) of forces on displacements (3 n, k).
 
-        ``forces`` (3 m, k) are those at the nodes that follow.
+        ``forces`` (3 m, k) act at the m nodes that follow.
         """
         left = self.coupling.product(
             np.ascontiguousarray(found, np.float32).reshape(-1, 3, found.shape[1]))
@@ -106,7 +106,7 @@ class NearSolver:
 
 
 def _following(body: ElasticBody, between: Any, loaded: Integers, layers: int) -> Any:
-    """Which nodes (N,) follow: middles of edges far from loaded nodes."""
+    """Boolean mask (N,) of the nodes that follow: middles of edges far from loaded nodes."""
     import scipy.sparse as sp
 
     matrix = body.component_mass

@@ -164,7 +164,7 @@ class SolidSolver:
             step_on(step, direction, pushed, x, residual)
             gain = step * energy
             work += gain
-            # What later steps will gain, if each gains less by the root of the last factor: the
+            # Estimated gain of later steps, if each gains less by the root of the last factor: the
             # first steps gain more than their share.
             factor = np.sqrt(gain / np.maximum(np.maximum(before, gain), np.finfo(float).tiny))
             reached |= gain * factor <= tolerance**2 * work * (1.0 - factor)
@@ -199,7 +199,7 @@ class SolidSolver:
 
     @cached_property
     def _single(self) -> "SolidSolver":
-        """The same with a stiffness of single precision, as the multigrid is."""
+        """Copy with a stiffness of single precision, the precision of the multigrid."""
         return replace(self, stiffness=self.stiffness.single())
 
     @cached_property

@@ -33,7 +33,7 @@ class Flexibility:
         self._places, self._half = self._factors.forward_substitute(self.rows[:, system.held])
 
     def of_rows(self, which: NDArray[np.bool_]) -> "Flexibility":
-        """The same for some rows alone."""
+        """Flexibility restricted to the rows of a mask."""
         part = copy(self)
         part.rows, part._half = self.rows[which], self._half[:, which]
         for name in ("compliance", "_balance"):

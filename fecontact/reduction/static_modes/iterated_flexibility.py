@@ -194,7 +194,7 @@ class IteratedFlexibility(Flexibility):
         self._whole: tuple[IteratedFlexibility, NDArray[np.bool_]] | None = None
 
     def of_rows(self, which: NDArray[np.bool_]) -> "IteratedFlexibility":
-        """The same for some rows alone."""
+        """Flexibility restricted to the rows of a mask."""
         part = IteratedFlexibility(self.system, self.rows[which], self.modes, self.accuracy,
                                    self.tolerance)
         part._whole = self, which

@@ -144,9 +144,10 @@ def diagonalised(system: FreeSystem, vectors: Array) -> tuple[Array, Array]:
 def _diagonalised_beside(
     space: TrialSpace, coordinates: Array, modes: Array, inertia: Array, vectors: Array
 ) -> tuple[Array, Array]:
-    """The same of displacements B v beside modes, and of vectors that are orthogonal to these.
+    """Squared frequencies and shapes of displacements B v beside modes, and orthogonal vectors.
 
-    All are sums B Z + C c of coordinates Z (s, p) and of few long vectors C, the modes and vectors.
+    All shapes are sums B Z + C c of coordinates Z (s, p) and of few long vectors C, which are the
+    modes and the vectors orthogonal to them.
     """
     system, count, p = space.system, modes.shape[1], coordinates.shape[1]
     long = np.hstack([modes, vectors])

@@ -53,7 +53,7 @@ def contact_maps(
     trajectory: Trajectory, times: Sequence[float] | None, wear: WearLaw | None,
     path: str | Path | None,
 ) -> "Figure":
-    """What :func:`fecontact.plot.plot_contact_map` draws of solids."""
+    """Maps of contact at times, drawn by :func:`fecontact.plot.plot_contact_map` for solids."""
     which = _chosen(trajectory, times)
     basis, run = trajectory.system.basis, trajectory
     plans, states = face_plans(basis, "contact map"), state_names(run)
@@ -90,7 +90,7 @@ def contact_maps(
 
 
 def shear_maps(history: LoadHistory, row: int, path: str | Path | None) -> "Figure":
-    """What :func:`fecontact.plot.plot_shear` draws of solids."""
+    """Maps of shear at a load step, drawn by :func:`fecontact.plot.plot_shear` for solids."""
     basis, state = history.system.basis, history.state(row)
     plans = face_plans(basis, "contact at a load step")
     friction = -np.einsum("nk,nkd->nd", history.friction_forces[row], basis.tangents)
@@ -231,7 +231,7 @@ def _single_maps(
 
 
 def friction_work_maps(trajectory: Trajectory, path: str | Path | None) -> "Figure":
-    """What :func:`fecontact.plot.plot_friction_work` draws of solids."""
+    """Maps of friction work, drawn by :func:`fecontact.plot.plot_friction_work` for solids."""
     drawn = resolved(trajectory)
     run = drawn.trajectory
     basis = run.system.basis
@@ -253,7 +253,7 @@ def _sheet_height(plans: Sequence[FacePlan], columns: int) -> float:
 
 def wear_maps(history: WearHistory, basis: ModalBasis, title: str, path: str | Path | None
               ) -> "Figure":
-    """What :func:`fecontact.plot.plot_wear` draws of solids."""
+    """Maps of worn depth and pressure, drawn by :func:`fecontact.plot.plot_wear` for solids."""
     plans = face_plans(basis, "wear")
     depth, area = history.depth, basis.contact_areas
     pressure = history.normal_force / area

@@ -241,6 +241,6 @@ def draw_arrows(
                         scale=largest / reach, color="white", edgecolor=_BORDER, linewidth=line,
                         width=0.10 * reach, units="xy", headwidth=3.6, headlength=4.2,
                         headaxislength=3.8, minlength=0.02, zorder=3.0, clip_on=False)
-    # What reaches beyond a face takes no room from others.
+    # Arrows that reach beyond a face must not shrink the other axes.
     drawn.set_in_layout(False)
     return drawn
