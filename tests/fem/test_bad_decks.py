@@ -84,6 +84,20 @@ def test_nodes_given_twice_are_said(tmp_path):
     assert len(read_mesh(written(tmp_path, "a.inp", text.replace("0.1", "0.0"))).nodes) == 8
 
 
+def test_elements_given_twice_are_said(tmp_path):
+    text = NODES + BRICK.rstrip() + "\n" + BRICK.rstrip().splitlines()[-1] + "\n"
+    with pytest.warns(ModelWarning, match="element 1 is given a second time, with its own"):
+        mesh = read_mesh(written(tmp_path, "a.inp", text))
+    assert len(mesh.cells) == 1
+
+
+def test_materials_without_a_section_are_said(tmp_path):
+    steel = "\n".join(line for line in STEEL.splitlines() if "SECTION" not in line) + "\n"
+    with pytest.warns(ModelWarning, match=r"no elements, for want of a \*SOLID SECTION"):
+        mesh = read_mesh(written(tmp_path, "a.inp", NODES + BRICK + steel))
+    assert mesh.materials == {}
+
+
 def test_couplings_that_determine_a_node_twice_name_it(tmp_path):
     points = NODES.rstrip() + "\n98, 0.5, 0.5, 2\n99, 0.5, 0.5, -1\n"
     coupling = "*COUPLING, CONSTRAINT NAME=C{0}, REF NODE={1}, SURFACE=A\n*KINEMATIC\n"

@@ -125,11 +125,14 @@ def read_inp(path: Path) -> RawMesh:
         raise MeshError("The file holds no *NODE or no *ELEMENT data.")
     deck.require_end()
     for body in bodies:
-        if len(moved := body.numbered.moved_nodes):
-            of = f" of '{body.name}'" if body.name else ""
-            more = f", as are {len(moved) - 1} others" if len(moved) > 1 else ""
-            warnings.warn(f"{path}: node {moved[0]}{of} is given a second time, at another place"
-                          f"{more}; the last place counts.", ModelWarning, stacklevel=4)
+        for found, what, last in (
+                (body.numbered.moved_nodes, "node", "at another place"),
+                (body.numbered.replaced_elements, "element", "with its own line")):
+            if len(found):
+                of = f" of '{body.name}'" if body.name else ""
+                more = f", as are {len(found) - 1} others" if len(found) > 1 else ""
+                warnings.warn(f"{path}: {what} {found[0]}{of} is given a second time, {last}{more};"
+                              f" the last one counts.", ModelWarning, stacklevel=4)
     joined, unread, without = _constrained(assembly, bodies)
     count = sum(len(body.numbered.places) for body in bodies)
     unused = sum(body.part.unused_nodes for body in bodies) if deck.ends_with_elements else 0
@@ -500,6 +503,8 @@ class _Assembly:
             constants that are not admissible.
         """
         found: dict[str, AnyMaterial] = {}
+        if self.materials and not self.sections:
+            return {}, ["its materials belong to no elements, for want of a *SOLID SECTION"]
         for part, options in self.sections:
             name, wanted = options.get("ELSET", ""), options.get("MATERIAL", "")
             if not name or not wanted:
@@ -831,8 +836,10 @@ class _NumberedMesh:
         before = np.flatnonzero(~last)
         elsewhere = (places[before] != self.places[self.nodes(numbers[before])]).any(axis=1)
         self.moved_nodes = np.unique(numbers[before][elsewhere])
-        last = _last_of_each(np.concatenate(
-            [np.empty(0, np.int64), *(numbers for _, numbers, _ in part.element_blocks)]))
+        numbers = np.concatenate(
+            [np.empty(0, np.int64), *(numbers for _, numbers, _ in part.element_blocks)])
+        last = _last_of_each(numbers)
+        self.replaced_elements = np.unique(numbers[~last])
         blocks: dict[str, list[tuple[Integers, Integers]]] = {}
         for kind, numbers, nodes in part.element_blocks:
             kept, last = last[:len(numbers)], last[len(numbers):]
