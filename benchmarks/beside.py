@@ -74,7 +74,7 @@ def main() -> int:
     slower, target = False, compiled_for(given.other) if given.other in FAMILIES else None
     other = Path(given.other).resolve() if target is None else HERE
     for benchmark in given.benchmarks:
-        # What a first run compiles is stored.
+        # The first run of each tree compiles and stores the kernels.
         run(other, benchmark, target)
         run(HERE, benchmark)
         turns = [(run(other, benchmark, target), run(HERE, benchmark))

@@ -26,7 +26,7 @@ def system(nodes: int, modes: int) -> ContactSystem:
 
 
 def numpy_rhs(system: ContactSystem, t: float, y: np.ndarray) -> np.ndarray:
-    """The same equations with numpy, all nodes at once."""
+    """Right-hand side of the same equations with numpy, all nodes at once."""
     s, m = system.arrays, system.basis.modes
     q, v = y[:m], y[m:]
     along, away = s.rows[:, 0], s.rows[:, 1]

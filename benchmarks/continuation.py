@@ -54,7 +54,7 @@ def two_masses() -> VectorField:
 
 
 def chain(masses: int) -> VectorField:
-    """As many masses in a row, each on the belt."""
+    """A chain of masses in a row, each on the belt."""
     rows = np.zeros((masses, 3, masses))
     rows[:, 0] = np.eye(masses)
     K = 2.0 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1)

@@ -1,8 +1,8 @@
 """Reading decks of many nodes: Abaqus decks and Ansys archives of a block of bricks.
 
 The deck has a node set, an element set, a surface and a section with its material. Each is read in
-a process of its own, whose peak memory is told beside that of the process before it reads; meshio
-reads the same deck without surfaces, sections and checks.
+a process of its own; its peak memory is printed beside the memory before reading. meshio reads the
+same deck without surfaces, sections and checks.
 
 Usage: python benchmarks/decks.py [NODES ...] [--quick]   (by default 200,000 and 2,000,000)
 """

@@ -4,9 +4,9 @@ Usage: python benchmarks/eigen.py [repetitions] [--quick]
        python benchmarks/eigen.py --solids [unknowns] [shape ...] [solver ...] [--quick]
 
 Solids are a cube of side 1 and a plate 1 x 1 x 0.05 of quadratic tetrahedra; solvers are "scipy",
-"direct" and "iterative", each in a process of its own, whose largest memory is told. By default all
-of them, with 50,000 unknowns. Times are those of the modes, without the assembly, which is told in
-a column of its own.
+"direct" and "iterative", each in a process of its own, whose largest memory is printed. By default
+all of them, with 50,000 unknowns. Times are those of the modes, without the assembly, which has a
+column of its own.
 """
 
 import json

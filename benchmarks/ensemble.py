@@ -2,7 +2,7 @@
 
 Usage: python benchmarks/ensemble.py [values] [periods] [--problem b] [--quick]
 
-Values of the drive's frequency, some periods of each, states once a period: if not told otherwise
+Values of the drive's frequency, some periods of each, states once a period: by default
 24 values and 60 periods of (f), then 64 and 100 of (b). The peer is numbalsoda, called in a
 compiled loop over the same values with the package's own compiled right-hand side. Errors are
 those after three periods, before chaos has its way: the median over the values of the largest
@@ -86,7 +86,7 @@ def numbalsoda_loop(name: str, values: Array) -> Callable[[float, int], Array]:
 
 
 def own(name: str, values: Array, workers: int) -> Callable[[float, int], Array]:
-    """The same by the package."""
+    """Solver of the same problem by the package."""
     systems = systems_of(name, values)
 
     def solve(rtol: float, periods: int) -> Array:

@@ -1,4 +1,4 @@
-"""What a new user waits for: sizes and times of first commands, from wheels in a new environment.
+"""Sizes and times of a new user's first commands, from wheels in a new environment.
 
 Builds both wheels, `fecontact` and `fecontact-kernels`, installs them away from the sources, and
 times first commands with and without the compiled kernels; with these nothing may be compiled.

@@ -33,7 +33,7 @@ Array = NDArray[np.float64]
 LEVELS, TIGHT = (1e-3, 1e-4, 1e-5, 1e-6), (1e-6, 1e-7, 1e-8, 1e-9)
 TOLERANCES = [10.0**-k for k in np.arange(3.5, 9.01, 0.5)]
 TIGHT_TOLERANCES = [10.0**-k for k in np.arange(6.0, 13.01, 0.5)]
-# What can be asked for at most.
+# Smallest relative tolerance that a solver accepts.
 LEAST = {"odeint": 1e-12, "numbalsoda": 1e-13}
 QUICK_PART = 0.05
 # Time that a solver gets for a problem [s]: then it is not followed to smaller tolerances.

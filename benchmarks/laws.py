@@ -59,7 +59,7 @@ def microseconds(normal: NormalLaw, friction: FrictionLaw, repetitions: int = 30
     return 1e6 * best
 
 
-# What friction laws require.
+# Values for the parameters of friction laws.
 FRICTION = {
     "static_coefficient": 0.8, "kinetic_coefficient": 0.55, "minimum_coefficient": 0.55,
     "friction_coefficient": 0.55, "minimum_velocity": 1e-2, "stribeck_velocity": 1e-3,

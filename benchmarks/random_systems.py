@@ -657,7 +657,7 @@ def distance(case: Case, found: Array, wanted: Array) -> float:
 
 @dataclass(frozen=True)
 class Result:
-    """What was found of a system."""
+    """Findings on one system."""
 
     case: Case
     status: str

@@ -1,4 +1,4 @@
-"""What derivatives of a run cost, and a point of a branch by shooting, on the beam that sticks.
+"""Cost of the derivatives of a run, and of a branch point by shooting, on the beam that sticks.
 
     python benchmarks/shooting.py [repetitions] [--quick]
 

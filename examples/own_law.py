@@ -2,10 +2,10 @@
 A friction law of your own
 ==========================
 
-Rocks and polymers rub harder the faster they slip: ``mu(v) = mu_0 + a ln(1 + |v| / v_0)``. Twenty
-lines make it a law at the speed of the built-in ones. A beam on a belt gets it and settles, where
-falling friction keeps it sticking and slipping. In a study file beside this script the law is used
-by ``law = "own_law.py:LogarithmicFriction"`` in ``[friction]``.
+Friction of rocks and polymers rises with slip velocity: ``mu(v) = mu_0 + a ln(1 + |v| / v_0)``.
+Twenty lines make it a law at the speed of the built-in ones. A beam on a belt gets it and settles,
+where falling friction keeps it sticking and slipping. In a study file beside this script the law is
+used by ``law = "own_law.py:LogarithmicFriction"`` in ``[friction]``.
 """
 
 import math

@@ -70,7 +70,7 @@ def bases() -> dict[str, ModalBasis]:
 def difference(basis: ModalBasis, other: ModalBasis) -> tuple[float, float]:
     """Largest relative differences of frequencies, and of T.
 
-    Rigid modes may be turned among themselves, so that they are compared by their products.
+    Rigid modes may be rotated among themselves; their products are compared instead.
     """
     r = other.rigid_modes
     w, expected = basis.angular_frequencies[r:], other.angular_frequencies[r:]

@@ -106,9 +106,9 @@ def touch(name, bodies, body, first, tangent, other=None):
 
 
 def stack(angle=0.0):
-    """A block that lies in the middle of a beam, and the beam on the ground; or both leaning.
+    """A block in the middle of a beam, and the beam on the ground; or both turned by an angle.
 
-    Meshes do not match. Leaning, the beam's lower face rests on nothing: there is no ground.
+    Meshes do not match. If turned, the beam's lower face rests on nothing: there is no ground.
     """
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     beam = moved(basis(columns=20, rows=4), angle=angle)

@@ -1,4 +1,4 @@
-"""What a report shows, read from its file."""
+"""Content of a report, read from its file."""
 
 import re
 

@@ -18,7 +18,7 @@ def files_of(folder):
 
 
 def run_script(script, arguments, folder, monkeypatch, capsys):
-    """What ``python SCRIPT ARGUMENTS --quick`` prints, and the files that it leaves in a folder.
+    """Output of ``python SCRIPT ARGUMENTS --quick``, and the files that it leaves in a folder.
 
     Temporary files must be gone, but for the references that the integrator's benchmark keeps;
     nothing is left beside the script.

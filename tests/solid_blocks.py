@@ -29,7 +29,7 @@ def block_mesh(counts, size=(0.2, 0.1, 0.05), *, tetrahedra=False):
 
 
 def block_body(counts, size=(0.2, 0.1, 0.05), *, tetrahedra=False, **options):
-    """The same as a body."""
+    """Elastic body of :func:`block_mesh`."""
     return ElasticBody(block_mesh(counts, size, tetrahedra=tetrahedra), **options)
 
 

@@ -1,4 +1,4 @@
-"""A small study to sweep, summaries of its user, executors that do as they are told."""
+"""A small study to sweep, summaries of its user, executors with prescribed behaviour."""
 
 import os
 from concurrent.futures import Executor, Future

@@ -77,7 +77,7 @@ def test_no_module_imports_itself_through_others():
     while free := [module for module, targets in left.items() if not targets & left.keys()]:
         for module in free:
             del left[module]
-    # What is left imports only from what is left: these are the circles, and what leads to them.
+    # The modules left import only from each other: they are circles, or lead to circles.
     assert not left
 
 

@@ -1006,7 +1006,7 @@ NAMESPACES = ("fem", "laws", "reduction", "integrate", "analysis", "bifurcation"
 
 @pytest.fixture(scope="module")
 def names():
-    """What the calls are about: a mesh, its body and modes, systems, a run."""
+    """Objects for the calls: a mesh, its body and modes, systems, a run."""
     mesh = fecontact.generate(fecontact.Beam(0.1, 0.01, element_size=0.01))
     body = ElasticBody(mesh)
     basis = modal_basis(body, 5, contact_nodes=4)

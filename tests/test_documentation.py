@@ -48,7 +48,7 @@ def blocks(page, language):
 
 
 def laws_setup(folder):
-    """What the page takes for granted: modules, a basis."""
+    """Names that the page needs: modules, a basis."""
     rows = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
     basis = fc.basis_from_matrices(np.eye(2), np.zeros((2, 2)),
                                    {"contact": rows[None], "B": rows, "C": rows})
@@ -324,7 +324,7 @@ def check_results(names, printed, folder):
     assert names["case"].versions["numpy"] == np.__version__
     slips = run.contact_state[:, 4] == fc.ContactState.SLIP
     assert 0 < len(names["sliding"]) == slips.sum() < len(frame)
-    # What friction takes from the block is its force times the slip, at each node.
+    # Power of friction on the block is its force times the slip, at each node.
     power = (data.friction_force * data.slip_velocity).sum("node")
     assert float(power.integrate("time")) == pytest.approx(run.energies.friction[-1], rel=0.01)
     assert printed.splitlines()[0] == "(1001, 5) N"
@@ -430,7 +430,7 @@ CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": che
 
 
 def test_every_page_with_code_is_known():
-    """Those of tutorials are run by test_site.py."""
+    """Code of the tutorials is run by test_site.py."""
     assert {page for page in PAGES if blocks(page, "python")
             and not page.startswith("tutorials/")} == set(CHECKS)
 

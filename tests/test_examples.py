@@ -36,7 +36,7 @@ EXAMPLES = {
     # The closed form of the validation page at a dashpot of 0.1.
     "sliding_borders": ([(r"ends at V = (\S+),", 0.5490463, 1e-6)],
                         {"sliding_borders.png", "stick_slip.png"}),
-    # As the source reports them: periods 1, 2, 4, none, and 1 with chatter.
+    # Periods reported by the source: 1, 2, 4, none, and 1 with chatter.
     "impact_oscillator": ([(r"^ 10.237 +(\d+)", 1.0, 0.0), (r"^  4.908 +(\d+)", 2.0, 0.0),
                            (r"^  5.954 +(\d+)", 4.0, 0.0), (r"^  1.567 +(\d+)", 1.0, 0.0)],
                           {f"pendulum_{name}_hz.png" for name in ("10.24", "4.91", "5.95", "3.76",

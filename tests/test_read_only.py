@@ -37,7 +37,7 @@ from fecontact.system.fields.vector_field import VectorField
 
 SPACES = ("fem", "reduction", "integrate", "analysis", "bifurcation", "measured", "sweeps",
           "fitting", "system", "io")
-# What users make and hand over, and what makes its own copies read-only.
+# Classes that users make and hand over, and classes that make read-only copies themselves.
 GIVEN = {"Task", "Axis", "PointPairing", "ReportFrame"}
 
 

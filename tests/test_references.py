@@ -20,7 +20,7 @@ ROLE = re.compile(r":(?:func|class|meth|mod|attr|data|exc|obj):`~?([^`]+)`")
 DOTTED = re.compile(r"(?<![\w/.@-])(?:fecontact|fc)(?:\.[A-Za-z_]\w*)+")
 # Names of files look like those of modules.
 FILES = (".css", ".md")
-# What others make is only looked at here, not imported.
+# Packages of others: names in them are only looked at here, not imported.
 FOREIGN = ("numpy.", "scipy.", "numba.", "matplotlib.", "pandas.", "xarray.", "concurrent.")
 PAGES = sorted(path for pattern in ("*.md", "*.toml", "*.cff", "Makefile", "docs/**/*.md",
                                     "docs/**/*.py", "examples/*.*", "benchmarks/*.py", ".ci/*",
@@ -30,7 +30,7 @@ PAGES = sorted(path for pattern in ("*.md", "*.toml", "*.cff", "Makefile", "docs
 
 
 def follow(name):
-    """What a dotted name stands for; LookupError if there is nothing."""
+    """Object of a dotted name; LookupError if there is none."""
     first, *rest = name.split(".")
     found, path = importlib.import_module("fecontact" if first == "fc" else first), "fecontact"
     for part in rest:

@@ -1,4 +1,4 @@
-"""What a release says of itself in several places is the same."""
+"""A release gives the same facts about itself in all places."""
 
 import re
 import runpy

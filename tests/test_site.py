@@ -132,7 +132,7 @@ def says_squeal(printed):
 
 
 def says_bifurcation_diagram(printed):
-    # As printed by Sextro: 7.09 and 8.09; a run outside of the unstable orbit meets the stable one.
+    # Sextro prints 7.09 and 8.09; a run outside of the unstable orbit meets the stable one.
     assert numbers(r"Hopf at B = ([\d.]+)", printed)[1] == pytest.approx(7.09, abs=0.005)
     assert numbers(r"doubling at B = ([\d.]+)", printed)[0] == pytest.approx(8.09, abs=0.005)
     stable, inside, outside = numbers(r"stable orbit ([\d.]+) m\n", printed) + numbers(
@@ -227,7 +227,7 @@ def test_stylesheets_from_elsewhere_are_found(tmp_path):
 def test_every_picture_of_a_page_can_be_made_again():
     made = {name for names in site_module("page_images").MAKERS.values() for name in names}
     images = Path(__file__).parents[1] / "docs" / "images"
-    # Those of the deck that is no part of the package are made by its example.
+    # The example of the deck that is no part of the package makes these images.
     made |= {"brake_reuss_backbone", "brake_reuss_pressure"}
     assert made == {path.stem for path in images.glob("*.png")}
     assert max(path.stat().st_size for path in images.rglob("*.png")) < 250_000

@@ -1,4 +1,4 @@
-"""What consoles and notebooks show of an object: a short line, and a small table."""
+"""Summaries of objects in consoles and notebooks: a short line, and a small table."""
 
 from html.parser import HTMLParser
 

@@ -36,7 +36,7 @@ CASES = {
                             (r"^1 m on 2 m: restitution (\S+) ", 0.53, 2e-3)], set()),
     "clamped_layers": (("out",), [(r"^mu p b h / P = 0.375: (\S+) J", 4.01786, 0.01)],
                        {"out/clamped_layers.png"}),
-    # As printed by Sextro: 7.09 and 8.09; the others see the example itself.
+    # Sextro prints 7.09 and 8.09; the others see the example itself.
     "disc_and_pads": (("out",), [(r"coefficient of (\S+) on", 0.1988, 2e-4),
                                  (r"at (\S+) Hz, supercritical", 4688.1, 0.2),
                                  (r"grows by (\S+) 1/s;", 1012.95, 0.5),

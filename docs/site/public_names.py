@@ -34,7 +34,7 @@ def places() -> dict[str, str]:
 
 
 def directive(thing: Any) -> str:
-    """What autodoc calls things of this kind."""
+    """Name of the autodoc directive for an object of this kind."""
     if inspect.isclass(thing):
         return "autoexception" if issubclass(thing, Exception) else "autoclass"
     return "autofunction" if inspect.isroutine(thing) else "autodata"

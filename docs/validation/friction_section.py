@@ -123,9 +123,9 @@ during stick, so that the vibration shows at B alone.
 {slips}
 
 These waves have slopes of up to 0.50, and the source keeps the contact force on them vertical
-(`ground.normal = "vertical"`). By default the contact force leans with the slope, which an elastic
-contact needs to conserve energy. It then pushes the mass along the belt with up to half of the
-normal force, beside a friction of at most 0.8 of it:
+(`ground.normal = "vertical"`). By default the contact force is normal to the sloping surface
+("leaning" below), which an elastic contact needs to conserve energy. It then pushes the mass along
+the belt with up to half of the normal force, beside a friction of at most 0.8 of it:
 
 {leaning}
 

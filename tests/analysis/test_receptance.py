@@ -88,7 +88,7 @@ def test_falling_friction_takes_damping_away():
 
 @pytest.mark.parametrize("damping", [40.0, 30.0])
 def test_response_tells_that_steady_sliding_is_unstable(damping, tmp_path):
-    """Where falling friction takes more than the dashpot gives: m x'' + d x' + c x = 0, d < 0."""
+    """Falling friction takes more than the dashpot gives: m x'' + d x' + c x = 0, d < 0."""
     speed, load = 0.01, 50.0
     slope = -0.2 * 100.0 * np.exp(-100.0 * speed) * load
     system = mass(normal=LinearContact(1e6, 2000.0), load=Load(load), ground=Ground(speed=speed),

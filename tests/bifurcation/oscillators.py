@@ -43,7 +43,7 @@ def jenkins_system(w=1.1, amplitude=1.0):
 
 
 def jenkins(w=1.1, **options):
-    """The same over its frequency."""
+    """Field of :func:`jenkins_system` over its frequency."""
     return contact_field(jenkins_system(w, **options), ["drive.frequency_hz"])
 
 

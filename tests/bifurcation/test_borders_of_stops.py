@@ -104,7 +104,7 @@ def test_impacts_that_begin_to_stop_the_slip():
 
 
 def test_slip_that_restarts_behind_an_impact_that_stops_it():
-    """What turns its sense there is an event of the slip alone, no meeting with the impact."""
+    """The reversal there is an event of the slip alone, no coincidence with the impact."""
     field = contact_field(skew(8.0), [AMPLITUDE])
     motion = periodic_motion(field.in_time(), solver=INELASTIC, initial=[0.0, 0.5, 0.0, 0.0],
                              rtol=1e-9)

@@ -206,5 +206,5 @@ def test_ensembles_in_space_are_single_runs():
         full = simulate(system, 0.05, initial=state, outputs=times, rtol=1e-8).states
         size = np.abs(full).reshape(6, 2, 6).max(axis=(0, 2)).repeat(6)
         assert (np.abs(got - full) < 1e-5 * size).all()
-    # What turns the other way round drags it the other way.
+    # Ground that turns the other way drags the mass the other way.
     assert found.states[0, -1, 5] * found.states[2, -1, 5] < 0.0

@@ -50,7 +50,7 @@ def test_explosions_have_no_false_folds(slowness, intervals):
     series = 1.0 - e / 8.0 - 3.0 * e**2 / 32.0 - 173.0 * e**3 / 1024.0
     at = np.median(orbits.parameter[steep])
     assert -0.65 < (at - series) / e**4 < -0.4
-    # The user is told.
+    # The message of the branch says so.
     lost = orbits.column("trivial_error") > 0.1
     assert f"Multipliers of {lost.sum()} orbits are lost in rounding" in orbits.message
 

@@ -141,7 +141,7 @@ def oscillator(t, x, p, out):
 
 
 def test_published_values_of_a_catalytic_oscillator():
-    """Those printed by MatCont; the sign of a and b is that of a vector."""
+    """Values printed by MatCont; the sign of a and b is that of a vector."""
     field = vector_field(oscillator, {"q2": 2.204678, "k": 0.4}, 3)
     branch = equilibrium_branch(field, [0.001137, 0.891483, 0.062345], "q2", bounds=(0.5, 2.3),
                                 direction=-1.0)

@@ -119,7 +119,7 @@ def test_tori_from_a_zero_hopf_point(kind):
 
 
 def no_torus(t, x, p, out):
-    # As ``rolling`` with the opposite sign of r^2: no torus.
+    # ``rolling`` with the opposite sign of r^2: no torus.
     r, g = x[1] * x[1] + x[2] * x[2], p[1] + x[0] + x[0] * x[0]
     out[0] = p[0] + x[0] * x[0] + r
     out[1], out[2] = g * x[1] - x[2], g * x[2] + x[1]

@@ -61,7 +61,7 @@ def strides(monkeypatch):
 
 
 def test_steps_of_a_body_are_those_of_plain_code(strides, monkeypatch):
-    """The same response, although four modes alone are solved for together."""
+    """Compiled steps give the response of plain code, although they solve for four modes alone."""
     options = ContinuationOptions(points=25, largest_step=0.05)
     fast = frequency_response(block(), BOUNDS, options=options).branches[0]
     assert sum(strides) >= 20

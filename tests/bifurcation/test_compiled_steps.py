@@ -82,7 +82,7 @@ def test_compiled_steps_are_those_of_plain_code(system, monkeypatch):
         assert mine.u == pytest.approx(theirs.u, rel=1e-6, abs=1e-8)
         for name in ("minimum", "maximum", "period", "truncation_error", "residual"):
             assert mine.values[name] == pytest.approx(theirs.values[name], rel=1e-4, abs=1e-7)
-    # What compiled steps store of a regular point is what its unknowns give.
+    # Values that compiled steps store of a regular point follow from its unknowns.
     for point in one.points[5:40:7]:
         restored = frequency_values(field, point)
         for name in ("truncation_error", "residual"):
@@ -94,7 +94,7 @@ def test_compiled_steps_are_those_of_plain_code(system, monkeypatch):
 
 
 def frequency_values(field, point):
-    """What plain code stores of a point."""
+    """Values that plain code stores of a point."""
     from fecontact.bifurcation.harmonic.starts import restored
 
     problem, u, tangent = restored(field, point)

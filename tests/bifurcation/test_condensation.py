@@ -25,7 +25,7 @@ def random_system(intervals, degree, states, parameters, seed=0):
 
 
 def dense(J, f, P, widths, T, degree, with_period):
-    """The same equations as one matrix, for x_0 ... x_N and the common unknowns."""
+    """Collocation equations as one matrix, for x_0 ... x_N and the common unknowns."""
     basis = rule(degree)
     points, d = f.shape
     matrix = np.zeros((points * d, (points + 1) * d + with_period + P.shape[2]))

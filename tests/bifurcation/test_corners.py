@@ -108,7 +108,7 @@ def test_mode_of_a_mass_above_a_stop(stiffness, H, samples, within):
 
 
 def test_mode_of_a_mass_pressed_on_a_stiff_stop():
-    """It leaves the stop at its static deflection: from the stiffness of the contact to flight."""
+    """Lift-off at the static deflection: from the stiffness of the contact to flight."""
     k, load = 1e4, 100.0
     mode = nonlinear_mode(stop(k, 0.0, load), (1e-3, 1.0), observe=("B", "y"),
                           method=HarmonicBalance(25, 1024))

@@ -84,7 +84,7 @@ def test_bautin():
 
 
 def test_a_curve_starts_with_the_parameters_of_its_point():
-    """Those of the branch, c = 0.5, not the base value of the field."""
+    """The curve starts with c = 0.5 of the branch, not the base value of the field."""
     field = vector_field(bautin, {"b": -1.0, "c": 1.0}, 2)
     start, = equilibrium_branch(field, find_equilibrium(field, {"c": 0.5}), "b",
                                 bounds=(-2.0, 2.0)).of_kind("Hopf")

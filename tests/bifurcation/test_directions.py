@@ -159,7 +159,7 @@ def test_conditions_of_a_symmetric_orbit_are_looked_at_in_their_order():
             problem = SimpleNamespace(linearise=lambda u, given=given: SimpleNamespace(
                 conditions=given))
             assert nothing_left(problem, None) == given
-    # What is left of a third one is more than rounding.
+    # The third one has a remainder above rounding.
     rest = Condition(2e-6, 2, 0, 0)
     problem = SimpleNamespace(linearise=lambda u: SimpleNamespace(conditions=[rest, first]))
     assert nothing_left(problem, None) == [first, rest]

@@ -48,7 +48,7 @@ def followed(X, offset, samples):
 @pytest.mark.parametrize("excess", [-1e-2, 1e-6, 1e-3, 1e-2, 0.1])
 @pytest.mark.parametrize("samples", [64, 256])
 def test_an_element_gives_up_the_least_deflection_that_it_can(excess, samples):
-    """Where it can stick all the time in the end: nearest to the deflection that it begins with."""
+    """An element that can stick in the end keeps the deflection nearest to its first one."""
     sticking = 0
     for X, offset in ellipses(excess):
         x = series(1, samples).values @ X[:, :2]

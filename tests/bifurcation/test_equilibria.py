@@ -87,7 +87,7 @@ def test_mode_coupling_flutter():
 
 
 def damped_coupling(mu=0.9, **changes):
-    """The same with springs and dashpots between the mass and the ground in x and y."""
+    """Mode coupling with springs and dashpots between the mass and the ground in x and y."""
     row = np.eye(3, 2)
     mass = basis_from_matrices(np.eye(2), [[2.0, 1.0], [1.0, 2.0 / 3.0]],
                                {"contact": row[None], "B": row, "C": row})

@@ -147,7 +147,7 @@ def carrier(t, x, p, out):
 
 @pytest.mark.parametrize("frequency", [10.0, 30.0, 100.0, 300.0])
 def test_errors_of_a_mode_that_stick_slip_excites(frequency):
-    """It turns once to fifty times in the mean interval; beside twice the intervals."""
+    """Error estimate against twice the intervals; the mode turns 1 to 50 times in an interval."""
     values = {"speed": 1.0, "slope": 100.0, "frequency": frequency}
     field = vector_field(carrier, values, 4)
     t, states = settled(field, 60.0, [2.0, 0.0, 2.0, 0.0], 8.0)

@@ -1,4 +1,4 @@
-"""Which set-valued orbits go from event to event, and where their branches end."""
+"""Set-valued orbits that are followed from event to event, and ends of their branches."""
 
 import numpy as np
 import pytest

@@ -29,7 +29,7 @@ def alone(example, law):
 
 
 def harmonics_at(example, branch, w, which=0):
-    """Those (H + 1,) of the observed displacement, and (H + 1, e) of the elements."""
+    """Harmonics (H + 1,) of the observed displacement, and (H + 1, e) of the elements."""
     system = example.system()
     field = contact_field(system, ["load.forces.0.signal.frequency_hz"])
     point = branch.at(field, w / TURN, which)

@@ -158,7 +158,7 @@ def layer_slope(t, x, p, out):
 
 @pytest.mark.long
 def test_error_of_an_orbit_without_a_jacobian():
-    """Where an error is solved for with the Jacobian, that has to be finite."""
+    """The error is infinite if the Jacobian with which it is solved for is not finite."""
     field = vector_field(layer, {"slope": 1e3, "none": 0.0}, 1, jacobian=layer_slope, period=TURN)
     t = np.linspace(0.0, 20.0 * TURN, 40001)
     x = np.zeros(len(t))

@@ -156,7 +156,7 @@ def sliding(amplitude):
 
 
 def test_lift_off_of_a_contact_that_slips():
-    """The row along the belt leans on the mode across, which rests; friction slips on."""
+    """The row along the belt also moves with the mode across, which rests; friction slips on."""
     field, branch = followed(sliding(2.5), INELASTIC, AMPLITUDE, (2.0, 3.5),
                              initial=[0.0, 0.0, 0.0, 0.0], largest_step=0.1)
     border, = branch.special
@@ -184,7 +184,7 @@ def phases_of(system, solver, initial, periods=1):
 
 
 def test_slip_that_rebounds_in_an_impact_goes_on():
-    """Where tangential restitution turns slip round, nothing could stick behind the impact."""
+    """Tangential restitution reverses the slip; nothing could stick after the impact."""
     problem, u = phases_of(skew(8.0), SetValued(restitution=0.0, tangential_restitution=0.3),
                            [0.0, 0.5, 0.0, 0.0])
     assert any(phase.strike is not None for phase in problem.phases)
@@ -207,7 +207,7 @@ def test_multipliers_of_motions_that_rest_where_the_period_begins():
 
 @pytest.mark.parametrize(("order", "left"), [(1, 3.0), (2, 0.75)])
 def test_rates_at_the_ends_of_brief_phases(order, left):
-    """What vanishes as c s^k (tau - s), s from the begin, has the rate -c tau^k at its end."""
+    """A function c s^k (tau - s), s from the begin, has the rate -c tau^k at its end."""
     phase = Phase((), (0,), 0, order=order)
     for part in (2e-6, 9e-6, 1e-4):
         course = Course(None, (phase,), np.zeros(1), np.zeros((1, 2)), np.array([part, 1.0 - part]),

@@ -260,7 +260,7 @@ def test_nodes_with_elements_stand_beside_nodes_with_bristles():
 
 
 def test_multipliers_by_hills_matrix_know_the_elements():
-    """As many as there are states, the same as those of transitions."""
+    """Multipliers by Hill's matrix, one a state, agree with those of transitions."""
     problem, u = corrected(*start(jenkins(0.5), 3, 128))
     found = problem.linearise(u)
     by_hill = np.linalg.eigvals(found.by_states.mean(axis=0) * TURN / 0.5)

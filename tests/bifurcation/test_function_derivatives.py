@@ -236,7 +236,7 @@ def bounded(t, x, p, out):
 
 
 def test_curves_do_not_depend_on_what_a_field_was_asked_before():
-    """Where complex numbers overflow far away, a curve beside zero keeps the complex step."""
+    """Complex numbers overflow far away; a curve computed near zero keeps the complex step."""
     field = vector_field(bounded, {"p": 0.2, "q": 0.3}, 2)
     assert field.differentiation == "complex"
     t = np.linspace(0.0, np.pi, 400)

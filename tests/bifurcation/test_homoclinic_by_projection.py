@@ -35,7 +35,7 @@ def field():
 
 @pytest.fixture(scope="module")
 def near(field):
-    """Where the branch of orbits over c ends, next to the homoclinic one."""
+    """Last orbit of the branch over c, next to the homoclinic one."""
     hopf, = equilibrium_branch(field, [-1.0, 0.0], "c", bounds=(-2.0, 2.0)).of_kind("Hopf")
     orbits = orbit_branch(field, hopf, method=Collocation(intervals=60), bounds=(-2.0, 2.0))
     assert orbits.status is BranchStatus.HOMOCLINIC

@@ -72,7 +72,7 @@ compiled_once = cache(njit)
 
 
 class Through:
-    """What scipy's dense output of DOP853 is, for many times at once."""
+    """Dense output of DOP853, equal to scipy's, for many times at once."""
 
     def __init__(self, solution):
         parts = solution.interpolants

@@ -1,4 +1,4 @@
-"""Marks of folders of blocks: what belongs to other runs is told apart to the last digit."""
+"""Marks of folders of blocks: they distinguish other runs to the last digit."""
 
 import functools
 import math
@@ -441,7 +441,7 @@ def on_contact(factor):
 
 
 def test_contact_fields_within_others():
-    """What they keep while they are used counts for nothing; it holds addresses of this process."""
+    """Working data of the fields do not enter the mark; they hold addresses of this process."""
     one, other = on_contact(1.0), on_contact(2.0)
     mark, inner = mark_of([one.spring]), one.spring
     inner.rates(np.zeros(3), np.zeros((3, inner.dimension)), 1.2 * inner.values)

@@ -119,7 +119,7 @@ def test_going_on_needs_the_same_values(cli, file):
     code, _, said = cli("modes", file, "--resume")
     assert code == 1
     assert "--resume is for a nonlinear mode" in said
-    # What responses alone read may differ.
+    # Keys that only responses read may differ.
     assert cli("modes", file, *ARGUMENTS, "--set", "response.bounds=[5.0, 6.0]",
                "--resume")[0] == 0
 

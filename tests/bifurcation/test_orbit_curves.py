@@ -67,7 +67,7 @@ def test_curves_have_at_least_the_intervals_of_their_first_point(masses):
 @pytest.mark.parametrize("kind", ["fold", "period doubling"])
 def test_a_point_takes_one_step_with_the_matrix_before_and_one_with_its_own(
         masses, kind, monkeypatch):
-    """Which leaves the square of the tolerance, and critical multipliers within the tolerance."""
+    """Residuals reach the tolerance squared, multipliers are critical within the tolerance."""
     field, branch = masses
     calls = {"linearise": [], "evaluate": []}
     for name, told in calls.items():
@@ -197,7 +197,7 @@ def test_generalised_period_doubling():
 
 
 def twisted(t, x, p, out):
-    # As ``torus``, but w' = (lam - nu + i nu) w - w |w|^2.
+    # ``torus`` with w' = (lam - nu + i nu) w - w |w|^2.
     r = np.sqrt(x[0] * x[0] + x[1] * x[1])
     C, S, a, z = x[0] / r, x[1] / r, r - 1.0, x[2]
     growth = p[0] - p[1] - a * a - z * z

@@ -33,7 +33,7 @@ FEW = ContinuationOptions(points=2)
 
 @pytest.fixture(scope="module")
 def unilateral_points():
-    """The same orbit of a mass that leaves a stop, by three methods."""
+    """One orbit of a mass that leaves a stop, by three methods."""
     field = unilateral()
     bounds = (0.9 / TURN, 0.95 / TURN)
     start = frequency_response(field.system(), bounds, observe=("B", "y"), options=FEW,

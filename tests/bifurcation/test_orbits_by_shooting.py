@@ -1,4 +1,4 @@
-"""What begins on branches by shooting, driven systems, and settled motions as starts."""
+"""Branches by shooting: switches onto them, driven systems, and settled motions as starts."""
 
 from dataclasses import replace
 
@@ -76,7 +76,7 @@ def test_doubled_orbits_agree_with_collocation(two_masses):
 
 
 def test_events_agree_with_collocation(two_masses):
-    """Where the period has a certain value: of two discretisations, each with steps of its own."""
+    """Events at a given period agree between two discretisations with steps of their own."""
     field, _, orbits = two_masses
     near = max((at for at in orbits.points if at.parameter < 7.6), key=lambda at: at.parameter)
     beyond = min((at for at in orbits.points if at.parameter > 7.7), key=lambda at: at.parameter)

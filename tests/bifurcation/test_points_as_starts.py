@@ -104,7 +104,7 @@ def test_steps_go_on_in_the_size_of_orbits_that_have_grown(field, rest):
 
 
 def test_a_start_may_pass_a_bound_by_rounding(field, rest, kept):
-    """As a bound that was computed does; branches themselves end exactly on theirs."""
+    """A computed bound may be missed by rounding; branches themselves end exactly on theirs."""
     assert kept.points[-1].parameter == 0.4
     assert rest.points[-1].parameter == 0.5
     beyond = np.nextafter(0.4, 1.0)

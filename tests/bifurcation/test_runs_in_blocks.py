@@ -41,7 +41,7 @@ def same(one, other):
 
 
 def apart_in_python(points, rows, still, scale, tolerance):
-    """Labels and numbers of points of the motions, told apart step by step in Python."""
+    """Labels and numbers of points of the motions, distinguished step by step in Python."""
     labels, motions = [], []
     for each, count, rests in zip(points, rows, still, strict=True):
         labels.append(-1)
@@ -300,7 +300,7 @@ class Counted:
 
 
 def test_what_ends_beside_a_failure_is_kept(monkeypatch, tmp_path):
-    """Eight blocks end at once, four of them with an error: four are kept, the first is told."""
+    """Eight blocks end at once, four with an error: four are kept, the first error is raised."""
     monkeypatch.setattr(in_blocks, "wait", lambda futures, **_: concurrent.futures.wait(futures))
     some = [Counted(number, number % 2 == 0) for number in range(8)]
     with pytest.raises(ArithmeticError, match="block 0"):

@@ -84,7 +84,7 @@ def test_a_mesh_that_is_too_coarse_claims_nothing_wrong(slow_doubling, intervals
     assert branch.special or branch.status is BranchStatus.STALLED
     for point in branch.special:
         assert point.kind in ("unresolved", "period doubling")
-        # What was met on this mesh alone may have no place on finer ones, hence no error.
+        # A point met on this mesh alone may have no place on finer ones, hence no error.
         assert abs(point.parameter - 0.04009165) <= 1.2 * point.parameter_error + 1e-8 or (
             point.kind == "unresolved" and np.isnan(point.parameter_error))
         assert point.kind == "unresolved" or point.criticality in ("undecided", "subcritical")
@@ -236,7 +236,7 @@ def test_special_points_get_as_many_intervals_as_their_tolerance_needs():
 
 
 def test_checks_of_a_coefficient_end_at_16_times_the_least_intervals(monkeypatch):
-    """Where orbits needed more intervals than the least ones, at least one doubling is made."""
+    """If orbits needed more than the least intervals, at least one doubling is made."""
     made = []
     twice = sharpening._with_twice_the_intervals
 

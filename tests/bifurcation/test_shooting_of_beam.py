@@ -77,7 +77,7 @@ def test_orbits_are_those_of_runs(motion):
         assert point.values["period"] == pytest.approx(run.period, rel=1e-6)
         assert point.values["stable"]
         assert point.values["trivial_error"] < 2e-4
-    # What the belt and the spring put in over a period, friction and damping take out.
+    # Friction and damping take out the work that belt and spring put in over a period.
     run = simulate(example.beam(SPEED), first.values["period"], initial=first.u[:40], rtol=1e-8)
     energies = run.energies
     assert energies.work[-1] > np.ptp(energies.stored)

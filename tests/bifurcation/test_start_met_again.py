@@ -1,4 +1,4 @@
-"""Where compiled steps may meet the start of their branch again, on curves that are known."""
+"""Compiled steps that may meet the start of their branch again, on known curves."""
 
 from types import SimpleNamespace
 

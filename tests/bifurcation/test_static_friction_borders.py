@@ -37,7 +37,7 @@ class Reference:
                 - 2.0 * DAMPING * SPEED)
 
     def left(self, t, begin, place):
-        """What stick that began at a place has left of its limit."""
+        """Margin of static friction at time t, for stick that began at a place."""
         return STATIC - abs(self.force(t, place + SPEED * (t - begin)))
 
     def release(self, begin, place):
@@ -68,7 +68,7 @@ class Reference:
         return float(found.t[-1]), float(found.y[0, -1])
 
     def settled(self, begin, place, periods=20):
-        """What stick phases of a settled period have left, and the last begin and place."""
+        """Least margin of stick in the last period, and begin and place of the last stick phase."""
         least, end = [], begin + periods * PERIOD
         while begin < end:
             release, low = self.release(begin, place)

@@ -189,7 +189,7 @@ def mode_of(wheel, order, bounds=(1e-7, 1e-4), number=1):
 
 @pytest.mark.parametrize(("order", "number"), [(1, 1), (2, 1), (3, 1), (4, 2)])
 def test_nonlinear_mode_of_a_wave_is_one_of_the_whole_wheel(sector, wheel, order, number):
-    """It satisfies the equations of all sectors of finite elements, with the same xi, to 1e-9."""
+    """The mode satisfies the equations of all sectors, with the same xi, to 1e-9."""
     mode = mode_of(wheel, order, number=number)
     index = int(np.argmax(mode.damping_ratio)) if order != 2 else len(mode) // 2
     point = mode.branch.points[index]

@@ -1,4 +1,4 @@
-"""A run that ends where it was told to."""
+"""A run that ends at an event chosen by the user."""
 
 from fecontact import Status, read_case
 from fecontact.cli import execute

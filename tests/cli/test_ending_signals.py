@@ -79,7 +79,7 @@ def files(folder):
 
 @pytest.mark.parametrize("deaf", [False, True])
 def test_sigterm_writes_the_run_and_its_checkpoint(tmp_path, deaf):
-    """As Ctrl-C does, also where that is ignored; more of them change nothing."""
+    """SIGTERM acts like Ctrl-C, also where SIGINT is ignored; further signals change nothing."""
     (tmp_path / "s.toml").write_text(STUDY)
     ignored = signal.SIG_IGN if deaf else signal.default_int_handler
     process = subprocess.Popen(

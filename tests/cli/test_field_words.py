@@ -26,7 +26,7 @@ def test_a_word_of_the_field_names_the_command(cli):
 
 
 def test_a_reader_of_help_may_end_early():
-    """As ``fecontact sweep --help | head`` does."""
+    """The reader closes the pipe early, like ``fecontact sweep --help | head``."""
     with subprocess.Popen([sys.executable, "-m", "fecontact", "sweep", "--help"],
                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         process.stdout.close()

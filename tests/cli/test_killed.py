@@ -158,7 +158,7 @@ def test_a_killed_sweep(tmp_path):
 
 
 def results(folder):
-    """What a sweep keeps, apart from pictures and the user's notes."""
+    """Files that a sweep stores, apart from pictures and the user's notes."""
     return {name: content for name, content in files_below(folder).items()
             if name.split("/")[0] in ("shards", "bases", "cases", "index.csv", "sweep.toml")
             and name.endswith((".json", ".h5", ".vtkhdf", ".csv", ".toml"))}

@@ -1,4 +1,4 @@
-"""What is refused, and what succeeds, where input is unusual."""
+"""Unusual input: cases that are refused, and cases that succeed."""
 
 import os
 

@@ -20,7 +20,7 @@ def blas_threads() -> set[int]:
 
 @pytest.fixture(autouse=True)
 def three_threads() -> Iterator[None]:
-    """As on a machine of three cores; OpenBLAS starts what is missing."""
+    """Three BLAS threads, like on a machine of three cores; OpenBLAS starts missing threads."""
     with one_blas_thread:  # loads all libraries
         pass
     with threadpool_limits(3, user_api="blas"):

@@ -55,7 +55,7 @@ def without_folder_of_numba():
 
 
 def hits(*folders):
-    """What a new process says that imports the module of each folder: whether it was on disk."""
+    """Output of a new process that imports the module of each folder: True if it was on disk."""
     done = subprocess.run([sys.executable, "-c", IMPORTS, *map(str, folders)], check=False,
                           capture_output=True, text=True, env=without_folder_of_numba())
     assert done.returncode == 0, done.stderr

@@ -70,7 +70,7 @@ def first_by_kernel(inner: Inner) -> float:
 def run(p: Outer, y: Vector, address: int) -> float:
     total = 0.0
     for _ in range(p.count):
-        # What is stored between two reads is seen, and so is a change in place.
+        # A value stored between two reads is seen, and so is a change in place.
         p.x[0] += 1.0
         total += _added_at(address)(p, y)
     return total + first_by_kernel(p.inner)
@@ -137,7 +137,7 @@ def test_constants_stand_for_what_a_tuple_says():
     assert weighted(p) == 2.0 * (111.0 + 1.0 + 5.0 + 9.0)
     said = constants({Table: {"places": np.array([3, 2]), "factor": 5}, Inner: {"rows": (2, None)}})
     assert weighted.for_values(said)(p) == 5.0 * (1100.0 + 1.0 + 5.0)
-    # What numbers stand beside one another follows from the shape alone.
+    # The shape alone determines which numbers lie beside one another.
     narrow = constants({Inner: {"rows": (None, 2)}})
     assert weighted.for_values(narrow)(p) == 2.0 * (111.0 + 1.0 + 3.0 + 5.0)
     assert weighted(p) == 2.0 * (111.0 + 1.0 + 5.0 + 9.0)

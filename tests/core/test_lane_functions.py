@@ -59,7 +59,7 @@ def both(x: Matrix, given: int) -> int:
 
 @kernel
 def of_python(x: Matrix, y: Matrix, out: Block) -> None:
-    """What laws write, row by row of ``out``."""
+    """Functions that laws use, one a row of ``out``."""
     for i in range(len(x)):
         a, b = read(x[i]), read(y[i])
         write(out[0, i], math.exp(a))

@@ -28,7 +28,7 @@ class Terminal(io.StringIO):
 
 
 class Notebook(ModuleType):
-    """What a kernel makes of IPython: displays with a handle, kept as they are set."""
+    """Stand-in for IPython in a kernel: displays with a handle, kept as they are set."""
 
     def __init__(self):
         super().__init__("IPython")

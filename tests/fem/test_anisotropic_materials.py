@@ -419,7 +419,7 @@ def test_anisotropic_materials_of_decks(tmp_path, kind):
 
 
 def test_expansion_of_decks(tmp_path):
-    """One number for isotropic materials; more is told, and leaves the material as it is."""
+    """One number for isotropic materials; more gives a warning and leaves the material as is."""
     plain = deck("ORTHO").replace(f"TYPE=ORTHO\n{CONSTANTS['ORTHO']}",
                                   "TYPE=ISO\n7e10, 0.33\n")
     for lines in ("2.3e-5,\n", "2.3e-5, 20.\n"):

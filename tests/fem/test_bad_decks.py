@@ -35,7 +35,7 @@ def test_shells_and_beams_are_refused_with_the_way_round(tmp_path, kind, nodes, 
 
 @pytest.mark.parametrize(("kind", "nodes"), [("S4", "1, 2, 3, 4"), ("CPS3", "1, 2, 3")])
 def test_elements_without_a_section_name_faces(tmp_path, kind, nodes):
-    """As meshers write groups; a triangle on a brick is none of its faces, but names its nodes."""
+    """Groups as meshers write them; a triangle on a brick is no face of it, but names its nodes."""
     mesh = read_mesh(written(
         tmp_path, "a.inp", f"{NODES}{BRICK}*ELEMENT, TYPE={kind}, ELSET=SKIN\n2, {nodes}\n{STEEL}"))
     if kind == "S4":

@@ -138,7 +138,7 @@ $EndElements
 
 
 def test_gmsh_curve_in_two_groups_reversed_and_elements_without_group(tmp_path: Path) -> None:
-    """All that meshio cannot read: see the entities 1 (two groups, one reversed) and 2 (none)."""
+    """Features that meshio cannot read: the entities 1 (two groups, one reversed) and 2 (none)."""
     path = tmp_path / "a.msh"
     path.write_text(GMSH_41)
     mesh = read_mesh(path)

@@ -35,7 +35,7 @@ def stacked():
 
 
 def stack(nodes, nodes_between, element_size=0.004, modes=MODES):
-    """Four beams on each other and the ground, told in another order than they stand in."""
+    """Four beams on each other and the ground, listed in another order than they stand in."""
     mesh = generate(Beam(length=0.1, height=HEIGHT, element_size=element_size))
     upwards = ("bottom", "middle", "top", "lid")
     bodies = {name: ElasticBody(mesh.placed((0.0, upwards.index(name) * HEIGHT)), thickness=0.01,
@@ -61,7 +61,7 @@ def system(stacked, friction):
 
 
 def in_one_block(whole):
-    """The same system without word of its bodies."""
+    """Copy of the system without its division into bodies."""
     return replace(whole, basis=replace(whole.basis, parts=()))
 
 

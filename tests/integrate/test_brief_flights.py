@@ -54,13 +54,13 @@ def changes(run):
 @pytest.mark.parametrize(("part", "within"), [
     (1e-3, 2e-5), (1e-4, 1e-5), (1e-5, 1e-4), (3e-6, 1e-3), (1e-6, 0.05)])
 def test_lift_off_where_the_force_nearly_stays(part, within, rtol):
-    """Where the stop would have to pull for a time 2 d, the flight takes 4 d (1 + O(d^2)).
+    """If the stop would have to pull for a time 2 d, the flight takes 4 d (1 + O(d^2)).
 
     In the shortest one it would pull with 1e-12 of the largest force, little more than rounding.
     """
     before = 0.25 * part * PERIOD
     amplitude = PRESSING / np.cos(W * before)
-    # What rounding has left of it.
+    # The time that belongs to the rounded amplitude.
     before = np.arctan(np.sqrt((amplitude / PRESSING - 1.0) * (amplitude / PRESSING + 1.0))) / W
     run = fc.simulate(mass(amplitude), 3.0 * PERIOD, initial=[-GAP, 0.0], rtol=rtol,
                       solver=INELASTIC, outputs=2, events=ContactEvents())
@@ -117,9 +117,9 @@ def test_many_lift_offs_open_the_stop_once(count):
 
 
 def test_slip_that_begins_on_stops():
-    """A mass on a belt, whose motion along it leans on that across: no run is stuck or has gained.
+    """A mass on a belt, coupled along and across: no run gets stuck or gains energy.
 
-    What all nodes rub off is the work of friction, and none of it is negative.
+    Work lost at all nodes is the work of friction, and none of it is negative.
     """
     random = np.random.default_rng(3)
     for _ in range(150):

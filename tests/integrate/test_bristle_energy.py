@@ -1,4 +1,4 @@
-"""What friction with memory stores it gives back: it is no loss, and wears nothing."""
+"""Friction with memory gives back the energy that it stores: no loss, and no wear."""
 
 import numpy as np
 import pytest
@@ -98,7 +98,7 @@ def test_loss_never_falls_and_covers_the_loop(name):
 
 @pytest.mark.parametrize("name", LAWS)
 def test_balance_under_a_varying_normal_force(name):
-    """What changes the stiffness of the bristles does work on them."""
+    """Changes of the bristles' stiffness do work on them."""
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
     basis = basis_from_matrices(2.0 * np.eye(2), np.diag([1e5, 0.0]),

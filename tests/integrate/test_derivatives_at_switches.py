@@ -89,7 +89,7 @@ def test_at_breakaway_there_is_no_derivative(start, solver, named):
 
 
 def test_derivatives_to_the_sides_of_breakaway():
-    """Those into slip are of the circle about 1/2; behind, the circle begins dx / V later."""
+    """Ahead, into slip, the circle about 1/2; behind, the circle begins dx / V later."""
     with pytest.warns(ModelWarning, match="there is no derivative"):
         found = sensitivity(belt_of_unit_mass(), 0.7, initial=np.array([0.8, 0.2]), solver=STATIC)
     c, s = np.cos(0.7), np.sin(0.7)

@@ -45,7 +45,7 @@ def test_deflection_since_touch_down(friction):
     assert found.monodromy[2, :2] == pytest.approx(
         [later / (GRAVITY * touched), later / GRAVITY], rel=1e-5)
     assert found.parameter_derivative[2] == pytest.approx(-unit * lasted * fall, rel=1e-5)
-    # What was there before the flight has decayed.
+    # The internal variable from before the flight has decayed.
     assert found.monodromy[2, 2] == 0.0
 
 

@@ -90,7 +90,7 @@ def test_pads_lift_off_and_the_squeal_keeps_its_size(brake, modes):
     sizes = [np.ptp(run.between(start, start + 2e-3).displacement("pad1.back")[:, 1])
              for start in (0.0, 0.006, 0.008, 0.01)]
     assert sizes[2] == pytest.approx(sizes[3], rel=0.25)
-    # As a mode it would have grown by a factor of more than four.
+    # Linear growth of the mode would give a factor of more than four.
     assert sizes[3] < 0.75 * sizes[0] * np.exp(modes.eigenvalues.real.max() * 0.01)
     states = run.between(0.008).contact_state
     assert 0.02 < (states == fc.ContactState.OPEN).mean() < 0.2

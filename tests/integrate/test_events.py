@@ -276,7 +276,7 @@ def test_kinds_and_functions_that_are_no_events_are_named():
 def test_more_events_than_steps_of_a_piece(tmp_path, monkeypatch):
     """80,000 turning points of a fast oscillator fill the table of events hundreds of times.
 
-    Progress is told, and the checkpoint is kept, all along.
+    Progress is reported, and the checkpoint is kept, all along.
     """
     monkeypatch.setattr(Checkpoint, "keep", Checkpoint.write)
     shape = np.array([[0.0], [1.0]])

@@ -112,7 +112,7 @@ def test_bristles(equations, law, size, curve):
                        for t, z in zip(TIMES, found.y[:2].T, strict=True)])
     run = run_of(law, path)
     assert run.friction_forces[:, 0] == pytest.approx(forces, abs=2e-5 * np.abs(forces).max())
-    # What was lost is the work of friction without what the bristles store.
+    # The loss is the work of friction without the energy that the bristles store.
     a, b = law.bristle_stiffness_of(np.ones(1))[:, 0, 0]
     kept = 0.5 * (a + b * F) * (found.y[:2, -1] ** 2).sum()
     lost = found.y[2, -1] - kept

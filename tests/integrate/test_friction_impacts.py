@@ -58,7 +58,7 @@ def imbalance(system, run):
 @pytest.mark.parametrize(("along", "mu", "e"), [(2.0, 0.3, 0.5), (-2.0, 0.3, 0.0), (0.4, 0.3, 0.5),
                                                (-0.3, 0.5, 1.0)])
 def test_oblique_impact_of_a_particle(law, along, mu, e):
-    """It keeps slipping, or sticks where Coulomb's impulse would turn it back."""
+    """The particle keeps slipping, or sticks where Coulomb's impulse would reverse it."""
     system = body([(0.0, 0.0)], mu, mass=2.0)
     run, motion = go(system, [0.0, 0.1, 0.0], [along, -1.0, 0.0], [0.0, 0.2], restitution=e,
                      impact_law=law)
@@ -243,7 +243,7 @@ def test_rocking_block():
 
 
 def test_flat_block_comes_to_rest_on_both_corners():
-    """Where Housner's ratio is below zero the corner that was the pivot is pressed too."""
+    """With Housner's ratio below zero the corner that was the pivot is pressed too."""
     b, h = 1.0, 0.5
     system = body([(-b, h), (b, h)], 1.0, inertia=(b * b + h * h) / 3.0, load=Load(10.0))
     run, motion = go(system, [-h * 0.02, b * 0.02, 0.02], np.zeros(3), [0.0, 0.2, 0.5],

@@ -47,7 +47,7 @@ def test_ensembles_refuse_them():
 
 
 def test_short_runs_of_fast_drives_end():
-    """The same drive over ten of its periods: the block does not move yet."""
+    """Ten periods of the same drive: the block does not move yet."""
     system = friction_oscillator().with_(**{"drive.frequency_hz": 1e12 / TURN})
     run = fc.simulate(system, 20.0 * np.pi / 1e12, outputs=11)
     assert run.status is fc.Status.FINISHED

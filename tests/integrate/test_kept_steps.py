@@ -1,4 +1,4 @@
-"""What runs keep between their outputs: states of the motion, whatever pieces it ran in."""
+"""States that runs keep between their outputs: independent of the pieces of the run."""
 
 from dataclasses import replace
 from itertools import pairwise

@@ -170,7 +170,7 @@ def test_results_do_not_depend_on_what_runs_beside():
 
 
 def test_a_chain_hands_on_its_states():
-    """As runs one after the other, each from where the one before has ended."""
+    """A chain equals runs one after the other, each from the end of the one before."""
     frequencies = np.linspace(11.0, 16.0, 11)
     systems = [slider().with_(**{"drive.frequency_hz": w / TURN}) for w in frequencies]
     times = np.linspace(0.0, 0.2, 3)

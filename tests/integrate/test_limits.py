@@ -1,4 +1,4 @@
-"""What a run warns of and refuses; CVODE; steep smoothing; wear."""
+"""Warnings and refusals of runs; CVODE; steep smoothing; wear."""
 
 import numpy as np
 import pytest

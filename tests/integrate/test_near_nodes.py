@@ -160,7 +160,7 @@ def test_runs_go_on_bit_for_bit():
     whole, parts = (runs_of(system, state, rtol=1e-6, max_step=1.0)[0] for _ in range(2))
     whole.advance(10**6)
     while parts.advance(7) == 0:
-        # What the room holds is forgotten where a run goes on from a checkpoint.
+        # A run that goes on from a checkpoint has lost the contents of its work arrays.
         parts = replace(parts, room=driver.room_for(5, NODES, 0, 2, parts.problem.blocks))
     assert np.array_equal(whole.states, parts.states)
     assert np.array_equal(whole.work, parts.work)

@@ -35,7 +35,7 @@ SOLVERS = {solver.name: solver for solver in (Auto(), SERIES, STEPS)}
 
 @kernel
 def first_zero(p: Vector, limit: float, room: Matrix) -> float:
-    """As the kernels find it."""
+    """First zero found by the kernels."""
     return polynomials.first_zero(p, limit, room)
 
 

@@ -340,7 +340,7 @@ def test_steps_end_where_the_speed_of_the_ground_has_a_kink(method):
 
 
 def test_from_rest_under_point_loads():
-    """Ringing of a stiff contact after its onset, once it has faded, shortens no steps."""
+    """Ringing of a stiff contact after its onset shortens no steps once it has decayed."""
     row = np.zeros((3, 2))
     row[0, 0] = row[1, 1] = 1.0
     basis = basis_from_matrices(

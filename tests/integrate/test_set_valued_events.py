@@ -180,7 +180,7 @@ def test_runs_in_pieces_are_the_same_to_the_last_bit(system, end, options):
 def test_a_run_without_time_between_its_events_ends_whatever_its_pieces():
     run = driver.start(belt(), np.array([0.5, 0.2]), np.linspace(0.0, 30.0, 301), rtol=1e-6)
     run.advance(5)
-    # As if no time had passed between many changes of contact, in calls before.
+    # State after many changes of contact without progress in time, in calls before.
     run.progress.counts[[IDLE, AT_EVENT]] = 200, 1
     run.progress.numbers[STEP] = 0.0
     assert run.advance(1) == MINIMUM_STEP

@@ -348,7 +348,7 @@ def test_steady_sliding_stays_steady():
     mu = 0.3 * 2.0 / np.pi * np.arctan(1e4 * 0.05)
     assert place[:, 0] == pytest.approx(np.full(11, mu * 50.0 / 1e5), rel=1e-6)
     assert run.contact_state.tolist() == [[ContactState.SLIP] * 4] * 11
-    # What the belt puts in is lost in friction.
+    # The work of the belt is lost in friction.
     assert run.energies.belt_friction_work[-1] == pytest.approx(mu * 50.0 * 0.05 * 0.02, rel=1e-6)
     assert run.energies.friction[-1] == pytest.approx(run.energies.belt_friction_work[-1], rel=1e-6)
 

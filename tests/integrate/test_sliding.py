@@ -128,7 +128,7 @@ def test_a_side_that_turns_unsteadily_is_a_belt_of_that_speed(name):
         theirs = getattr(single, quantity)[:, 0]
         assert getattr(run, quantity)[:, 1] == pytest.approx(
             theirs, abs=5e-6 * np.abs(theirs).max())
-    # What the side's drive puts in is what the belt's puts in; the ground at rest does nothing.
+    # The drive of the side does the work of the belt; the ground at rest does none.
     done = run.energies.belt_friction_work[-1]
     assert done == pytest.approx(single.energies.belt_friction_work[-1], rel=1e-5)
     assert abs(done) > 1e-3
@@ -162,7 +162,7 @@ def test_derivatives_to_the_state_and_to_each_speed(friction):
 
 
 def test_quasi_static_travel_is_that_of_the_side_that_slides():
-    """A mass dragged along a leaning side as along the ground; the travel's work too."""
+    """A mass dragged along an inclined side moves as along the ground; the travel's work too."""
     angle, path = 0.7, LoadPath(travel=(0.0, 2e-3, -1e-3, 2e-3), steps=40)
     side = ContactSystem(
         bodies={"b": oscillator(angle), "wall": wall()},

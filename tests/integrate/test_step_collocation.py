@@ -153,7 +153,7 @@ def test_a_ball_that_bounces(damping):
 
 
 def test_the_work_of_a_ball_that_bounces():
-    """What the dashpot takes is what motion and spring lose, though its force jumps."""
+    """The dashpot takes the energy that motion and spring lose, though its force jumps."""
     g, c, damping, height = 9.81, 1e4, 6.0, 0.05
     system = mass_in_y(normal=LinearContact(c, damping), friction=ConstantFriction(0.0),
                        load=Load(normal=g))

@@ -1,4 +1,4 @@
-"""Where the force of a node begins or ends within a step by collocation."""
+"""Begin and end of the force of a node within a step by collocation."""
 
 import numpy as np
 import pytest

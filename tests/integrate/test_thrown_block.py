@@ -49,7 +49,7 @@ def block():
 
 
 def test_block_of_finite_elements_sticks_where_the_mass_does(block):
-    """As the same smoothed law lets a mass; 4e-5 s and 3e-5 m from the law without smoothing."""
+    """Equal to the mass with the same smoothed law; 4e-5 s and 3e-5 m from the unsmoothed law."""
     mass = tb.thrown_mass("arctan", 1e4)
     assert block.stop == pytest.approx(mass.stop, abs=2e-7)
     assert block.stuck_at == pytest.approx(mass.stuck_at, abs=5e-7)

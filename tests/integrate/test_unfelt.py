@@ -37,7 +37,7 @@ HERTZ = 0.5 / np.pi
 
 
 def swing(normal, gap=1.0, frequency=HERTZ):
-    """x'' + w^2 x = 0 in y, with w = 1 rad/s unless told, over ground one below."""
+    """x'' + w^2 x = 0 in y, with w = 1 rad/s by default, over ground one below."""
     return ContactSystem(basis([frequency], [0.0], UP, UP), normal=normal, gap=gap)
 
 
@@ -114,7 +114,7 @@ def test_no_reversal_of_slip_is_missed():
 
 
 def test_reversal_on_a_belt_whose_speed_changes():
-    """As above, with a belt whose speed swings: bounds on its speed, not polynomials."""
+    """Reversal on a belt whose speed swings: bounds on its speed, not polynomials."""
     for phase in np.linspace(0.0, 1.2, 25):
         system, start = sliding(1e-4, 0.1, phase)
         system = system.with_(ground=Ground(speed=1.0, motion=HarmonicSpeed(1e-5, 0.3 / TURN)))
@@ -186,7 +186,7 @@ def test_longest_step(solver):
 
 
 def test_longest_step_of_set_valued_runs(monkeypatch):
-    """It is handed on, unless what is given in time or the run ask for a shorter one."""
+    """The longest step is handed on, unless signals or the run ask for a shorter one."""
     handed = []
 
     def run(*_, longest, **__):

@@ -76,7 +76,7 @@ def total_energy(run):
     (Rodas5P(), 3e-9, 1e-6), (SetValued(), 1e-9, 2e-6), (Scipy("LSODA"), 1e-10, 1e-5)])
 @pytest.mark.parametrize("profile", PROFILES)
 def test_frictionless_mass_on_waves_at_rest_keeps_its_energy(profile, solver, rtol, tolerance):
-    """It glides over crests and through troughs, and bounces as it lands."""
+    """The mass glides over crests and through troughs, and bounces as it lands."""
     system = mass(PROFILES[profile])
     run = simulate(system, 0.4, initial=thrown(system, 3e-3, 0.12), outputs=401, rtol=rtol,
                    solver=solver)
@@ -237,14 +237,14 @@ def test_orbit_over_waves_followed_in_their_amplitude():
     swing = np.ptp(run.modal_coordinates, axis=0)
     low, top = last.values["minimum"][:2], last.values["maximum"][:2]
     assert top - low == pytest.approx(swing, rel=1e-3)
-    # The leaning force moves it along the ground; a vertical one would not.
+    # The force normal to the slope moves it along the ground; a vertical one would not.
     upright = simulate(high.with_(**{"ground.normal": "vertical"}), 61.0 * period, outputs=2001)
     late = upright.time > 60.0 * period
     assert np.ptp(upright.displacement(0)[late, 0]) < 0.5 * np.ptp(run.displacement(0)[:, 0])
 
 
 def test_derivatives_to_waves():
-    """Of the rates to amplitude and wavelength, leaning forces included, by differences."""
+    """Derivatives of the rates to amplitude and wavelength, on sloping ground, by differences."""
     field = contact_field(held(), ["ground.amplitude", "ground.wavelength"])
     rng = np.random.default_rng(7)
     t = rng.uniform(0.0, 1.0, 40)

@@ -153,7 +153,7 @@ def test_loads_even_out_by_the_closed_form():
         away = history.normal_force - N / 5
         expected = first * (1.0 - 2.0 / blocks) ** np.arange(blocks)[:, None]
         assert away == pytest.approx(expected, abs=2e-4 * np.abs(first).max())
-        # What is worn off is what the slip work takes.
+        # The worn volume follows from the slip work.
         assert np.diff(history.volume) == pytest.approx(
             1e-13 * history.acceleration * history.slip_work.sum(axis=1), rel=1e-12, abs=0.0)
         ends.append(history.depth[-1])

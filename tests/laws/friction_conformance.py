@@ -1,4 +1,4 @@
-"""What every friction law must do, whoever wrote it: checks that raise AssertionError."""
+"""Requirements on every friction law, also of users: checks that raise AssertionError."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What every normal law must do, checked on the law itself; for laws of users as well."""
+"""Requirements on every normal law, also of users: checks that raise AssertionError."""
 
 import math
 import pickle
@@ -62,7 +62,7 @@ def check_normal_law(law, u_range, v_range, *, two_sided=False, nodes=1):
 
 
 def check_forces(law, p, u_range, v_range, two_sided=False):
-    """What the function of the law returns, for one row of parameters."""
+    """Check the function of the law for one row of parameters."""
     check_values(law, p, u_range, v_range, two_sided)
     check_derivatives(law, p, u_range, v_range)
     check_continuity(law, p, u_range)

@@ -1,4 +1,4 @@
-"""What every friction law must do in two directions: checks that raise AssertionError."""
+"""Requirements on every friction law in two directions: checks that raise AssertionError."""
 
 from typing import NamedTuple
 

@@ -241,7 +241,7 @@ def test_seeds_reproduce():
     np.testing.assert_array_equal(first.height(xi), same.height(xi))
     assert np.abs(first.height(xi) - other.height(xi)).max() > 1e-7
     assert RandomRoughness(*options, seed=np.int64(7)) == first
-    # What numpy's manual prints for this seed.
+    # Numbers that numpy's manual prints for this seed.
     published = RandomRoughness(*options, seed=12345).series.phases[:3]
     assert np.array(published) / (2.0 * math.pi) == pytest.approx(
         [0.22733602, 0.31675834, 0.79736546], abs=5e-9)

@@ -244,7 +244,7 @@ def test_greenwood_williamson_in_si_units():
 
 
 def test_energy_of_a_body_far_above_the_surface():
-    """All that a Greenwood-Williamson contact can give back: C sigma F_5/2(h_0) / (5/2)."""
+    """Energy that a Greenwood-Williamson contact can give back: C sigma F_5/2(h_0) / (5/2)."""
     law = GreenwoodWilliamson(1e4, 1e-4, 1e11, 1e-6, separation=0.5)
     scale = law.table(np.ones(1))[0, 0]
     expected = -scale * 1e-6 * _asperity_integral(2.5, 0.5) / 2.5

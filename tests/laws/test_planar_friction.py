@@ -78,7 +78,7 @@ def mass_on(friction, components, depth=1e-5, weight=20.0):
 
 
 def test_a_mass_with_a_law_of_ones_own_is_thrown_askew():
-    """It stops on a straight line, as the mass in the plane does."""
+    """The mass stops on a straight line, as the mass in the plane does."""
     friction, angle, speed = Logarithmic(), 0.9, 0.5
     plane, rows = mass_on(friction, "xy")
     start = np.concatenate([np.linalg.solve(rows, [0.0, -1e-5]),
@@ -151,7 +151,7 @@ class OwnSpring(LimitedFriction):
 
 @dataclass(frozen=True)
 class OwnSpringInSpace(OwnSpring):
-    """The same with one."""
+    """Dahl's law with a function for two directions."""
 
     planar_kernel: ClassVar = _own_spring_in_two_directions
 

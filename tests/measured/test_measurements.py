@@ -1,4 +1,4 @@
-"""Files of measurements: what is read, in which units, and what is told to be wrong."""
+"""Files of measurements: values, units, and errors that are reported."""
 
 import h5py
 import numpy as np
@@ -161,7 +161,7 @@ def test_units_of_universal_files(tmp_path):
     found = read_measurement(tmp_path / "a.uff")
     assert found.channels[0].unit == "m/N"
     assert found.values[:, 0] == pytest.approx(1e-6 * RECEPTANCE, rel=1e-10)
-    # A label wins, and the contradiction is told.
+    # A label takes precedence, and a note reports the contradiction.
     pyuff.UFF(str(tmp_path / "b.uff")).write_sets([units(1e3, 1.0), function(
         ordinate_axis_units_lab="m", orddenom_axis_units_lab="N")], mode="add")
     found = read_measurement(tmp_path / "b.uff")

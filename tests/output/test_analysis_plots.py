@@ -138,7 +138,7 @@ def test_every_kind_is_drawn_from_a_stored_run(trajectory, tmp_path, capsys):
 
 
 def test_a_pendulum_is_drawn_across_the_ground(tmp_path):
-    """It has no motion along it: the drive's axis is the usual one, and zeros can be drawn."""
+    """Without motion along the ground the drive's axis is the usual one, and zeros can be drawn."""
     from systems import impact_oscillator
 
     trajectory = simulate(impact_oscillator(w=64.32), 0.5, outputs=801)

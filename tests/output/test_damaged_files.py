@@ -460,7 +460,7 @@ def test_shapes_that_cannot_be_drawn_are_refused(case, name, value, tmp_path):
 
 
 def test_reports_end_where_work_is_not_finite(case, tmp_path):
-    """As where the state is not: loads beyond all make such runs, files are damaged to them."""
+    """Work that is not finite, as after loads beyond all bounds or in damaged files."""
     found = read_case(case).trajectory
     work = found.work.copy()
     work[4:] = np.nan

@@ -259,7 +259,7 @@ def test_contact_groups_of_one_body_have_panels_of_their_own():
     ([5, 14, 23], [10, 10, 10], (), [[0, 9.5], [9.5, 18.5], [18.5, 28]]),
     # Displacement nodes of linear elements of 10, 20 and 10 mm, with nodes on the ends.
     ([0, 10, 30, 40], [5, 15, 15, 5], (), [[0, 5], [5, 20], [20, 35], [35, 40]]),
-    # Those of quadratic elements of 60 mm; two groups touch at 60 mm, where each has a node.
+    # Nodes of quadratic elements of 60 mm; two groups touch at 60 mm, where each has a node.
     ([0, 30, 60, 60, 90, 120], [10, 40, 10, 10, 40, 10], (("a", 3), ("b", 3)),
      [[0, 10], [10, 50], [50, 60], [60, 70], [70, 110], [110, 120]]),
 ])

@@ -247,7 +247,7 @@ def test_zoom_and_drag_move_the_view(browser, path):
         closer = opened.of_player("[200 - player.project(0.1, 0.01)[0], player.size]")
         ratio = closer[1] / world[1]
         assert ratio > 1.5
-        # What lies under the pointer stays there.
+        # The point under the pointer stays there.
         assert closer[0] == pytest.approx(ratio * world[0], rel=1e-6)
         opened.page.mouse.down()
         opened.page.mouse.move(stage["x"] + 230, stage["y"] + 110)

@@ -19,7 +19,7 @@ from fecontact.output.report import notebook
 
 pytest.importorskip("anywidget")
 
-# What a notebook does: it loads the module, gives it a model and a place, and ends it.
+# Stand-in for a notebook: loads the module, gives it a model and a place, and ends it.
 HOST = """<!doctype html><title>notebook</title><body style="width: 1100px">
 <p id="text">text of the notebook</p><div id="one"></div><div id="two"></div>
 <script type="module">

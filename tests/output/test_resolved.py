@@ -104,7 +104,7 @@ def test_outputs_stay_and_energies_balance():
 
 
 def test_slip_is_measured_along_the_motion():
-    """What slips of the mass bring it back is what the belt has carried it forth."""
+    """Slips bring the mass back by the way that the belt has carried it forth."""
     system = friction_oscillator(2)
     run = fc.simulate(system, 8.0 * 2.0 * np.pi / 13.8, outputs=33)
     fine = resolved(run).trajectory
@@ -155,7 +155,7 @@ def test_pictures_say_where_they_are_too_coarse(tmp_path):
     assert " ".join(wide.texts[0].get_text().split()) == found.note
     assert not plot_phase(hit(7), component="y").texts
     assert "has kept nothing" in resolved(hit(7, keep_steps=False)).note
-    # As after a run that was too long: two of the rows are left.
+    # Stand-in for a run that was too long: two of the kept rows are left.
     run = hit(7)
     sparse = replace(run, kept=run.kept.part(slice(None, None, len(run.kept.time) // 2)))
     assert "too long to keep more" in resolved(sparse).note

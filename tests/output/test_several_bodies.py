@@ -64,7 +64,7 @@ def leaning():
 
 
 def test_forces_act_along_the_directions_of_each_node(leaning):
-    """Along the leaning face friction acts in -t, the normal force along n."""
+    """Along the inclined face friction acts in -t, the normal force along n."""
     t, n = np.array([np.cos(0.7), np.sin(0.7)]), np.array([-np.sin(0.7), np.cos(0.7)])
     forces = contact_forces(leaning)
     assert np.abs(leaning.friction_force).max() > 1.0
@@ -152,7 +152,7 @@ def test_pictures_of_two_bodies_show_arrows_in_their_directions(leaning, tmp_pat
 
 @rendering
 def test_names_are_written_into_the_scene(trajectory):
-    """What differs from the picture without names lies about the nodes that carry them."""
+    """Differences from the picture without names lie about the nodes that carry the names."""
     motion = motion_of(trajectory)
     with scene_of(motion, 960, 432) as scene:
         named = scene.image(4).astype(int)

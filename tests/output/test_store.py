@@ -299,7 +299,7 @@ def test_pvd_lists_frames_that_vtk_reads(tmp_path):
 
 
 def test_pvd_frames_hold_velocity_and_contact_state(tmp_path):
-    """What VTK reads from VTU files is what it reads from the temporal file."""
+    """VTK reads equal data from the VTU files and from the temporal file."""
     trajectory = run(basis(LENGTH, HEIGHT, columns=20, rows=2), times=31)
     reader, times = open_by_vtk(write_case(tmp_path / "case.vtkhdf", trajectory, frames=31))
     listed = export_pvd(trajectory, tmp_path / "frames", frames=31)

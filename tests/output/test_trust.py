@@ -91,7 +91,7 @@ def ran(stored):
 
 
 def test_what_is_stored_needs_no_code(stored):
-    """All that pictures and tables show is that of the run, to the last bit."""
+    """Pictures and tables show the run to the last bit."""
     safe = fc.read_case(stored).trajectory
     assert not ran(stored)
     energies, contact = safe.energies, safe.contact_state

@@ -59,7 +59,7 @@ def test_chain_of_two_masses():
 
 
 def test_damped_eigenvalues_of_the_chain():
-    """Those of the modal equations are the roots of det(M s^2 + C s + K), from its polynomial."""
+    """Eigenvalues of the modal equations are the roots of det(M s^2 + C s + K), a polynomial."""
     D = 0.1
     basis = chain(D)
     A = np.block([[np.zeros((2, 2)), np.eye(2)],

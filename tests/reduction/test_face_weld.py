@@ -65,7 +65,7 @@ def test_blocks_whose_meshes_do_not_match_converge():
     assert errors[0] < 0.03
     assert errors[1] < 0.15 * errors[0]
     assert errors[2] < 1e-3
-    # As exact as the whole block meshed as coarsely.
+    # At least as exact as the whole block with the coarse mesh.
     coarse = np.abs(whole(8, 4)[:5] / fine - 1.0).max()
     assert errors[1] < coarse
 

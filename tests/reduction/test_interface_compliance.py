@@ -113,7 +113,7 @@ def test_residual_vectors_resolve_all_of_it(bodies, pairing):
 
 
 def test_boundaries_of_a_single_body_are_interfaces_too(bodies):
-    """As the report of the basis says of the nodes, along x and y."""
+    """The compliance agrees with the contact errors of the basis's report, along x and y."""
     body = ElasticBody(rectangle(0.12, 0.04, 8, 3), thickness=0.05)
     basis = modal_basis(body, 7, contact="bottom", contact_nodes=5)
     found = interface_compliance(basis, body)

@@ -281,7 +281,7 @@ def test_another_load_works_on_the_quadratic_displacement():
 
 
 def test_the_potential_ends_with_the_fourth_degree():
-    """What it lacks of a cantilever's forces, of the fifth degree, grows with the fourth power.
+    """Error of a cantilever's forces, of the fifth degree, grows with the fourth power.
 
     Relative to the load; twice the range has sixteen times the error.
     """

@@ -15,7 +15,7 @@ from fecontact.reduction import Recovery, rows_from_dofs
 SIZE = 8
 STIFFNESS = np.diag(np.r_[2.0 * np.ones(SIZE - 1), 1.0]) - np.eye(SIZE, k=1) - np.eye(SIZE, k=-1)
 MASS = np.diag(np.arange(1.0, SIZE + 1.0))
-# As Nastran punches it: two points with displacements, and two scalar points.
+# Cards as Nastran punches them: two points with displacements, and two scalar points.
 EXTERNAL = ("BEGIN SUPER        7\n$ EXTRN DATA\n"
             "EXTRN          3     123      11     123 2995001       0 2995002       0\n")
 LABELS = [[3, 1], [3, 2], [3, 3], [11, 1], [11, 2], [11, 3], [2995001, 0], [2995002, 0]]
@@ -148,7 +148,7 @@ def test_modes_of_ansys():
     # Bending modes come in pairs, which may be turned.
     for pair in ([0, 1], [2], [3, 4], [5]):
         assert alike[np.ix_(pair, pair)].sum(axis=0) == pytest.approx(1.0, abs=2e-3)
-    # As a basis, with pictures: coordinates of the file are its six modes.
+    # A basis with pictures: coordinates of the file are its six modes.
     row = modes.labels.tolist().index([1, 3])
     basis = fc.basis_from_modes(
         modes.matrix, rows_from_dofs(963, [[row - 2, row - 1, row]], dimension=3), dimension=3,

@@ -125,7 +125,7 @@ def test_no_row_lacks_more_than_the_tolerance(room, layers, held, monkeypatch):
 
 
 def test_rows_that_lack_too_much_are_answered_by_all_displacements(monkeypatch):
-    """Where a sample of the rows was satisfied with fewer than all of them need."""
+    """A sample of the rows is satisfied with fewer displacements than all rows need."""
     body = column()
     system, rows = FreeSystem.of(body, "iterative"), loaded_rows(body)
     modes = free_modes(FreeSystem.of(body, "direct"), 12)

@@ -160,7 +160,7 @@ def free_free_shape(root, x):
 
 
 def clamped_free_shape(root, x):
-    """The same for a beam clamped at x = 0."""
+    """Bending shape of a beam clamped at x = 0, of length one, mean square one, and its slope."""
     s = (np.cosh(root) + np.cos(root)) / (np.sinh(root) + np.sin(root))
     z = root * x
     w = np.cosh(z) - np.cos(z) - s * (np.sinh(z) - np.sin(z))
@@ -305,7 +305,7 @@ def test_reversed_and_shuffled_edges_make_no_difference(n):
 
 
 def renumbered(mesh, seed=0):
-    """The same mesh with its nodes in another order."""
+    """Copy of the mesh with its nodes in another order."""
     number = np.random.default_rng(seed).permutation(len(mesh.nodes))
     nodes = np.empty_like(mesh.nodes)
     nodes[number] = mesh.nodes

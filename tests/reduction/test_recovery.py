@@ -48,7 +48,7 @@ def grid(body):
 
 
 def punched(body, labels):
-    """As EXTSEOUT: names of the coordinates, and of the rows of MUG1, last point first."""
+    """EXTRN and MUG1 cards of EXTSEOUT: coordinates, and rows of MUG1, last point first."""
     points = dict.fromkeys(labels[labels[:, 1] > 0, 0].tolist())
     words = [word for point in points for word in (point, 123)]
     words += [word for point, way in labels.tolist() if not way for word in (point, 0)]

@@ -135,7 +135,7 @@ def test_rotating_disc_of_lamb_and_southwell():
 
 
 def test_centrifugal_load_presses_a_contact():
-    """A block beyond the axis leans on a stop with m W^2 r, as in the plane."""
+    """A block beyond the axis presses on a stop with m W^2 r, as in the plane."""
     W, size = 50.0, (0.04, 0.04, 0.05)
     body = block_body((1, 1, 1), size, material=STEEL, fixed={"left": "xy"})
     centre = (0.02, 0.02, 2.0)
@@ -152,7 +152,7 @@ def test_centrifugal_load_presses_a_contact():
 
 
 def test_bodies_that_rotate_together_press_each_other(tmp_path):
-    """A block that can slide outwards leans on the next one with m W^2 r."""
+    """A block that can slide outwards presses on the next one with m W^2 r."""
     W, size = 40.0, 0.1
     rotation = Rotation(W, (-0.5, 0.5 * size), stress_stiffening=False)
     bodies = {"inner": ElasticBody(rectangle(size, size, 2, 2), STEEL, fixed={"bottom": "y"}),

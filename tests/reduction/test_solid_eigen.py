@@ -222,7 +222,7 @@ def test_modal_bases_agree(nodes):
 
 
 def test_cholmod_where_it_is_installed():
-    """The same modes and flexibility, and the same complaint, as by SuperLU."""
+    """CHOLMOD agrees with SuperLU and the iterative solver, and refuses a singular stiffness."""
     pytest.importorskip("sksparse.cholmod")
     body = ElasticBody(block((4, 3, 3)), STEEL)
     system = FreeSystem.of(body, "direct")

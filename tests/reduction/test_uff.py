@@ -104,7 +104,7 @@ def test_axes(tmp_path, axes, components, turn, x):
 
 @pytest.mark.parametrize("kind", [15, 2411])
 def test_units(tmp_path, kind):
-    """The same shape and mass in millimetres, newtons and tonnes."""
+    """Equal shape and mass from a file in metres and one in millimetres, newtons and tonnes."""
     places = np.array([(0.0, 0.0, 0.0), (0.1, 0.0, 0.2), (0.3, 0.4, 0.5)])
     metres = read_uff(written(tmp_path / "m.uff", nodes(kind, places), mode()))
     millimetres = read_uff(written(tmp_path / "mm.uff", units(1000.0, 1.0),

@@ -608,7 +608,7 @@ def test_names_of_movies_that_mean_something_to_the_encoder(name, place, tmp_pat
 
 
 def test_in_a_process_of_its_own(place):
-    """As people meet it: the largest picture, a name that is too long, bytes that are no text."""
+    """Errors of the command: the largest picture, a name too long, bytes that are no text."""
     for tokens in (["render", "run.vtkhdf", "--size", "100000", "100000"],
                    ["mesh", "n" * 300 + ".toml"],
                    [b"mesh", b"\xff\xfe.toml"]):

@@ -403,7 +403,7 @@ def test_changes_of_unknown_interfaces_name_the_nearest(study):
     ("piecewise-spring", {"elongations": [-1e-3, 0.0, 1e-3], "forces": [-10.0, 0.0, 90.0],
                           "preload": 30.0})])
 def test_nonlinear_springs_join_points_of_bodies(study, kind, keys):
-    """The same system as in Python; its preload presses the pad on the block."""
+    """The system equals the one made in Python; its preload presses the pad on the block."""
     point = {"bodies.pad.basis.points": {"P": [0.06, 0.06]}}
     bolt = {"kind": kind, "first": "pad.P", "direction": [0.0, 1.0], **keys}
     linked = study.with_(**point, **{"links.bolt": bolt})

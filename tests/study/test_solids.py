@@ -162,7 +162,7 @@ def test_two_solids_run_as_in_python():
     assert study.system().parameters() == system.parameters()
     run = study.run()
     same_runs(run, fc.simulate(system, 1e-3, outputs=21))
-    # What slides below drags the pad along its direction.
+    # The moving ground drags the pad along its direction.
     total = run.friction_forces[1:].sum(axis=1)
     along = np.array([1.0, 2.0]) / 5.0**0.5
     assert (-total @ along > 0.9 * np.linalg.norm(total, axis=1)).all()

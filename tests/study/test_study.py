@@ -128,7 +128,7 @@ def test_resolved_study_reads_back_the_same(text):
 
 @pytest.mark.parametrize("shape", TEMPLATES)
 def test_keys_that_a_study_gives(shape):
-    """What a study gives stays, also defaults; what it leaves out is not there."""
+    """Keys that a study gives stay, also defaults; keys that it leaves out do not appear."""
     text = template(shape)
     study = Study.from_toml(text)
     short = with_given_keys(study.to_toml())

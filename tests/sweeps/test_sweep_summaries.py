@@ -75,7 +75,7 @@ def test_contact(run):
 
 
 def test_forces_of_one_of_several_interfaces():
-    """Those of both interfaces add up to those of the whole system."""
+    """Forces of both interfaces add up to the force of the whole system."""
     stack = stack_run()
     found = values(stack, *(f"{kind}_{force}_force{at}" for kind in ("mean", "peak")
                             for force in ("normal", "friction") for at in ("", "@shoe", "@foot")))

@@ -142,7 +142,7 @@ class Model:
         out["modal_damping"] = rate @ self.C @ rate
         for j in range(self.n):
             F, R, u, v, slip, slope = self.node(j, t, y)
-            # What the normal force does on the body beyond what goes into the contact.
+            # Work of the normal force on the body beyond the work that goes into the contact.
             out["belt_normal"] += F * slope * slip - self.leaning(F, slope) * (
                 slip + self.values["ground.speed"])
             out["belt_friction"] -= R * self.values["ground.speed"]

@@ -18,7 +18,7 @@ def node(friction, load=10.0, held=HELD, normal=None, **parts):
 
 
 def jenkins(stiffness=2e4, coefficient=0.4, load=10.0, **parts):
-    """The same with a Jenkins element, whose force is at most 4 N by default."""
+    """A node with a Jenkins element, whose force is at most 4 N by default."""
     return node(JenkinsFriction(stiffness, coefficient), load, **parts)
 
 

@@ -63,7 +63,7 @@ def test_euler_column_in_the_plane():
     lambda: solid_column(20), lambda: solid_column(80, 1, "incompatible"),
     lambda: solid_column(20, tetrahedra=True)], ids=["Q2", "incompatible", "P2"])
 def test_euler_column_in_space(body):
-    """It buckles about its weak axis first, then about the strong one, 1.44 times as stiff."""
+    """Buckling is first about the weak axis, then about the strong one, 1.44 times as stiff."""
     found = buckling_loads(body(), PRESSED, 2)
     assert found.load_factors * 1e6 == pytest.approx([EULER, 1.44 * EULER], rel=3e-3)
     tip = np.abs(found.shapes[found.state.nodes[:, 0] > L - 1e-9]).max(axis=0)

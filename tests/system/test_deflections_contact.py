@@ -183,7 +183,7 @@ def test_a_belt_slips_on_a_drum():
     assert path.normal_force[-1].all()
     assert np.linalg.norm(path.friction_force[-1], axis=1) == pytest.approx(
         mu * path.normal_force[-1])
-    # Away from both ends, where the belt bends and leans out: nodes are halves of cells.
+    # Away from both ends, where the belt bends and lifts off: nodes are halves of cells.
     phi = np.linspace(0.0, angle, 65)
     for first, last in ((8, 32), (32, 56)):
         part = path.normal_force[-1, first : last + 1]

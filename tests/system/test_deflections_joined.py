@@ -217,7 +217,10 @@ def coupled(kind, factor, columns=48):
 
 
 def test_a_force_on_a_distributing_coupling():
-    """It is spread over the end and makes nothing stiff: Mattiasson at P L^2 / EI = 2."""
+    """A distributing coupling spreads the force and adds no stiffness.
+
+    Mattiasson's cantilever at P L^2 / EI = 2.
+    """
     with pytest.warns(ModelWarning, match=r"turns by 0\.\d+ rad"):
         x, y = coupled("distributing", 2.0)
     assert [-x, y] == pytest.approx([0.16064, 0.49346], rel=4e-3)

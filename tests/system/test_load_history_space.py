@@ -290,7 +290,7 @@ def table(ground, friction=None):
 
 @pytest.mark.parametrize("ground", GROUNDS)
 def test_work_is_stored_or_lost(ground):
-    """All that does work, along paths in space: drive in x, y, z, travel in x and y, the load."""
+    """Work of all actions along paths in space: drive in x, y, z, travel in x and y, the load."""
     path = LoadPath(load_scale=(1.0, 1.3, 0.8, 1.0), motion_x=(0.0, 2e-4, -1e-4, 1e-4),
                     motion_y=(0.0, -1e-4, 2e-4, 0.0), motion_z=(0.0, 1e-4, -2e-4, 1e-4),
                     travel=(0.0, 1e-4, 3e-4, -1e-4), travel_y=(0.0, 2e-4, -1e-4, 1e-4), steps=20)

@@ -277,7 +277,7 @@ def driven_mass():
                        frequency_hz=4.0 / TURN)},
     {"load.normal": 12.0}, {"load": Load(5.0), "drive.damping_y": 0.3}])
 def test_a_system_under_another_excitation_is_that_made_anew(changes):
-    """It shares what has been checked already; its arrays are those of a new system."""
+    """Checked parts are shared; the arrays equal those of a new system."""
     system = driven_mass()
     found = system.with_(**changes)
     parts = {"drive": system.drive, "load": system.load}

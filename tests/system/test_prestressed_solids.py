@@ -45,7 +45,7 @@ def test_stuck_block_stands_on_springs(block, ratio):
 
 
 def test_rigid_sticking_holds_both_tangents(block):
-    """As the mesh with its patches held along x and y, by penalties that scipy gets."""
+    """Modes agree with those of the mesh, its patches held along x and y by penalties, by scipy."""
     body, basis, system = block
     history = load_history(system, LoadPath(forces=((0.0, 300.0), (0.0, -200.0)), steps=2),
                            tangential_ratio=np.inf)
@@ -85,7 +85,7 @@ def test_a_slider_holds_across_its_way(ratio):
         free[:2, 2], free[2, 2] = -mu * c_N * a, c_N
     exact = np.sort(np.sqrt(np.linalg.eigvals(free).real)) / (2.0 * np.pi)
     assert held.frequencies_hz == pytest.approx(exact, rel=1e-8)
-    # What grows or not is in the shapes: away from the ground drives along a.
+    # Growth depends on the shape: motion away from the ground drives motion along a.
     mode = int(np.argmin(np.abs(held.frequencies_hz - np.sqrt(c_N) / (2.0 * np.pi))))
     x, y, z = (system.basis.contact_T[0, :3] @ held.right[:3, mode])
     assert np.array([x, y]) / z == pytest.approx(mu * c_N / (2e5 - c_N) * a, rel=1e-6)

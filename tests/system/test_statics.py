@@ -256,7 +256,7 @@ def slope(ground, xi):
 @pytest.mark.parametrize("stiffness", [2e3, 5610.0, 1e5])
 @pytest.mark.parametrize("time", [0.0, 0.7, 1.4])
 def test_mass_on_a_wave(time, stiffness):
-    """It leans on the slope: c_x x = -F y_R', on the side of the trough."""
+    """The slope balances the spring: c_x x = -F y_R', on the side of the trough."""
     system = mass_point(ground=WAVE, drive=Drive(stiffness_x=stiffness))
     x, y = system.basis.T[2, :2] @ equilibrium(system, time=time).modal_coordinates
 

@@ -153,7 +153,7 @@ def test_right_hand_side_jacobian_and_powers(case, parts):
         assert value == pytest.approx(expected[name], rel=1e-7, abs=1e-10 * largest), name
     for name in ("modal_damping", "dashpots", "contact_damping", "friction"):
         assert got[name] >= -1e-12 * largest, name
-    # What is put in and not lost is stored.
+    # Power that is put in and not lost is stored.
     balance = (got["drive"] + got["belt_normal"] + got["belt_friction"] + got["load"]
                - got["modal_damping"] - got["dashpots"] - got["contact_damping"]
                - got["friction"])

@@ -78,7 +78,7 @@ def test_partial_slip_is_that_of_cattaneo_and_mindlin(found):
 
 
 def test_loop_is_that_of_increments_without_time(found):
-    """The same rings, solved without inertia, rates and springs, to 0.1 %; Masing's loss."""
+    """Loop of the same rings without inertia, rates and springs, to 0.1 %; Masing's loss."""
     system = found.run.system
     travels = found.exact.displacement(0.75) * np.linspace(0.0, 1.0, 801)[1:]
     forces = increments(system, ts.MU * found.run.normal_force[0], travels)

@@ -98,7 +98,7 @@ def slipping(branch: Branch, fastest: float, points: int = 200) -> Branch:
 
 
 def scales(motion: PeriodicMotion) -> NDArray[np.float64]:
-    """What counts as one in the length of a step: all displacements alike, all velocities alike."""
+    """Scales of the states: one for all displacements, one for all velocities."""
     size = np.ptp(motion.states, axis=0) / 2.0
     modes = len(size) // 2
     return 10.0 * np.repeat([size[:modes].max(), size[modes:].max()], modes)
@@ -122,7 +122,7 @@ def amplitude(point: BranchPoint) -> float:
 
 
 def run_amplitude(motion: PeriodicMotion) -> float:
-    """The same of a run [mm]."""
+    """Half the way of point B in a run [mm]."""
     row = contact_field(beam(), {}).displacement_row("B")
     return 500.0 * float(np.ptp(motion.states @ row))
 

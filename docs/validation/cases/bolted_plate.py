@@ -210,7 +210,7 @@ def plot(mode: StuckMode, estimated: np.ndarray, runs: list[np.ndarray], path: P
     with new_figure(10.0, 3.4, path) as figure:
         cycle, frequency, damping = figure.subplots(1, 3)
         x = one.deflection - 0.5 * (one.deflection.max() + one.deflection.min())
-        # What a spring of the same tips would need is taken off, or the loop would be a line.
+        # The secant through the tips is subtracted: the loop would look like a line otherwise.
         spring = one.force.max() / one.amplitude * x
         cycle.plot(scale * x, (one.force - spring) / one.force.max(), color=COLOURS[0])
         cycle.set(xlabel="free end [mm]", ylabel="(force - secant) / largest force")

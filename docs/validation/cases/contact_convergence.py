@@ -34,7 +34,7 @@ LENGTH, HEIGHT = 0.2, 0.02
 
 @dataclass(frozen=True)
 class Row:
-    """What one mesh gives; lengths in m, forces in N."""
+    """Results on one mesh; lengths in m, forces in N."""
 
     element_size: float
     nodes: int

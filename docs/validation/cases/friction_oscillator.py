@@ -2,7 +2,7 @@
 
 With two modes (rigid along and across the belt) the motion is one loop of stick and slip in the
 phase plane. A third, elastic mode vibrates at the drive after each slip; waves of the belt make
-slips of many lengths, whether the contact force is vertical, as in the source, or leans with the
+slips of many lengths, whether the contact force is vertical, as in the source, or normal to the
 slopes. So do a wave spectrum and a coefficient of friction that varies along the
 belt. At last the block is a soft finite-element body, whose face sticks and slips in parts.
 
@@ -46,7 +46,7 @@ LAWS: dict[str, Any] = {
     "load": fc.Load(normal=NORMAL_FORCE),
 }
 EVEN = fc.Ground(speed=BELT_SPEED)
-# The source keeps the contact force vertical; that of the surface leans with the slope.
+# The source keeps the contact force vertical; "surface" makes it normal to the slope.
 WAVY = fc.Ground(speed=BELT_SPEED, amplitude=200e-6, wavelength=2.5e-3, normal="vertical")
 LEANING = replace(WAVY, normal="surface")
 
@@ -70,7 +70,7 @@ def oscillator(modes: int, ground: fc.Ground = EVEN, **laws: Any) -> fc.ContactS
 
 
 def prescribed(modes: int = 1) -> fc.ContactSystem:
-    """The same normal force without a mode across the belt: found from the static equilibrium."""
+    """The normal force of the static equilibrium, prescribed, without a mode across the belt."""
     force = fc.equilibrium(oscillator(2)).normal_force[0]
     return oscillator(modes, normal=PrescribedForce(float(force)), load=fc.Load())
 

@@ -1,4 +1,4 @@
-"""Which pendulum is the impact oscillator? Three dimensions found from three modal numbers.
+"""Dimensions of the pendulum of the impact oscillator, three found from three modal numbers.
 
 The source gives the mass reduced to the contact, 0.092 kg, and no bending mode. Periodic, chaotic
 and chattering motions come out as reported with a first bending mode at 230.0 Hz whose amplitude

@@ -1,4 +1,4 @@
-"""Where the motions of the impact oscillator lie: over the drive's frequency, and over the body.
+"""Motions of the impact oscillator over the drive's frequency, and over the bending mode.
 
 A bifurcation diagram from 0.8 to 12.8 Hz, followed upwards and downwards, shows which motions exist
 side by side. A map over frequency and damping of the bending mode, which the source does not give,

@@ -226,7 +226,7 @@ def _meets(branch: Branch, frequency_hz: float, y: Array) -> bool:
 
 
 def pieces(branch: Branch, low: float, high: float, marked: bool) -> list[Branch]:
-    """What of a branch lies within a range, with its section; doublings stand on single orbits."""
+    """Pieces of a branch in a range, with their section; doublings stand on single orbits."""
     found: list[list[BranchPoint]] = [[]]
     for point in branch.points:
         inside = low <= point.parameter <= high

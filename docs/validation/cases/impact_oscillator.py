@@ -102,7 +102,7 @@ def settled(system: ContactSystem, initial: np.ndarray | None = None, *, transie
 
 @dataclass(frozen=True)
 class Regime:
-    """What a settled motion is.
+    """Kind of a settled motion: its period, impacts and rests.
 
     Attributes
     ----------

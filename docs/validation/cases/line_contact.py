@@ -71,7 +71,7 @@ class LineContact:
 
     @property
     def uncoupled_part(self) -> float:
-        """The same from the shear in the middle, mu p_0 (1 - c / b) if p and q are not coupled."""
+        """Half-width of stick over b, 1 - c / b = q(0) / (mu p_0), if p and q are not coupled."""
         middle = np.abs(self.x) < 0.3 * self.half_width
         q, p = (np.polyfit(self.x[middle] ** 2, values[middle], 2)[-1]
                 for values in (self.shear, self.pressure))

@@ -117,7 +117,7 @@ class PressedSphere:
         return float((field.nodes + field.displacement)[outside, 2].min())
 
     def beyond(self, axis: int) -> float:
-        """What the body gives way beyond a half-space under uniform traction on the face [m/N].
+        """Compliance of the body beyond a half-space under uniform traction on the face [m/N].
 
         Along the first tangent or, 2, the normal; its top is at rest.
         """

@@ -59,7 +59,7 @@ def run(sliding: fc.ContactSystem, outputs: int = 1201) -> fc.Trajectory:
 
 
 def motion(one: fc.Trajectory) -> Array:
-    """What errors are measured by: x of B, y of C, y of the right end, (3, N) [m]."""
+    """Displacements that are compared: x of B, y of C, y of the right end, (3, N) [m]."""
     return np.stack([one.displacement("B")[:, 0], one.displacement("C")[:, 1],
                      one.displacement("end")[:, 1]])
 

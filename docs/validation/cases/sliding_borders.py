@@ -1,4 +1,4 @@
-"""Where stick-slip ends, and how stick phases come and go: sliding bifurcations.
+"""Sliding bifurcations: the end of stick-slip, and the birth and loss of stick phases.
 
 A mass on a belt (m = k = 1, F_N = 1) with static friction 1 and kinetic friction 1/2: stick ends at
 x = 1 - c V with the speed V, slip is a damped vibration about x = 1/2, and where its next crest

@@ -37,7 +37,7 @@ ELEMENTS: dict[str, tuple[Literal["tetrahedron", "hexahedron"], int]] = {
     "Q2": ("hexahedron", 2)}
 PLATE_STEEL = Material(2e11, 0.3, 8000.0)
 PLATE_SIDE, PLATE_HEIGHT = 10.0, 1.0  # m
-# What holds the plate: lines along its bottom edges, its sides along z, or these across too.
+# Supports of the plate: lines along its bottom edges, its sides along z, or these across too.
 SUPPORTS = {"lines": {"bottom_edges": "z"},
             "sides": dict.fromkeys(("left", "right", "front", "back"), "z"),
             "walls": {"left": "yz", "right": "yz", "front": "xz", "back": "xz"}}
@@ -169,7 +169,7 @@ def lamb_hz(halves: tuple[int, int]) -> float:
 
 
 def mindlin_hz(halves: tuple[int, int]) -> float:
-    """The same by Mindlin's theory of plates with his factor of shear, pi^2 / 12."""
+    """Frequency of the plate [Hz] by Mindlin's theory with his shear factor pi^2 / 12."""
     E, nu, rho = (PLATE_STEEL.youngs_modulus, PLATE_STEEL.poisson_ratio, PLATE_STEEL.density)
     h, k2 = PLATE_HEIGHT, (np.pi * np.hypot(*halves) / PLATE_SIDE) ** 2
     shear, bending = np.pi**2 / 12.0 * E / (2.0 * (1.0 + nu)), E * h**3 / (12.0 * (1.0 - nu**2))

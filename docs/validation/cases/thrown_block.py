@@ -67,7 +67,7 @@ class Throw:
 
     @property
     def stuck_at(self) -> np.ndarray:
-        """Where it sticks in the room, from its place on the belt at the end [m]."""
+        """Place in space where the mass sticks, from its place on the belt at the end [m]."""
         return self.places[-1] - BELT * (self.run.time[-1] - self.stop)
 
     @property

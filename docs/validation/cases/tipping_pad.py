@@ -52,7 +52,7 @@ def forces(system: fc.ContactSystem) -> tuple[np.ndarray, np.ndarray]:
 
 
 def resultant(normal: np.ndarray) -> np.ndarray:
-    """Where normal forces act together, from the middle of the pad (2,) [m]."""
+    """Centre of the normal forces, from the middle of the pad (2,) [m]."""
     places = pad().contact_places[:, :2]
     return np.asarray(normal @ places / normal.sum() - [0.5 * LENGTH, 0.5 * WIDTH])
 

@@ -158,7 +158,7 @@ def attractors(v0: float, diagram: dict[str, Branch]) -> list[tuple[str, np.ndar
 
 
 def basins_of_attraction(v0: float, count: int = 60) -> tuple[Basins, list[np.ndarray]]:
-    """Where starts of the second mass lead at v_0, B = 20; and the rows that give x_3 and x_3'.
+    """Basins of starts of the second mass at v_0, B = 20; and the rows that give x_3 and x_3'.
 
     The first mass begins at its place in steady sliding, and at rest.
     """

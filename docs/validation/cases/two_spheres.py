@@ -123,7 +123,7 @@ def spheres(rings: int, poisson_ratio: float = RATIO, part: float = PART, angle:
     n = rings
     stiffness = np.kron(np.linalg.inv(compliance(edges)), np.diag([1.0 / along, 1.0 / along,
                                                                    1.0 / normal]))
-    # What is far from the contact approaches as a whole: the last degree of freedom.
+    # The last degree of freedom is the approach of all points far from the contact.
     moved = np.zeros((3 * n, 1))
     moved[2::3] = 1.0
     full = np.block([[stiffness, -stiffness @ moved],
