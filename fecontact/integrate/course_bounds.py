@@ -1,8 +1,8 @@
-"""Bounds on the course of a step, which tell that no contact can have changed within it.
+"""Bounds on the step polynomials, which show that no contact can have changed within a step.
 
-Most steps need no such search: a mode deviates from the straight line between its ends by at most
-the deviation of its coefficients from that line, and a node by at most the sum over the modes. For
-few nodes on flat ground it is cheaper to evaluate the coefficients themselves.
+Most steps need no search for changes: a mode deviates from the straight line between its ends by
+at most the deviation of its coefficients from that line, and a node by at most the sum over the
+modes. For few nodes on flat ground it is cheaper to evaluate the coefficients themselves.
 """
 
 from fecontact.core.compiled import helper, routine
@@ -25,10 +25,10 @@ _FEW = 4
 
 @routine
 def restless(step, problem, progress, room):
-    """Whether :func:`doubtful` may be true.
+    """True if :func:`doubtful` may return True; costs less.
 
-    ``room.ends`` and ``room.nodes`` hold the nodes at both ends, ``room.given`` the ground at the
-    end.
+    ``room.ends`` and ``room.nodes`` hold the nodes at both ends, ``room.given`` the motion of the
+    ground at the end.
     """
     s, control = problem.system, problem.control
     if len(s.gap) <= _FEW and control.ground[STEEPEST] == 0.0:
@@ -48,7 +48,7 @@ def _range(first, last, k1, k2, k3):
 
 @helper
 def _restless_nodes(moved, h, s, blocks, control, room):
-    """As :func:`doubtful`, without slip velocities of nodes clear of the ground."""
+    """Tests of :func:`doubtful` for few nodes on flat ground, without slip of open nodes."""
     levels, ends, nodes, dense = control.levels, room.ends, room.nodes, room.dense
     shapes = blocks.shapes
     n, m = len(s.gap), len(control.largest)
@@ -88,7 +88,7 @@ def _restless_nodes(moved, h, s, blocks, control, room):
 
 @helper
 def _restless_modes(step, problem, progress, room):
-    """The same for many nodes, from the modes only."""
+    """Tests of :func:`doubtful` for many nodes or wavy ground, by bounds on the modes."""
     s, blocks, control = problem.system, problem.blocks, problem.control
     bounds, levels, ends, nodes, dense = (control.ground, control.levels, room.ends, room.nodes,
                                           room.dense)
@@ -153,7 +153,7 @@ def _departure(k1, k2, k3):
 
 @routine
 def doubtful(moved, h, s, bounds, levels, slip_scale, room):
-    """Whether forces within the step may differ from what its ends suggest.
+    """True if forces within the step may differ from what the values at its ends suggest.
 
     A gap or slip velocity may change sign more often than its end values show, a contact be twice
     as deep in between, or slip begin and end. ``levels`` (k, n) are the penetrations at which

@@ -179,7 +179,7 @@ def keep_ends(n, room):
 
 @helper
 def ground_part(part, course):
-    """What the ground adds at a part of the step: its height under the node, or its speed."""
+    """Contribution of the ground at a part of the step: height under the node, or its speed."""
     s, step, row = course.system, course.step, course.row
     now = min(step.t + part * step.h, step.latest)
     if course.what == SLIP:

@@ -1,4 +1,4 @@
-"""What is watched for, as the compiled integrator takes it."""
+"""Events of a run as arrays for the compiled integrator."""
 
 from collections.abc import Sequence
 from typing import Any

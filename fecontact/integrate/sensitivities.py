@@ -187,7 +187,7 @@ def differentiated(
     system: ContactSystem, times: Array, state: Array, parameter: Parameter | None, solver: Solver,
     rtol: float, derivative_rtol: float | None = None, max_step: float | None = None,
 ) -> Sensitivity:
-    """As :func:`sensitivity`, from a state and without its warning."""
+    """Sensitivity as in :func:`sensitivity`, from a given state and without its warning."""
     if not isinstance(solver, CompiledSolver):
         return _differences(system, times, state, parameter, solver, rtol, max_step)
     vary = True if parameter is None else _moved(system, parameter, times, state)

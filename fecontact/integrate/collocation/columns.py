@@ -285,11 +285,11 @@ def propagate(
     t: float, h: float, latest: float, before: float, near: float, problem: run_arrays.Problem,
     progress: run_arrays.Progress, room: run_arrays.Room, c: Collocation, vary: Vary,
 ) -> float:
-    """Carry the columns over the step whose stages ``c`` holds; the largest error of one.
+    """Carry the columns over the step whose stages ``c`` holds; return the largest error of one.
 
-    It is relative to the size of the column, or to the part ``faded`` of the largest it has been.
-    The step goes on for the part ``before`` of it after a switch of forces, which its last stage
-    does not feel, and which is found to the part ``near``.
+    The error is relative to the size of the column, or to the part ``faded`` of its largest size so
+    far. The step continues for its part ``before`` after a switch of forces, which its last stage
+    does not feel. The switch is located to the part ``near`` of the step.
     """
     s, v = problem.system, vary.variation
     count, m = v.pushed.shape

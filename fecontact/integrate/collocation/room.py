@@ -1,4 +1,4 @@
-"""What steps by collocation work on, and the systems that take them."""
+"""Workspace of steps by collocation, and the systems to which they apply."""
 
 from collections.abc import Sequence
 from typing import Annotated, NamedTuple

@@ -152,7 +152,7 @@ def solve_stages(h, before, problem, progress, room, c):
             rate = size / last
             if rate < 1.0 and size * rate < _SOLVED * (1.0 - rate):
                 return True
-            # What no longer shrinks is rounding, or no convergence.
+            # Corrections that no longer shrink are rounding, or the iteration does not converge.
             if iteration > 2 and rate > 0.5:
                 if size < _SOLVED:
                     return True

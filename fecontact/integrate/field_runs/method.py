@@ -58,7 +58,7 @@ class Step(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """What a run goes on from.
+    """State of a run, from which it continues.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ def _begin(t, data):
         size = max(size, abs(progress.rate[k]) / progress.sizes[k])
     if size > 0.0:
         numbers[STEP] = min(numbers[STEP], 0.01 / size)
-    # What is at rest may not stay there: the first step does not depend on the end of the run.
+    # A state at rest may not stay there: the first step does not depend on the end of the run.
     steep = steepest(progress.J, progress.sizes)
     if steep > 0.0:
         numbers[STEP] = min(numbers[STEP], 0.1 / steep)

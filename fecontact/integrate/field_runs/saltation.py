@@ -95,7 +95,7 @@ def passages(
     system: ContactSystem, state: Array, times: Array, rtol: float, max_step: float | None = None,
     beside: Above | None = None,
 ) -> list[Passage]:
-    """Where nodes pass levels at which their forces jump, in a run over these times.
+    """Passages of nodes through levels at which their forces jump, in a run over these times.
 
     ``beside`` is the system with a parameter moved up and down, and the difference of both.
     """
@@ -104,7 +104,7 @@ def passages(
         return []
     run = start(system, state, times[[0, -1]], rtol=rtol, max_step=max_step, work=False,
                 events=[ContactEvents()], method="rodas5p")
-    # Whoever needs derivatives says where a run fails.
+    # The function that needs derivatives reports a failed run.
     finish(run)
     levels, events = run.problem.control.levels, run.events
     found = []

@@ -1,4 +1,4 @@
-"""What the integrator of eight runs side by side works on: parameters, states, room to work in.
+"""Parameters, states and workspace of the integrator of eight runs side by side.
 
 Each quantity of a run is a row (8,), with one entry for each lane. All rows of the parameters lie
 in one table (rows, 8), those of the progress in another, so that a run is loaded as one column.
@@ -64,10 +64,11 @@ class LaneSystem(NamedTuple):
 
 
 class LaneControl(NamedTuple):
-    """What limits the steps in each lane; see :class:`fecontact.integrate.rodas5p.state.Control`.
+    """Step-size limits and error scales in each lane.
 
-    ``numbers`` holds the relative tolerance, the longest step, the velocity below which errors
-    count as if it were that large, and the largest acceleration of the ground.
+    See :class:`fecontact.integrate.rodas5p.state.Control`. ``numbers`` holds the relative
+    tolerance, the longest step, the velocity below which errors count as if it were that large,
+    and the largest acceleration of the ground.
     """
 
     displacement_scale: Annotated[Array, MODES, WIDTH]
@@ -80,7 +81,7 @@ class LaneControl(NamedTuple):
 
 
 class LaneProgress(NamedTuple):
-    """All that the runs in the lanes need to go on.
+    """Complete state of the runs in the lanes.
 
     Attributes
     ----------

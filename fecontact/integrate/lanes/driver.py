@@ -42,7 +42,7 @@ _FIELDS = arrays.LaneSystem._fields[:15]
 
 @dataclass(frozen=True)
 class Kind:
-    """What runs have in common that go side by side: laws by address, and shapes of parameters."""
+    """Common properties of runs that go side by side: laws by address, shapes of parameters."""
 
     laws: tuple[tuple[int, ...], ...]
     steady: bool
@@ -207,7 +207,7 @@ class SideBySide:
         return own, _copied(self._spare.progress), room
 
     def _dealt_to(self, runs: LaneRuns, workers: int) -> LaneRuns:
-        """The same with more runs that wait; at the end each worker takes few at once."""
+        """Return the runs with a longer queue; at the end each worker takes few at once."""
         rest = runs.queue[runs.counts[TAKEN] : runs.counts[WAITING]]
         with self._lock:
             left = len(self._waiting)
@@ -268,7 +268,7 @@ def side_by_side(
 
 
 def _key(member: Any, times: Array) -> tuple[int, float, float]:
-    """What tells runs apart whose steps have the same limits."""
+    """Key shared by runs whose steps have the same limits."""
     return id(member), float(times[0]), float(times[-1])
 
 

@@ -104,7 +104,7 @@ def set_rate(y, speed, s, load, places, speeds, forces, rate):
 
 @routine
 def set_rate_and_forces(y, speed, s, load, places, speeds, forces, rate):
-    """As :func:`set_rate`, and fill ``forces`` (n, 5, 8) with what derivatives are made of."""
+    """Fill ``rate`` as :func:`set_rate`, and ``forces`` (n, 5, 8) with F and derivatives."""
     n = s.rows.shape[0]
     project(s, y, places, speeds)
     _accelerate(y, s, load, rate)

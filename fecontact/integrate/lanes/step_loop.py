@@ -54,7 +54,7 @@ from fecontact.system.nodes import GroundMotion
 # runs have ended.
 GOES_ON, HUNGRY, DONE = range(3)
 
-# As in the step loop of one run.
+# Safety factor and limits of the ratio of steps, as in the step loop of one run.
 _SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.9, 0.1, 8.0
 # Errors are counted as within these bounds, and as the third at least, for the length of a step.
 _LEAST_ERROR, _LARGEST_ERROR = 1e-6, 1e10

@@ -38,8 +38,8 @@ from fecontact.integrate.nonsmooth.problem import OPEN, STICK
 # Largest number of cases that are tried.
 MOST_CASES = 8192
 _SWEEPS = 2000
-# What is left of the conditions in a solution, and the difference between two that are not the
-# same, relative to the largest terms.
+# Residual of the conditions in a solution, and smallest difference between distinct solutions,
+# relative to the largest terms.
 _RESIDUAL, _APART = 1e-13, 1e-6
 # Accelerations or velocities that are the same, relative to the terms of b.
 _SAME = 1e-10
@@ -78,7 +78,7 @@ class Conditions(NamedTuple):
 
 
 class Case(NamedTuple):
-    """Which nodes are pressed, the mode of each cluster, and what follows.
+    """Pressed nodes, mode of each cluster, and the impulses and velocities that follow.
 
     Attributes
     ----------
@@ -336,10 +336,10 @@ def solve_conditions(c, case):
 
 @routine
 def solve_uniquely(c, case):
-    """As :func:`solve_conditions`, preferring stick, but only if there is no other solution.
+    """Fill a case as :func:`solve_conditions`, preferring stick, if it is the only solution.
 
-    For the coefficients of slip; a larger one of stick makes no difference to that. With more than
-    MOST_CASES cases the first solution that is found is taken.
+    Uniqueness is tested with the coefficients of slip; a larger coefficient of stick makes no
+    difference to it. With more than MOST_CASES cases the first solution that is found is taken.
     """
     if count_cases(c) > MOST_CASES:
         return solve_conditions(c, case)

@@ -364,7 +364,7 @@ def _rough_nodes(groups: list[tuple[FrictionLaw, Array]], static: Array) -> NDAr
 
 
 def _require_independence(Ty: Array, rows: Array) -> None:
-    """Raise InputError unless motions normal to the ground and along it can be told apart."""
+    """Raise InputError unless normal and tangential motions of the nodes are independent."""
     scale = max(np.abs(Ty).max(initial=1e-300), np.abs(rows).max(initial=0.0))
     together = np.vstack([Ty, rows])
     if np.linalg.matrix_rank(together, tol=1e-9 * scale) < len(together):

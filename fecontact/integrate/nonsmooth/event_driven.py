@@ -74,7 +74,7 @@ from fecontact.integrate.step_loop import (
     step_loop,
 )
 
-# What has just begun to move and turns back in this part of a step is looked at more closely.
+# Contacts that have just begun to move and change in this part of a step are searched again.
 EARLY = 0.25
 # Weight of the error before in the control of the steps, and the least one that counts.
 _DAMPED, _SMALLEST_ERROR = 0.03, 1e-4
@@ -213,7 +213,7 @@ def _lengthened(length, size_of_error, numbers):
 
 @helper
 def _first_place(place):
-    """Where the first change is, 1 for none, and whether there is one."""
+    """Fraction of the step at which the first contact changes (1.0 if none), and a flag."""
     high, found = 1.0, False
     for k in range(len(place)):
         found = found or place[k] <= 1.0

@@ -40,7 +40,7 @@ from fecontact.integrate.rodas5p.event_kernels import (
 )
 from fecontact.integrate.rodas5p.event_kernels import STICK as STICK_BEGINS
 
-# What is noted: the state at the start, a step or a part of it, a change of contact.
+# Kinds of notes: the state at the start, a step or a part of it, a change of contact.
 BEGIN, WITHIN, CHANGED = range(3)
 NOTE = Callable[[Step, float, int, NonsmoothProblem, Progress, Workspace, Room, Watch], float]
 note_at = function_at(NOTE)

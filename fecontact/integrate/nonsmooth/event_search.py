@@ -209,10 +209,11 @@ def pressed(u, j, s):
 
 @helper
 def first_pressed(b, above, finest, j, s, room):
-    """Where the penetration with coefficients b first makes a force above a bound.
+    """Fraction of the step at which the force of a penetration polynomial first exceeds a bound.
 
-    To a part ``finest`` of the step, the later end of it; the law's force must not fall while
-    penetration grows, into the ground or into a stop above.
+    ``b`` are the coefficients of the polynomial. The fraction is exact to ``finest``, the later end
+    of that interval. The law's force must not fall while penetration grows, into the ground or into
+    a stop above.
     """
     n = len(b)
     for i in range(n):

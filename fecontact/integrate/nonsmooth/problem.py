@@ -1,4 +1,4 @@
-"""What the kernels of set-valued contact share: the problem, room to work in, names of columns."""
+"""Problem, workspace and names of columns that the kernels of set-valued contact share."""
 
 from typing import Annotated, NamedTuple
 
@@ -93,7 +93,7 @@ class NonsmoothProblem(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """What limits the steps of a run.
+    """Step-size limits and error scales of a run.
 
     ``stops`` are ascending times at which a step ends; ``floor`` (size,) are values below which
     the error is not measured relative to the state; ``longest`` is the longest step.

@@ -375,7 +375,7 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
             if closed[j] and p.cluster[j] == c:
                 status[c] = case.mode[c]
         room.fresh[c] = room.fresh[c] and (status[c] == 1 or status[c] == -1)
-        # What begins to slip does so from no slip velocity.
+        # Slip that begins here starts from zero slip velocity.
         before[c] = STICK if room.fresh[c] else status[c]
     settle(t, p, before, closed, w, out, Y)
     derivative(t, Y, p, status, closed, w, out)

@@ -71,7 +71,7 @@ _FINER = 1e-4
 
 @helper
 def contact_of(j, Y, moved, s):
-    """Where node j is above the other side, in the state Y."""
+    """Contact kinematics of node j in the state Y."""
     return contact_in_space(node_motion(j, Y, s), moved, laws_of(j, s), s.sides[j],
                             s.profile_parameters)
 
@@ -164,9 +164,9 @@ def _slips_back(j, step, p, w, tolerance, room):
 
 @helper
 def _grip(j, g, hold, s):
-    """What holds node j in stick, stiffer than in the plane where rounding limits it.
+    """Parameter r of node j in stick, larger than in the plane where rounding limits it.
 
-    Athwart a fast belt velocities are small, and nodes have to come to rest in shorter steps.
+    Across a fast belt slip velocities are small, and nodes must come to rest in shorter steps.
     """
     along, across = 0.0, 0.0
     for i in range(s.rows.shape[2]):

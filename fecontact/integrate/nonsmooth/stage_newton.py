@@ -57,7 +57,7 @@ class Stage(NamedTuple):
 
 
 class Hold(NamedTuple):
-    """What holds the nodes (n,) in stick.
+    """Variables of the augmented Lagrangian that hold the nodes (n,) in stick.
 
     ``grip`` is r, ``multiplier`` is lambda, and ``side`` the sign of the slip of each node at the
     last evaluation, zero for stick. In space the last two are vectors (2 n,), of all first and then
@@ -89,7 +89,7 @@ class NewtonRoom(NamedTuple):
     residual: Vector
 
 
-# What evaluates the contact of a stage in space: number of nodes under force and creep velocity.
+# Evaluates the contact of a stage in space: number of nodes under force, and creep velocity.
 LINEARISE = Callable[[
     Stage, GroundMotion, NonsmoothProblem, Hold, int, NewtonRoom, Vector,
 ], tuple[float, float]]

@@ -141,7 +141,7 @@ def _blocks(
 
 
 def _ranges(counts: list[int], total: int) -> list[tuple[int, int]]:
-    """Ranges of so many, or the one of all where they are not told apart."""
+    """Ranges with these numbers of entries; one range of all if they are not distinguished."""
     ends = np.concatenate([[0], np.cumsum(counts, dtype=int)]).tolist()
     if ends[-1] != total or min(counts, default=0) == 0:
         ends = [0, total]

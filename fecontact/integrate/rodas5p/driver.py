@@ -215,7 +215,7 @@ def control_for(
     system: ContactSystem, state: Array, times: Array, *, rtol: float, max_step: float | None,
     work: bool,
 ) -> Control:
-    """What limits the steps of a run; see :func:`start`."""
+    """Step-size limits and error scales of a run; see :func:`start`."""
     largest = largest_motions(system)
     slip_scale, depth, stick_speed, untouched = np.zeros((4, system.basis.contact_nodes))
     for nodes, _, law in system.law_groups("friction"):
@@ -225,7 +225,7 @@ def control_for(
     for nodes, _, law in system.law_groups("normal"):
         depth[nodes] = law.penetration_scale
         untouched[nodes] = law.untouched(nodes.stop - nodes.start)
-    # What friction remembers fades without force.
+    # Internal variables of friction decay without force: their nodes are always evaluated.
     untouched[system.arrays.memory[: len(untouched)] > 0] = -np.inf
     with np.errstate(over="ignore", invalid="ignore"):
         energy = energy_scale(system, state) if work else 0.0
@@ -258,12 +258,12 @@ def _levels(system: ContactSystem) -> Array:
     """Penetrations (l, n) at which the normal forces of the nodes begin or end."""
     parts = [law.onsets(nodes.stop - nodes.start) for nodes, _, law in system.law_groups("normal")]
     most = max(len(part) for part in parts)
-    # What a law has less of, it has twice.
+    # Laws with fewer onsets repeat their first one.
     return np.hstack([np.vstack([part, *[part[:1]] * (most - len(part))]) for part in parts])
 
 
 def _ground_bounds(system: ContactSystem, times: Array) -> Array:
-    """What bounds the ground, in the order of :mod:`fecontact.integrate.courses`."""
+    """Bounds on the motion of the ground, in the order of :mod:`fecontact.integrate.courses`."""
     ground, motions = system.ground, system.prescribed_motion.motions
     start, end = float(times[0]), float(times[-1])
     low, high, slope = 0.0, 0.0, 0.0

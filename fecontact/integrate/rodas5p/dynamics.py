@@ -109,7 +109,7 @@ def project_block(ends, shapes, y, places, speeds):
 
 @helper
 def project_one(blocks, q, places):
-    """As :func:`project` for coordinates q (m,) alone."""
+    """Fill ``places`` as :func:`project`, from the coordinates q (m,) alone."""
     shapes = blocks.shapes
     count = blocks.used[0]
     for first in range(0, shapes.shape[1], len(blocks.nodes)):
@@ -121,7 +121,7 @@ def project_one(blocks, q, places):
 
 @helper
 def project_block_once(ends, shapes, q, places):
-    """As :func:`project_block` for coordinates q (m,) alone."""
+    """Add to ``places`` as :func:`project_block`, from the coordinates q (m,) alone."""
     i, end, left, right = ends
     while i + 3 < end:
         for j in range(left, right):
@@ -239,7 +239,7 @@ def set_gradients(y, s, blocks, moved, w, out):
 
 @routine
 def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
-    """As :func:`set_rate`, and fill the :class:`Gradients` ``out``."""
+    """Fill ``rate`` as :func:`set_rate`, and the :class:`Gradients` ``out``."""
     set_gradients(y, s, blocks, motion_given(given), w, out)
     m, states = len(load), out.rates.shape[1]
     for j in range(len(s.gap)):

@@ -261,7 +261,7 @@ def _set_powers(step, problem, progress, room):
 def _quadrature_error(h, room):
     """Estimated error of a work in a step, the largest of those of the system and its nodes [J]."""
     largest, power = 0.0, room.power
-    # What a node loses in creep is what it loses, in parts of the step.
+    # Losses in creep need no estimate: they are losses of the node in parts of the step.
     for k in range(POWER_COUNT + len(room.creeps)):
         difference = 0.0
         for point in range(4):

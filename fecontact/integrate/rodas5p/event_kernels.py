@@ -42,7 +42,7 @@ _MOST_A_NODE = 3
 
 
 class Watch(NamedTuple):
-    """What is watched during a run, and what was found.
+    """Events that are watched for during a run, and those that were found.
 
     Attributes
     ----------
@@ -161,7 +161,7 @@ def _zone_of(j, t, y, s, depth, force, rates, watch):
 
 @helper
 def _zone(j, part, y, view, watch):
-    """As :func:`_zone_of` for a state y at a part of the step."""
+    """Zone of node j by :func:`_zone_of`, for a state y at a part of the step."""
     return _zone_of(j, _time(part, view.step), y, view.system, view.depth, view.force, view.rates,
                     watch)
 
@@ -184,7 +184,7 @@ def full(watch):
 
 @helper
 def _normal_zone(zone):
-    """What of a zone belongs to the normal force alone."""
+    """Part of a zone that depends on the normal force alone: 1 if closed, plus 2 if deep."""
     return (0 if zone % DEEP == OPEN else 1) + (2 if zone >= DEEP else 0)
 
 
@@ -200,7 +200,7 @@ def _look(part, view):
 
 @helper
 def _changed(j, low, high, view, watch):
-    """Where node j leaves its state between two parts of a step, and for which; y is set there."""
+    """Part of the step, between two, at which node j changes its zone; the new one; sets y."""
     old = watch.zones[j] % DEEP
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)

@@ -157,8 +157,8 @@ def _aim(t, h, last, smallest, data):
         kink = dynamics.next_kink(progress.state, progress.rate, s, problem.blocks,
                                   progress.gradients, control.depth, control.slow, moved,
                                   room.nodes, reach)
-        # Nearer ones are left to the error control, lest steps shrink without end, and those that
-        # rounding does not tell from here.
+        # Nearer kinks would shrink the steps without end. They are left to the error control,
+        # and so are kinks within rounding of this time.
         if max(1e-3 * limit, 100.0 * smallest) < kink < 0.9 * reach:
             # Rather a little too far than too short.
             target = min(t + 1.0003 * kink, stop)
@@ -169,7 +169,7 @@ def _aim(t, h, last, smallest, data):
 
 @routine
 def _linearise(step, after_t, problem, progress, room):
-    """What a step needs of the derivatives at its start besides the matrices."""
+    """Compute the derivatives that a step needs at its start besides the matrices."""
     s, later = problem.system, dynamics.soon(step)
     acceleration = dynamics.ground_acceleration(step.t, later,
                                                 dynamics.motion_given(room.given), s)
@@ -280,7 +280,7 @@ def _unfelt_part(step, smallest, problem, progress, room):
 def _switch_part(step, smallest, problem, progress, room, watch):
     """Part of the step to which it has to be shortened, to end at a kink; 1 if there is none."""
     part = next_switch(step, problem, progress, room, watch)
-    # Nearer to an end it is at that end, as far as the time can tell.
+    # A switch within rounding of a step end counts as lying on that end.
     near = max(1e-6 * step.h, 100.0 * smallest)
     if part * step.h > near and (1.0 - part) * step.h > near:
         return part * (1.0 + 1e-9)
@@ -428,7 +428,7 @@ def _go_on(step, h, data):
         progress.rate[k] = room.rate_after[k]
     n = len(problem.system.gap)
     set_signs(room.nodes[2, n : 2 * n], progress.signs)
-    # Those of the other nodes are zero.
+    # Gradients of nodes that are not near stay zero.
     dynamics.copy_gradients(room.gradients_after, progress.gradients, room.near)
     keep_ends(n, room)
     return RUNNING, h

@@ -118,7 +118,7 @@ def add_products(a, b, ends, columns, out):
 
 @routine
 def _add_by_fours(a, b, ends, columns, out):
-    """The same for numbers of rows that four divides."""
+    """Body of :func:`add_products` for numbers of rows that four divides."""
     # Unsigned: loops over indices that might be negative are not vectorised.
     left, right = np.uint64(columns[0]), np.uint64(columns[1])
     for i in range(ends[0], ends[1], 4):
@@ -154,7 +154,7 @@ def _add_by_fours(a, b, ends, columns, out):
 
 @routine
 def _add_by_twos(a, b, ends, columns, out):
-    """The same for few rows, two by two at a time."""
+    """Body of :func:`add_products` for few rows, two by two at a time."""
     top, bottom, first, last = ends
     left, right = np.uint64(columns[0]), np.uint64(columns[1])
     for i in range(top, bottom - 1, 2):

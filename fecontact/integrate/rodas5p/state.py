@@ -1,4 +1,4 @@
-"""What the compiled integrator works on: limits, the state of a run, room to work in."""
+"""Records of the compiled integrator: limits, state of a run, workspace."""
 
 from typing import Annotated, NamedTuple
 
@@ -37,7 +37,7 @@ WORST_NODE, SWITCHES = range(step_loop.COUNTS, COUNTS)
 
 
 class Control(NamedTuple):
-    """What limits the steps.
+    """Step-size limits and error scales of a run.
 
     Attributes
     ----------
@@ -47,15 +47,15 @@ class Control(NamedTuple):
         Scales of the internal variables.
     slip_scale, slow, stick_speed, depth : (n,) arrays
         Width of the smoothing of friction, slip velocity at which slip is about to become stick,
-        that below which what friction loses is creep, penetration at which the normal law changes
-        its character.
+        slip velocity below which the loss in friction counts as creep, penetration at which the
+        normal law changes its character.
     largest : (m,) array
         Largest motion of each mode at any point.
     untouched : (n,) array
-        Penetration up to which a node has no force, so that it need not be looked at; -inf if
-        there is none, or if it has to be looked at all the same.
+        Penetration up to which a node has no force and need not be evaluated; -inf if there is
+        none, or if the node has to be evaluated all the same.
     breaks : (k, 2) array
-        Times to step on to, ascending: the first and the last of those that are one but for
+        Times at which steps end, ascending: the first and the last of those that agree within
         rounding.
     levels : (l, n) array
         Penetrations at which normal forces begin or end.
@@ -101,7 +101,7 @@ class Control(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """What is integrated, and how finely."""
+    """Equations to integrate, and limits of the steps."""
 
     system: SystemArrays
     blocks: Blocks
@@ -136,7 +136,7 @@ class Step(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """All that a run needs to go on, bit for bit; copies of the arrays are a checkpoint.
+    """Complete state of a run, bit for bit; copies of the arrays are a checkpoint.
 
     Attributes
     ----------
@@ -223,8 +223,8 @@ def gradients_for(
 ) -> motion.Gradients:
     """Zeros for so many contact nodes with so many internal variables each.
 
-    ``told`` is the length of what is told of a node in space; without derivatives they are not
-    computed.
+    ``told`` is the number of entries for the contact of a node in space. Derivatives are not
+    computed if it leaves no entries for them.
     """
     length = 2 * (4 + states) + told if dimension == 3 else 3 + states
     return allocate(motion.Gradients, {NODES: nodes, MEMORY: states, AXES: dimension,

@@ -1,12 +1,12 @@
-"""Contacts and slips within a step that its stages did not feel.
+"""Contacts and slips within a step that its stages missed.
 
 The error of a step is estimated from forces at a few places. A node that touches the ground and
 leaves it again between two of them moves as if the ground were not there, and the estimate is
-small. So the course of every node over an accepted step is looked at. A stretch in which a gap or
-slip velocity has another sign than at the ends of the step, or a force at least twice that at the
-ends, counts as unfelt if its impulse would change the state by more than a part of the tolerance.
-The step is then taken anew to a place within that stretch: its end feels the force, and the
-estimate of the error sees it.
+small. Therefore the step polynomials of every node are searched after an accepted step. A stretch
+in which a gap or slip velocity has another sign than at the ends of the step, or a force at least
+twice that at the ends, counts as missed if its impulse would change the state by more than a part
+of the tolerance. The step is then repeated up to a place within that stretch. The force at the end
+of the new step enters the estimate of the error.
 """
 
 from collections.abc import Callable
@@ -31,7 +31,7 @@ _UNFELT = Callable[[
 ], float]
 first_unfelt_at = function_at(_UNFELT)
 
-# An unfelt impulse counts from this part of the tolerance on.
+# Smallest missed impulse that counts, as a part of the tolerance.
 _PART = 0.1
 # Steps end after this part of a stretch.
 _JUST_PAST = 0.01
@@ -74,7 +74,10 @@ def _unfelt_push(j, inside, level, value, ends, brief, s):
 
 @helper
 def _unfelt_rub(j, inside, F, slip, ends, s):
-    """The same of friction, for a slip velocity under the normal force F."""
+    """Friction force that a stretch hides, for a slip velocity under the normal force F.
+
+    ``ends`` is the largest slip velocity at ends of the step that belong to the stretch.
+    """
     rub, p = friction_at(s.friction[j]), s.friction_parameters[j]
     force = abs(rub(slip, F, p)[0])
     if inside:

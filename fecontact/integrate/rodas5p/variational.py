@@ -58,17 +58,17 @@ class Variation(NamedTuple):
     columns : (k, size) array
         dy/dy_0 column by column, then dy/dp if a parameter varies. Empty if none are wanted.
     after : (k, size) array
-        They at the end of the step.
+        Columns at the end of the step.
     norms : (2, k) array
         Largest size of each column since it began, and at the end of the step.
     least : (k,) array
-        What these are at least: what makes the column of a parameter, which begins at zero,
-        worth attention.
+        Lower bounds of the sizes in ``norms``: the size from which on the column of a parameter,
+        which begins at zero, is controlled.
     stages : (STAGES k, size) array
         U_i of column c in row STAGES c + i.
     tolerance, faded : float
-        Error of a column in a step that is allowed, in units of its size; of the part ``faded``
-        of the largest size that it has had where it is smaller.
+        Largest error of a column in a step that is allowed, relative to its size, or to the part
+        ``faded`` of its largest size so far where that is more.
     moved, right : (k, 2 size), (k, size) arrays
         [X_i, x] and the right sides of a stage, column by column.
     pushed : (k, m) array
@@ -77,14 +77,14 @@ class Variation(NamedTuple):
         Answers of the node forces inside a stage and ahead; what makes these of [X_i, x], and of
         the right sides.
     given, load : (2, GIVEN), (2, m) arrays
-        What is given at a stage in the systems above and below.
+        Motions and loads that are prescribed at a stage in the systems above and below.
     forces : (d n,) array
         Room for node forces.
     paths : (STAGES, D, n) array
-        What the stages move the nodes along each of their directions.
+        Displacements of the nodes by the stages along each of their directions.
     inside, ahead, behind, usual, between, bends : Gradients
-        Those inside a stage, their change along it, room, their usual sizes, their derivatives to
-        the parameter, and their change along each direction of each node.
+        Gradients inside a stage, their change along it, work array, their usual sizes, their
+        derivatives to the parameter, and their change along each direction of each node.
     """
 
     columns: Annotated[Array, COLUMNS, SIZE]
@@ -279,9 +279,9 @@ def propagate(
 ) -> float:
     """Carry the columns over the step whose stages and factors the room holds.
 
-    Returns the largest error of a column in units of its size, or of the part ``faded`` of the
-    largest it has been, with ``room.right`` (size,) as the units of the state; columns of a
-    parameter that are still faint count as if they were not.
+    Returns the largest error of a column relative to its size, or to the part ``faded`` of its
+    largest size so far. ``room.right`` (size,) holds the units of the state. Columns of a parameter
+    that are still smaller than ``least`` count as if they had that size.
     """
     s, blocks, v = problem.system, problem.blocks, vary.variation
     state, gradients, reduced, stages = (progress.state, progress.gradients, room.reduced,
@@ -390,10 +390,10 @@ def propagate_in_parts(
     step: run_arrays.Step, problem: run_arrays.Problem, progress: run_arrays.Progress,
     room: run_arrays.Room, vary: Vary,
 ) -> float:
-    """As :func:`propagate`, but by collocation in parts of the step, for systems without memory.
+    """Carry the columns as :func:`propagate`, by collocation in parts of the step.
 
-    The derivatives are those along the interpolant of the step. Returns zero where they are within
-    their tolerance: the steps are then left to the motion.
+    For systems without memory. The derivatives are those along the interpolant of the step. Returns
+    zero where their errors are within the tolerance: the steps are then left to the motion.
     """
     s, blocks, v = problem.system, problem.blocks, vary.variation
     count, size = v.columns.shape

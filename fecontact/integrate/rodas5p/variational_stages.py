@@ -280,7 +280,7 @@ def set_between(above, here, below, width, central, usual, out):
 
 @helper
 def _products(a, b, out):
-    """As :func:`fecontact.integrate.rodas5p.stage_solver.products`; by BLAS where it pays."""
+    """Fill ``out`` as :func:`stage_solver.products` does; large matrices by BLAS."""
     if len(a) * len(b) * a.shape[1] > _LARGE:
         np.dot(a, b.T, out)
     else:

@@ -144,7 +144,7 @@ def law_pieces(system: ContactSystem) -> Array:
     most = max(table.shape[1] for table in found)
     rows = []
     for table in found:
-        # What a law has less of begins and ends at infinity.
+        # Pieces that a law lacks begin and end at infinity.
         full = np.zeros((len(table), most, PIECE))
         full[..., : UPPER + 1] = np.inf
         full[:, : table.shape[1]] = table

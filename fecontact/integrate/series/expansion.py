@@ -120,7 +120,7 @@ def expand(y, h, s, series):
         ahead = h * _INVERSE[k + 2]
         factor = h * _INVERSE[k + 1] * ahead
         for i in range(m):
-            # The newest coefficients come last, lest all else wait for them.
+            # The newest coefficients come last: other terms do not wait for them.
             total, damped = series.forcing[i, k], 0.0
             for j in range(n):
                 total += s.rows[j, 1, i] * series.F[j, k]

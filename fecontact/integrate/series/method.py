@@ -142,7 +142,7 @@ def _within(last, before):
 
 @helper
 def _work_length(control, progress, series, h):
-    """The same of the work."""
+    """Part of h until the last terms of the work are within the tolerance."""
     kinetic = 0.0
     for i in range(len(series.q)):
         kinetic += 0.5 * series.v[i, 0] ** 2

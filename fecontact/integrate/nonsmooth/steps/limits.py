@@ -1,4 +1,4 @@
-"""What limits the steps of runs with set-valued friction and rigid stops."""
+"""Step-size limits of runs with set-valued friction and rigid stops."""
 
 import numpy as np
 

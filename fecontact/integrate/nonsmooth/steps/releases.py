@@ -119,9 +119,9 @@ def _clear(left, size):
 
 @helper
 def _lowest(begin, width, step, p, progress, w, room):
-    """Where in a part of the step something lets go for a moment between the quarters.
+    """Place in a part of the step where a contact lets go for a moment between the quarters.
 
-    NOWHERE if it does not. The vertices of parabolas lead to where least is left.
+    NOWHERE if none does. The vertices of parabolas lead to the smallest remaining margins.
     """
     left, size, scratch = room.left, room.scale, room.left[QUARTERS + 1]
     for r in range(len(size)):
