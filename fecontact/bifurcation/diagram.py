@@ -91,7 +91,7 @@ def follow_branches(
 
 
 def _limits_exceeded(field: ContactField, branch: Branch) -> Iterator[str]:
-    """Where a branch first exceeds the limits of the model, checked at some of its points."""
+    """Messages for the first of some checked points of a branch beyond the model's limits."""
     values = np.array(branch.attributes["parameter_values"], dtype=float)
     for place in np.unique(np.linspace(0, len(branch) - 1, _CHECKED_POINTS).astype(int)):
         point = branch.points[place]

@@ -77,7 +77,7 @@ class _FamilyTests:
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, Any] | None:
-        """Points are told by their test functions alone."""
+        """No data: test functions alone decide on special points."""
         return {}
 
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:

@@ -62,7 +62,7 @@ class ResponseSettings:
         Largest error from few samples, relative to the orbit, for which samples are doubled;
         5e-4 by default where ``samples`` are not given.
     stability : 'transitions', 'Koopman-Hill' or 'none'
-        How it is told whether orbits are stable; without it points take a fraction of the time and
+        How the stability of orbits is computed; without it points take a fraction of the time and
         folds alone are found.
     engine_order : int, optional
         Of one sector of a wheel, ``[symmetry]``: forces reach sector s a time engine_order s T / N

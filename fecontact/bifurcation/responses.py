@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class Responses:
-    """What was computed of the responses of a study.
+    """Computed responses of a study.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Motions on which others settle, told apart by their states on a section."""
+"""Attractors: motions on which others settle, distinguished by their states on a section."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -75,7 +75,7 @@ def _room(number: int, rows: int, size: int) -> Motions:
 
 
 def _grown(motions: Motions, number: int, rows: int) -> Motions:
-    """The same motions with room for more."""
+    """Motions in larger arrays, for ``number`` motions of ``rows`` states."""
     count = int(motions.number[0])
     made = _room(max(number, count), rows, motions.points.shape[2])
     made.points[:count, : motions.points.shape[1]] = motions.points[:count]

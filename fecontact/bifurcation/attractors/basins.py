@@ -71,7 +71,7 @@ class Axis:
 @read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Basins:
-    """Which attractor each start leads to.
+    """Attractor that the run from each start reaches.
 
     Attributes
     ----------
@@ -80,11 +80,11 @@ class Basins:
     label : (a, b) array
         Index into ``attractors``; -1 where a run could not go on, or had not settled: its last
         states come ever closer to a periodic motion, but do not repeat within the tolerance. With
-        32 states that was said of 1 % of the chaotic runs of Duffing's oscillator, and of none of
-        an impact oscillator. A run that nears a periodic motion by less than 30 % in a third of
-        its states counts as aperiodic: 14 % of Duffing's unsettled runs within 5 % of their motion
-        did, half of those of the impact oscillator, whose free motion loses 1.5 % in a period.
-        Longer transients settle them.
+        32 states, 1 % of the chaotic runs of Duffing's oscillator had this label, and none of an
+        impact oscillator. A run that nears a periodic motion by less than 30 % in a third of its
+        states counts as aperiodic. Of the unsettled runs of Duffing's oscillator within 5 % of
+        their motion 14 % did so, and half of those of the impact oscillator, whose free motion
+        loses 1.5 % in a period. Longer transients settle these runs.
     attractors : tuple of Attractor
         In the order of their shares, the largest first.
     """
@@ -217,7 +217,7 @@ class _Settle:
     def settled(
         self, states: Array, tell: Callable[[int], None] | None, workers: int | None,
     ) -> Settled:
-        """Where runs from some states settle."""
+        """Last states of runs from some initial states, and whether they have settled."""
         settings: dict[str, Any] = {"initial": states, "solver": self.solver, "rtol": self.rtol,
                                     "workers": workers, "progress": tell}
         rows, still = np.full(len(states), -1), np.zeros(len(states), dtype=np.int64)
@@ -294,7 +294,7 @@ def _scale(moving: Moving, starts: Array, parts: Sequence[Callable[[], Settled]]
 
 
 def _size(moving: Moving, states: Array) -> Array:
-    """The same of states (N, size)."""
+    """Size (size,) of displacements, velocities and internal variables of states (N, size)."""
     size = np.abs(states).max(axis=0)
     if not isinstance(moving, ContactSystem):
         return np.where(size > 0.0, size, 1.0)

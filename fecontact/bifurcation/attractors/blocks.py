@@ -55,14 +55,14 @@ class Block(Protocol):
 
 @dataclass(frozen=True)
 class Place:
-    """Where blocks are computed and kept.
+    """Folder and executor with which blocks are computed and kept.
 
     Attributes
     ----------
     folder : Path or None
-        Where they are kept; None in memory.
+        Folder of the finished blocks; None keeps them in memory.
     executor : Executor or None
-        What computes them; None threads of this process, ``workers`` of them.
+        Executor that computes the blocks; None for ``workers`` threads of this process.
     """
 
     folder: Path | None
@@ -100,7 +100,7 @@ class Place:
 def work_off(
     blocks: Sequence[Block], place: Place, mark: str, tell: Callable[[int], None] | None,
 ) -> list[Callable[[], Found]]:
-    """What all blocks found, in their order, each by a function that reads it.
+    """Compute all blocks; return for each, in their order, a function that reads its results.
 
     Raises
     ------
@@ -269,5 +269,5 @@ def _broken(error: BaseException | None) -> AnalysisError:
 
 
 def found_of(block: Block) -> Found:
-    """What a block finds, for an executor of other processes."""
+    """Results of a block, for an executor of other processes."""
     return block.found()

@@ -16,14 +16,14 @@ _DECAY, _LEFT, _FEWEST = 0.7, 0.05, 12
 
 
 class Settled(NamedTuple):
-    """Where runs have settled.
+    """Last states of runs on a section, and whether the runs have settled.
 
     Attributes
     ----------
     points : (E, K, size) array
         Last states of each run on its section, the first ``rows`` of it.
     rows : (E,) integer array
-        How many there are; -1 of runs that could not go on or had not settled.
+        Number of these states; -1 for runs that could not go on or had not settled.
     still : (E,) integer array
         Whether the run is at rest, at its one point.
     """

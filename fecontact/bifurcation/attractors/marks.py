@@ -33,7 +33,7 @@ _LIBRARIES = frozenset({*sys.stdlib_module_names, "fecontact", "numpy", "scipy",
                         "llvmlite"}) - {"__main__"}
 # The flag of classes that are not compiled into Python.
 _HEAP = 1 << 9
-# What classes hold besides their code and values.
+# Descriptors that classes hold besides their code and values.
 _SLOTS = (types.MemberDescriptorType, types.GetSetDescriptorType, types.WrapperDescriptorType,
           types.MethodDescriptorType, types.ClassMethodDescriptorType)
 
@@ -58,7 +58,7 @@ def mark_of(systems: Iterable[Moving], *settings: Any) -> str:
 
 
 def _of_system(system: ContactSystem) -> list[Any]:
-    """All that the motion of a contact system depends on."""
+    """Data on which the motion of a contact system depends."""
     facts: list[Any] = sorted(system.parameters().items())
     for kind in ("normal", "friction"):
         for nodes, share, law in system.law_groups(kind):
@@ -75,9 +75,9 @@ def _of_system(system: ContactSystem) -> list[Any]:
 
 
 def _of_field(field: VectorField) -> list[Any]:
-    """All that the motion of a field depends on, and some of its rates."""
+    """Data on which the motion of a field depends, and some of its rates."""
     whole = list(field.functions) if isinstance(field, FunctionField) else [field]
-    # What libraries do within shows in rates alone.
+    # Effects of code in libraries show in the rates alone.
     places = np.random.default_rng(0).normal(size=(3, state_size(field)))
     scales = field.state_scales(field.values)
     rates = field.rates(np.array([0.0, 0.1, 0.2]), places * scales, field.values)
@@ -139,7 +139,7 @@ class _Marker:
             yield from map(self.of, (value.__qualname__, getattr(value, "__module__", None), None
                                      if inspect.ismodule(holder) else holder))
         elif isinstance(value, ParametrisedSystem):
-            # What it has made of these holds addresses, and grows with use.
+            # Systems made of these are left out: they hold addresses, and grow with use.
             yield from map(self.of, ("systems", value.base, value.parameters, value.setters))
         elif isinstance(value, type):
             yield from self._of_class(value)

@@ -194,7 +194,7 @@ def poincare_scan(
 
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """What is done at each value; ``passes`` are a section and the time before it counts."""
+    """Settings of the run at each value; ``passes`` are a section and the time before it counts."""
 
     system: Any
     parameter: Change

@@ -61,7 +61,7 @@ class Branch(Summarised):
     status : BranchStatus
         How its forward end was reached.
     message : str
-        Error of the last failed step, and what else is to be told; empty if there is nothing.
+        Error of the last failed step, and further notes; empty if there are none.
     attributes : mapping
         Further data of the branch: numbers, texts, arrays.
     """
@@ -244,7 +244,7 @@ class Branch(Summarised):
         return on_branch(found, BranchHeader(self.parameter_name, self.attributes))
 
     def _passages(self, passed: list[tuple[int, float]]) -> str:
-        """What may be asked for instead, for a message."""
+        """Remedy for an error message: the values that can be asked for."""
         if passed:
             last = len(passed) - 1
             return (f"the branch passes this value {len(passed)} times; choose a whole number from "

@@ -25,8 +25,8 @@ def counted(
 
     It is the number at the first point plus the changes that the special points in between allow.
     Eigenvalues within rounding of the stability border may lie on either side of it; the admissible
-    number nearest to the computed one is taken. Where nothing can be told of the stability, the
-    number stays, and behind that it is the computed one.
+    number nearest to the computed one is taken. Where the stability is unknown the number stays;
+    after such a point it is the computed one.
     """
     if "unstable" not in here.values:
         return 0

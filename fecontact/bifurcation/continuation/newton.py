@@ -221,7 +221,7 @@ def completed(
     problem: Problem, u: Array, linearisation: Linearisation, tangent: Array, iterations: int,
     options: ContinuationOptions, values: Mapping[str, Any] | None = None, *, stored: bool = True,
 ) -> Solution:
-    """As :func:`finished` with a tangent, and perhaps values, that are known."""
+    """Solution as by :func:`finished`, with a known tangent and perhaps known values."""
     if values is None:
         values = (problem.point(u, linearisation, tangent) if stored or options.events else {})
     return Solution(u, linearisation, tangent, iterations, values,

@@ -120,7 +120,7 @@ class BranchPoint(Summarised):
 
     @property
     def place(self) -> str:
-        """Where and what the point is, for messages: 'The point at B = 0.5 (fold)'."""
+        """Parameter and kind of the point, for messages: 'The point at B = 0.5 (fold)'."""
         name = "the parameter" if self.header is None else self.header.parameter_name
         return f"The point at {name} = {self.parameter:.6g} ({self.kind or 'a regular point'})"
 
@@ -309,7 +309,7 @@ class BranchPoint(Summarised):
 
     @property
     def second_parameter_error(self) -> float:
-        """The same of the second parameter, on curves of orbits over two."""
+        """Error of the second parameter, on curves of orbits over two; see parameter_error."""
         return float(self._details.get("second_parameter_error", np.nan))
 
     def parameter_text(self, digits: int = 7) -> str:

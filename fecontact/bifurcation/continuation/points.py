@@ -33,7 +33,7 @@ class _NormalForm(BranchPoint):
 
 
 class FoldPoint(_NormalForm):
-    """Where a branch of equilibria or orbits turns."""
+    """Fold (limit point), at which a branch of equilibria or orbits turns."""
 
     @property
     def null_vector(self) -> Array:
@@ -51,7 +51,7 @@ class FoldPoint(_NormalForm):
 
 
 class HopfPoint(BranchPoint):
-    """Where periodic orbits are born of an equilibrium."""
+    """Hopf point, at which periodic orbits are born of an equilibrium."""
 
     @property
     def angular_frequency(self) -> float:
@@ -90,11 +90,11 @@ class HopfPoint(BranchPoint):
 
 
 class PeriodDoublingPoint(_NormalForm):
-    """Where orbits of twice the period begin."""
+    """Period doubling, at which orbits of twice the period begin."""
 
 
 class NeimarkSackerPoint(_NormalForm):
-    """Where a torus is born of an orbit."""
+    """Neimark-Sacker point, at which a torus is born of an orbit."""
 
     @property
     def angle(self) -> float:
@@ -127,7 +127,7 @@ class CrossingPoint(BranchPoint):
 
 
 class UnresolvedPoint(BranchPoint):
-    """Where the stability changes but no test function has a zero, or the mesh is too coarse."""
+    """Change of stability where no test function has a zero, or the mesh is too coarse."""
 
     @property
     def instead_of(self) -> str | None:
@@ -142,12 +142,12 @@ class UnresolvedPoint(BranchPoint):
 
     @property
     def unstable_after(self) -> int:
-        """Number of unstable directions behind it."""
+        """Number of unstable directions after the point."""
         return int(self._detail("unstable_after"))
 
 
 class DiscontinuityPoint(BranchPoint):
-    """Where a set-valued orbit meets a border of its contact states; see docs/set-valued.md."""
+    """Border of its contact states that a set-valued orbit meets; see docs/set-valued.md."""
 
     @property
     def time(self) -> float:
@@ -166,7 +166,7 @@ class DiscontinuityPoint(BranchPoint):
 
 
 class ZeroHopfPoint(BranchPoint):
-    """Where a curve of folds or Hopf points has both a zero and an imaginary pair."""
+    """Zero-Hopf point: a curve of folds or Hopf points has both a zero and an imaginary pair."""
 
     @property
     def frequency_hz(self) -> float:
@@ -176,7 +176,7 @@ class ZeroHopfPoint(BranchPoint):
 
 
 class DoubleHopfPoint(BranchPoint):
-    """Where a curve of Hopf points has a second imaginary pair."""
+    """Double Hopf point, at which a curve of Hopf points has a second imaginary pair."""
 
     @property
     def frequency_hz(self) -> float:
@@ -246,7 +246,7 @@ def require_no_family(point: BranchPoint) -> None:
 
 
 def details_of(point: BranchPoint) -> Mapping[str, Any]:
-    """What was found at a special point by name, for files."""
+    """Details of a special point by name, for files."""
     return point._details
 
 

@@ -67,7 +67,7 @@ class Stride:
 
 
 class Strider(Protocol):
-    """What makes plain steps."""
+    """Function object that computes plain steps in batches."""
 
     def stride(
         self, problem: Any, here: Any, step: float, most: int, start: Any, header: Any = None
@@ -157,7 +157,7 @@ class Problem(Protocol):
         return count, count
 
     def lost(self, values: Mapping[str, Any]) -> bool:
-        """Whether nothing can be told of the stability of a point, from its stored values."""
+        """True if the stability of a point is unknown, by its stored values."""
         return False
 
     def labels(self, names: Sequence[str]) -> tuple[str, ...]:
@@ -166,7 +166,7 @@ class Problem(Protocol):
         return tuple(name if field is None else field.parameter_label(name) for name in names)
 
     def note(self, points: Any) -> str:
-        """What is to be told of the points of a branch besides its end."""
+        """Further notes on the points of a branch for its message."""
         return ""
 
     def tests(
@@ -231,7 +231,7 @@ class Problem(Protocol):
         return None
 
     def strider(self, options: "ContinuationOptions") -> Strider | None:
-        """What makes plain steps of a branch faster than one by one."""
+        """Object that computes plain steps of a branch in batches; None for one by one."""
         return None
 
     def met_again(
@@ -296,7 +296,7 @@ class ContinuationOptions:
     bounds : tuple
         Least and largest value of the parameter; the last point lies on the bound.
     second_bounds : tuple
-        The same for the second parameter of a curve over two.
+        Least and largest value of the second parameter of a curve over two.
     tolerance : float
         Newton's method ends with a step of this size relative to 1 + |u|; the remaining error is of
         the order of its square, where laws have kinks of the order of the tolerance. Special points
@@ -314,7 +314,7 @@ class ContinuationOptions:
         Functions by name of the stored values (and 'parameter'); their zeros become points of the
         kind of that name.
     progress : bool or callable, optional
-        True for a progress bar on a terminal or in a notebook; a function is told the number of
+        True for a progress bar on a terminal or in a notebook; a function receives the number of
         points after each.
     """
 
@@ -389,7 +389,7 @@ def options_of(
 def titled(
     options: ContinuationOptions, title: str, progress: Callable[[str, float], None] | None
 ) -> ContinuationOptions:
-    """The options, with progress that is told the title and which part of the points there is."""
+    """Options whose progress passes on the title and the part of the points that is done."""
     if progress is None:
         return options
     progress(title, 0.0)

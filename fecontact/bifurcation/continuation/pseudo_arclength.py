@@ -162,7 +162,7 @@ def continuation(
         if ended is not None:
             return End(ended)
         before = last
-        # An unresolved change of stability has halved the step; restore its length behind it.
+        # An unresolved change of stability has halved the step; restore its length afterwards.
         unresolved = any(point.kind == UNRESOLVED for _, special in reached for point in special)
         step = (whole if unresolved else min(whole, 4.0 * step) if rounded
                 else _next_step(problem, last, here, step, options))
@@ -259,7 +259,7 @@ def _step(
                       known=None if near else here.linearisation)
     if found is None:
         return None
-    # What rounding takes for a solution may lie where the step began.
+    # A solution that is one within rounding may lie at the start of the step.
     if float(row @ (found[0] - here.u)) <= 0.5 * step:
         return None
     there = finished(problem, *found, row, options)

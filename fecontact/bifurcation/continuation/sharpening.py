@@ -298,7 +298,7 @@ def _confirmed(
     """Nothing more about a fold or branch point; None if no two successive meshes agree on it.
 
     They agree if both have the point, and the same test function a distance ``reach`` before and
-    behind it.
+    after it.
     """
     problem, _, tangent = located.place
     before = None if found is None else (problem, found.u, tangent)

@@ -238,7 +238,7 @@ def _hidden_change(step: Step, end: Solution, found: list[BranchPoint]) -> bool:
 
 
 def _jump_of_stability(step: Step) -> BranchPoint:
-    """Where the number of unstable directions changes, by bisection, without any test function."""
+    """Change of the number of unstable directions, by bisection without any test function."""
     low, high = 0.0, step.length
     counts = [int(each.values["unstable"]) for each in (step.here, step.there)]
     at, precision = step.there, _JUMP * high

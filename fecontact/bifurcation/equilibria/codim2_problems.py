@@ -69,7 +69,7 @@ class PlaneCurve(Problem):
         return values
 
     def weights(self) -> Array:
-        """Those of states, parameters (and w^2)."""
+        """Weights of states, (w^2,) and parameters in the inner product."""
         return np.asarray(self._sizes**-2.0)
 
     def evaluated(self, u: Array) -> tuple[Array, Array, Array, Array]:
@@ -97,7 +97,7 @@ class PlaneCurve(Problem):
                     self.active, every=4)[0].first
 
     def renewed(self, u: Array, b: Array, c: Array) -> "PlaneCurve":
-        """The same curve with new borders, and scales that grow with the states."""
+        """Curve with new borders, and with scales that grow with the states."""
         larger = np.clip(np.abs(u), self._sizes, self._limits)
         sizes = np.where(larger > 1.5 * self._sizes, larger, self._sizes)
         return type(self)(self.field, self._values, self.active, sizes, self._limits, b, c)
@@ -132,7 +132,7 @@ class FoldCurve(PlaneCurve):
         return _Augmented(np.append(f, g), matrix, J, {"v": v, "w": w, "curvature": curvature})
 
     def adapted(self, u: Array, tangent: Array) -> tuple[Problem, Array, Array]:
-        """The same curve with borders that belong to u."""
+        """Curve with borders computed at u; u and the tangent are unchanged."""
         v, w = null_vectors(scaled(self.evaluated(u)[2], self.scales))
         return self.renewed(u, w if w @ self._b > 0.0 else -w,
                             v if v @ self._c > 0.0 else -v), u, tangent
@@ -201,7 +201,7 @@ class HopfCurve(PlaneCurve):
         return _Augmented(np.append(f, [even.real, odd.real]), matrix, J, {"square": square})
 
     def adapted(self, u: Array, tangent: Array) -> tuple[Problem, Array, Array]:
-        """The same curve with borders that belong to u."""
+        """Curve with borders computed at u; u and the tangent are unchanged."""
         J = scaled(self.evaluated(u)[2], self.scales)
         b, c = hopf_borders(J, float(u[self.field.dimension]))
         return self.renewed(u, b, c), u, tangent

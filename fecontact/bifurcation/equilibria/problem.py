@@ -90,7 +90,7 @@ class EquilibriumProblem(Problem):
         return self._weights
 
     def adapted(self, u: Array, tangent: Array) -> tuple[Problem, Array, Array] | None:
-        """Where the scales were not given, they grow with the states."""
+        """Problem with scales that grow with the states; None if scales were given, or suffice."""
         if self._limits is None:
             return None
         larger = np.clip(np.abs(u[:-1]), self.scales, self._limits)

@@ -98,7 +98,7 @@ def stability_map(
         Modes of higher frequencies [Hz] are left out; of a reduced body beyond the frequency up to
         which its basis is usable, ``Study.usable_hz``, they mean nothing.
     progress : bool or callable, optional
-        True for a progress bar on a terminal or in a notebook; a function is told the part of the
+        True for a progress bar on a terminal or in a notebook; a function receives the part of the
         map that is done, 0 to 1.
 
     Raises

@@ -56,7 +56,7 @@ def border_of(problem: EventOrbit, u: Array, condition: Condition) -> str:
     stays = condition.what == CROSSING
     if stays and jumps(motion := problem.motion(u), cluster):
         return "switching-sliding" if _holds(problem, u, condition, motion) else "crossing-sliding"
-    # What begins there soon ends, or goes on.
+    # The phase that begins at the border soon ends, or goes on.
     short = problem.durations(u)[i] < _VANISHING * problem.period(u)
     return "crossing-sliding" if short != stays else "switching-sliding"
 
@@ -336,7 +336,7 @@ def _other_impacts(
     modes[cluster] = sense if stopped else STICK
     found = Successor(problem, u)
     found.phases[i] = phase.ending(phase.event, replace(phase.strike, modes=tuple(modes)))
-    # With tangential restitution what it stops rebounds, and slips behind it on either side.
+    # With tangential restitution the stopped contact rebounds, and slips after it on either side.
     rests = stopped and found.motion.problem.tangential[cluster] == 0.0
     if rests and behind.status[cluster] in (STICK, -sense):
         found.insert((i + 1) % problem.count, _with(behind, cluster, sense, 2 * cluster))

@@ -26,8 +26,8 @@ from fecontact.integrate.solvers import SetValued
 
 # First steps beyond a border, in those of the branch, and the largest residual there.
 _BEYOND, FITS = (0.1, 0.01, 1e-3), 1e-5
-# What is left of a condition at a border counts as nothing below this; at most so many borders are
-# met at once, and below the second value what is left is rounding.
+# Margin of a condition that counts as zero at a border, margin that is rounding, and largest number
+# of borders that are met at once.
 _NOTHING, _EQUAL, _DEPTH = 1e-5, 1e-8, 4
 # Ranges of the states below this part of the largest one are those of a system at rest.
 _STILL, _NONE = 1e-10, 1e-200

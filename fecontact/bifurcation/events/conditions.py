@@ -1,9 +1,9 @@
-"""What the conditions of the phases of an orbit have left.
+"""Margins of the conditions that hold in the phases of an orbit.
 
-An orbit stops being of its kind where one of them has nothing left: a phase has no duration, what
-ends it vanishes without any rate (the orbit only touches there), something else vanishes within a
-phase or at its begin, what slips through zero could stick there, or an impact begins or ceases to
-stop the slip of a contact.
+An orbit stops being of its kind where a margin becomes zero: a phase has no duration, its event
+function vanishes at its end without any rate (the orbit only touches there), another event function
+vanishes within a phase or at its begin, a contact whose slip passes through zero could stick there,
+or an impact begins or ceases to stop the slip of a contact.
 """
 
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ from fecontact.bifurcation.events.phases import BRIEF, PERIOD, Motion, Phase, sc
 from fecontact.core.types import Array
 from fecontact.integrate.nonsmooth.problem import STICK
 
-# What has nothing left.
+# Kinds of conditions.
 DURATION, RATE, WITHIN, BEGIN, CROSSING, STRIKE = range(6)
 # Parts of a phase at which conditions are looked at, closer together at its ends, and places of the
 # polynomial about a minimum.
@@ -34,10 +34,11 @@ _CLOSE = 0.3
 
 
 class Condition(NamedTuple):
-    """What is left of a condition, in parts of its scale, and which one it is.
+    """Margin of a condition, relative to its scale, and the condition.
 
-    ``what`` is DURATION, RATE, WITHIN, BEGIN, CROSSING or STRIKE, of the phase with this number,
-    ``event`` what vanishes and ``after`` when, from the begin of the phase [s].
+    ``what`` is DURATION, RATE, WITHIN, BEGIN, CROSSING or STRIKE, ``phase`` the number of the
+    phase, ``event`` the event function that vanishes, and ``after`` the time when it does, from the
+    begin of the phase [s].
     """
 
     left: float
@@ -84,7 +85,7 @@ def of_phase(
     phase, T, duration = course.phases[i], course.period, float(course.durations[i])
     if what in (None, DURATION):
         yield Condition(duration / T, DURATION, i, phase.event, duration)
-    # What vanishes at both ends of a phase has no rate where the phase has no duration.
+    # An event function that is zero at both ends of a phase without duration has no rate there.
     if what in (None, RATE) and phase.event != PERIOD and not (
             abs(duration) < _NO_RATE[phase.order] * T):
         scale = scales_of(phase, course.margins)[phase.event] * (duration / T) ** phase.order
@@ -149,7 +150,7 @@ def _minimum(course: Course, i: int, event: int, first: float, last: float) -> t
 
 
 def _at_begin(course: Course, i: int) -> Iterator[Condition]:
-    """What is left where a phase begins, of what its first event has not just brought to zero."""
+    """Margins at the begin of a phase, except those that its first event has just made zero."""
     phase, before = course.phases[i], course.phases[i - 1]
     if before.event == PERIOD:
         return
@@ -167,7 +168,7 @@ def _at_begin(course: Course, i: int) -> Iterator[Condition]:
         elif own is not None and place == 2 * own and before.strike is not None and (
                 before.strike.modes[own] == STICK and phase.status[own] in (1, -1)
                 and course.motion.problem.tangential[own] == 0.0):
-            # What an impact has stopped slips again at once.
+            # A contact that an impact has stopped slips again at once.
             turning.append(own)
             continue
         yield Condition(float(margins[place]), BEGIN, i, place)

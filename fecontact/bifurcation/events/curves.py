@@ -73,7 +73,7 @@ class BorderCurve(Problem):
         return replace(self.orbit, values=values), np.append(u[:-2], u[-1])
 
     def along_second(self, u: Array) -> tuple[EventOrbit, Array]:
-        """The same over the second one."""
+        """The orbit and its unknowns over the second parameter."""
         first, _ = self.along_first(u)
         scales = np.append(first.scales[:-1], self.width)
         return replace(first, free=self.second, scales=scales), u[:-1]
@@ -95,7 +95,7 @@ class BorderCurve(Problem):
     def left(
         self, orbit: EventOrbit, u: Array, start: Array, begin: float, tau: float, motion: Motion
     ) -> float:
-        """What the condition has left, for a phase with another start, begin and duration."""
+        """Margin of the condition, for a phase with another start, begin and duration."""
         i = self.phase
         begins, starts = orbit.begins(u).copy(), orbit.starts(u).copy()
         durations = orbit.durations(u).copy()
@@ -129,14 +129,14 @@ class BorderCurve(Problem):
         return {"kind": "turning point"}
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        """What the other conditions have left."""
+        """Smallest margin of the other conditions, as a test function."""
         others = [each.left for each in linearisation.orbit.conditions
                   if named(each) not in self.beside]
         return {ADMISSIBLE: min(others, default=1.0)}
 
 
 def named(condition: Condition) -> tuple[int, int, int]:
-    """Which condition it is."""
+    """Kind, phase and event of a condition."""
     return condition.what, condition.phase, condition.event
 
 
@@ -148,7 +148,7 @@ class BorderLinearisation:
 
     @cached_property
     def orbit(self) -> EventLinearisation:
-        """Those of the orbit, over the first parameter."""
+        """Linearisation of the orbit, over the first parameter."""
         found, u = self.problem.along_first(self.u)
         return found.linearise(u)
 
@@ -158,7 +158,7 @@ class BorderLinearisation:
         return np.append(self.orbit.residual, self._left())
 
     def _left(self, offset: Array | None = None) -> float:
-        """What the condition has left, with an offset (d + 4,) of start, begin, tau, parameters."""
+        """Margin of the condition, with an offset (d + 4,) of start, begin, tau, parameters."""
         problem, u = self.problem, self.u.copy()
         d = problem.orbit.dimension
         moved = np.zeros(d + 4) if offset is None else offset

@@ -394,8 +394,11 @@ def strike_rows(
     closed: IntegerVector, full: Vector, rate: Vector, held: Matrix, pushing: Matrix,
     speeds: Vector, coefficients: Vector,
 ) -> None:
-    """What an impact needs: rows held (n + k, m), pushing (n + k, m) of unit impulses, penetration
-    rates and slip velocities (n + k,), and coefficients of friction (n,) at these.
+    """Fill the arrays that an impact needs.
+
+    ``held`` (n + k, m) are the rows of the constraints, ``pushing`` (n + k, m) those of unit
+    impulses, ``speeds`` (n + k,) the penetration rates and slip velocities, and ``coefficients``
+    (n,) those of friction at these.
     """
     clusters, n, m = len(p.rows), len(p.cluster), p.rows.shape[1]
     _rates(t, state, p, status, closed, w, full, rate, rate[: len(state)].copy())

@@ -296,7 +296,7 @@ class EventLinearisation:
 
     @cached_property
     def conditions(self) -> list[Condition]:
-        """What the conditions of the phases have left."""
+        """Margins of the conditions of the phases."""
         problem = self.problem
         course = Course(self.motion, problem.phases, self.begins, problem.starts(self.u),
                         problem.durations(self.u), problem.margins)

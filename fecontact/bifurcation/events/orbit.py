@@ -191,7 +191,7 @@ class EventOrbit(FloquetTests, Problem):
                                              self.phases[i])[0][-1])
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        """Those of the multipliers, and what the conditions of the phases have left."""
+        """Test functions of the multipliers, and the smallest margin of the phases' conditions."""
         return {**super().tests(u, linearisation, tangent),
                 ADMISSIBLE: linearisation.least.left}
 
@@ -208,7 +208,7 @@ class EventOrbit(FloquetTests, Problem):
         return found
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[EventOrbit, Array, Array]":
-        """The same problem at the values of u."""
+        """Problem with the parameter values of u; u and the tangent are unchanged."""
         return replace(self, values=self.parameters(u)), u, tangent
 
 

@@ -114,7 +114,7 @@ class Phase:
         return event // 2 if 0 <= event < 2 * len(self.status) else None
 
     def ending(self, event: int, strike: Strike | None = None, order: int = 0) -> "Phase":
-        """The same contact state with another end."""
+        """Phase with this contact state and another end."""
         return replace(self, event=event, strike=strike, order=order)
 
 
@@ -318,7 +318,7 @@ class Motion:
         return found
 
     def strike_left(self, t: float, state: Array, phase: Phase) -> list[tuple[int, float]]:
-        """What the impact at the end of a phase has left: places of events, and parts."""
+        """Places of events and relative margins of the impact at the end of a phase."""
         assert phase.strike is not None
         return self._impact(t, state, phase, phase.strike)[1]
 
@@ -398,7 +398,7 @@ class Motion:
     def _strikes(
         self, node: int, phase: Phase
     ) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
-        """Nodes that an impact may press, and whether it may stop or rub their clusters."""
+        """Nodes that an impact may press, and modes of the clusters: STICK, +1, -1 or none, 0."""
         others = [j for j in range(self.nodes) if phase.closed[j] and j != node]
         for count in range(len(others), -1, -1):
             for beside in combinations(others, count):

@@ -61,7 +61,7 @@ def traced(motion: Motion, begin: float, start: Array, period: float, forced: bo
                       np.array([period]))
     if np.diff(begins[1:]).min(initial=period) < _SHORTEST * period:
         raise AnalysisError(_CLOSELY)
-    # What follows the last event leads to the first one again, a period later.
+    # The phase after the last event leads to the first event again, a period later.
     if phases[-1].state != phases[0].state:
         raise AnalysisError("The contact state does not repeat after the period; run the motion "
                             "longer until it has settled.")
@@ -222,7 +222,7 @@ def _first_event(
     if left <= 0.0:
         return None
     times = np.linspace(0.0, left, max(8, int(np.ceil(_SAMPLES * left / period))) + 1)
-    # What a phase has just begun with, such as the height behind an impact, is zero at first.
+    # The event function that began a phase, such as the height after an impact, is zero at first.
     fine = np.concatenate([times[:1], times[1] * np.array([1e-3, 1e-2, 1e-1]), times[1:]])
     states = np.vstack([state, motion.run(t, fine[1:], state, phase)[0]])
     margins = motion.observed(t + fine, states, phase)[0]

@@ -16,7 +16,7 @@ _SAMPLES = 400
 
 
 def missed_jumps(field: VectorField, points: Sequence[BranchPoint]) -> str:
-    """Which orbits of a branch have multipliers without the saltation at touch-downs, if any.
+    """Note on orbits of a branch whose multipliers lack the saltation at touch-downs, if any.
 
     Multipliers come from Jacobians along the orbit, in which a jump of the force does not show.
     """

@@ -121,7 +121,7 @@ def _rescaled(
 
 
 def attributes_of(problem: HarmonicProblem) -> dict[str, Any]:
-    """What a branch stores of its problem, so that its points can be restored."""
+    """Attributes of a branch from which the problem of its points is restored."""
     field, layout = problem.field, problem.layout
     found: dict[str, Any] = {} if problem.limits is None else {"limits": problem.limits}
     if problem.orders is not None:

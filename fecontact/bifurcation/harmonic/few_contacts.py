@@ -76,7 +76,7 @@ class Factors:
 
 @dataclass(frozen=True, eq=False)
 class FewContacts:
-    """The same by Woodbury's formula, for the columns Q (m, r) of contact displacements.
+    """Factors by Woodbury's formula, for the columns Q (m, r) of contact displacements.
 
     ``blocks`` are factors of D but for its last entry, one; ``left`` (n + 1, c) is X, ``right``
     (c, n + 1) is Y^T, ``solved`` D^-1 X, and ``core`` the factors of 1 + Y^T D^-1 X.

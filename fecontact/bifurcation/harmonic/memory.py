@@ -82,7 +82,7 @@ class Kept:
         return np.asarray(q @ self.rows.T + self.offsets)
 
     def left_by(self, states: Array) -> "Kept":
-        """Those that elements have after states (N, d), on the average."""
+        """Deflections that elements have after states (N, d), averaged over these."""
         c, m = self.rows.shape
         return Kept(self.rows, (states[:, states.shape[1] - c :]
                                 - states[:, :m] @ self.rows.T).mean(axis=0), self.blocks,

@@ -1,4 +1,4 @@
-"""What is observed of orbits by harmonic balance: range and harmonics of one displacement."""
+"""Observed values of orbits by harmonic balance: range and harmonics of one displacement."""
 
 from typing import Any
 
@@ -29,7 +29,7 @@ def observed_values(
 def observed_of_orbits(
     layout: Layout, X: Array, periods: Array, row: Array
 ) -> dict[str, Any]:
-    """Those of K orbits with coefficients X (K, 2 H + 1, b) and periods (K,), K of each name."""
+    """Values of K orbits with coefficients X (K, 2 H + 1, b) and periods (K,), K by each name."""
     K, H, m = len(X), X.shape[1] // 2, layout.displacements
     moved = np.moveaxis(X, 1, 0)
     observes = moved[..., :m] @ row[:m] + moved[..., m:] @ row[2 * m : m + layout.harmonic]

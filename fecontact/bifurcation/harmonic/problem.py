@@ -63,7 +63,7 @@ def orientation(matrix: Array, weights: Array, tangent: Array) -> float:
 
 
 class HarmonicLinearisation(Linearised):
-    """As :class:`Linearised`, with stability."""
+    """Residual and linear systems at u as in :class:`Linearised`, and stability."""
 
     problem: "HarmonicProblem"
 
@@ -92,7 +92,7 @@ class HarmonicLinearisation(Linearised):
 
 
 class CompiledLinearisation(HarmonicLinearisation):
-    """The same of forced contact systems, by compiled code."""
+    """Linearisation of forced contact systems, by compiled code."""
 
     def __init__(
         self, problem: "HarmonicProblem", u: Array, e: Equations, derivatives: bool
@@ -145,7 +145,7 @@ class CompiledLinearisation(HarmonicLinearisation):
 
 
 class BodyLinearisation(HarmonicLinearisation):
-    """The same of forced bodies of many modes, of which compiled code solves few together."""
+    """Linearisation of forced bodies with more modes than compiled code solves for together."""
 
     def __init__(self, problem: "HarmonicProblem", u: Array, e: Equations) -> None:
         super().__init__(problem, u)
@@ -202,7 +202,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         return self._about(u, True)
 
     def evaluate(self, u: Array) -> HarmonicLinearisation:
-        """The same where the residual alone is sure to be asked for."""
+        """Residual at u, for callers that need no derivatives."""
         return self._about(u, False) if type(self) is HarmonicProblem else self.linearise(u)
 
     def _about(self, u: Array, derivatives: bool) -> HarmonicLinearisation:
@@ -318,7 +318,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         return found
 
     def note(self, points: Sequence[BranchPoint]) -> str:
-        """Where multipliers are lost or miss jumps of forces, if they are asked for."""
+        """Note on multipliers that are lost or miss jumps of forces; empty without stability."""
         if self.stability is None:
             return ""
         return " ".join(filter(None, (super().note(points), missed_jumps(self.field, points))))

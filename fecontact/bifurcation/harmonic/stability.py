@@ -84,7 +84,7 @@ def by_transitions(problem: Balance, u: Array, z: Array) -> Floquet:
 def along_orbits(
     problem: Balance, us: Array, zs: Array, e: Equations
 ) -> list[Floquet]:
-    """As :func:`by_transitions` for K forced orbits us (K, n + 1) with zs (K, N, c)."""
+    """Stability by :func:`by_transitions` of K forced orbits us (K, n + 1) with zs (K, N, c)."""
     intervals, radau = _intervals(problem)
     tau, series = _grid(intervals, radau, problem.harmonics)
     d = problem.layout.states

@@ -12,7 +12,7 @@ from fecontact.system.kernels import NORMAL_FORCE
 # Samples that a contact phase should have, and truncation error above which harmonics lack.
 _ENOUGH, _LARGE = 16, 1e-2
 
-# What to do where one sector does not stand for the wheel.
+# Remedy where one sector does not represent the wheel.
 NO_WAVE = ("Where contact opens, the wheel may not move in a wave that repeats: press the contacts "
            "more, or run all sectors, simulate(wheel_system(...)).")
 

@@ -1,4 +1,4 @@
-"""What branches store of orbits by harmonic balance, made when it is first asked for."""
+"""Values that branches store of orbits by harmonic balance, computed on first use."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field

@@ -175,7 +175,10 @@ class HomoclinicProblem(OpenOrbit, Problem):
         return resting(tangents, float(self.scales[-1])) | absent
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
-        """Where both orbit and rates vanish, at a Bogdanov-Takens point, or one rate alone."""
+        """HOPF where orbit and rates vanish, SADDLE_NODE where one rate does, else None.
+
+        Orbit and rates vanish together at a Bogdanov-Takens point.
+        """
         amplitude, rates = self.amplitude(u), self.saddle(u).rates
         if amplitude < _LEAST * self.largest[0] and max(rates) < _SLOWEST * self.largest[1]:
             return BranchStatus.HOPF

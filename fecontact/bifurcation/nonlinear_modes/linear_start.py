@@ -1,4 +1,4 @@
-"""Where a nonlinear mode begins: the system without excitation, and its linear mode at rest."""
+"""Start of a nonlinear mode: the system without excitation, and its linear mode at rest."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -25,9 +25,10 @@ PERIOD_SCALE, _FOLLOWED = 0.2, 1.3
 
 
 class ModeLinearisation(HarmonicLinearisation):
-    """As that of any orbit; means of coordinates that nothing holds stay where they are.
+    """Linearisation of a nonlinear mode; means of coordinates that nothing holds are kept.
 
-    Their balance is without stiffness and met by itself, as the forces within a free body are.
+    The balance of these means has no stiffness and is satisfied identically, as it is for the
+    forces within a free body.
     """
 
     problem: "ModeProblem"
@@ -165,7 +166,7 @@ class ModeProblem(HarmonicProblem):
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, Any] | None:
-        """Points are told by their test functions alone."""
+        """No data: test functions alone decide on special points."""
         return {}
 
 

@@ -23,16 +23,16 @@ _BETWEEN = 8
 
 @dataclass(frozen=True)
 class Resonance:
-    """Where the work of a force balances what a nonlinear mode loses.
+    """Resonance: the work of a force balances the energy that a nonlinear mode loses.
 
     Attributes
     ----------
     amplitude : float
         Half the range of the observed displacement [m].
     frequency_hz : float
-        Frequency of the mode there [Hz].
+        Frequency of the mode at the resonance [Hz].
     damping_ratio : float
-        Its damping ratio.
+        Damping ratio of the mode at the resonance.
     """
 
     amplitude: float
@@ -161,7 +161,7 @@ def mode_response(
 
 @dataclass(frozen=True, eq=False)
 class _Along:
-    """What the response needs, along a mode, over the chord s (N,).
+    """Quantities along a mode from which the response follows, over the chord s (N,).
 
     Rows of ``known`` (9, N): frequency, damping ratio, logarithm of the amplitude a; X_1^H X_1 and
     the sums of the equation with C and with xi (see :func:`mode_response`), all over a^2; X_1^H P

@@ -105,12 +105,12 @@ class PeakProblem(Problem):
             fixed = self.orbit.field.forcing_period(values)
         # Compiled equations hold all values but that of p.
         found = replace(self.orbit, values=values, compiled=None, fixed=fixed)
-        # As it is known to be forced, the system need not be made to find out.
+        # The orbit is known to be forced: no system is made to find that out.
         vars(found)["autonomous"] = False
         return found
 
     def weights(self) -> Array:
-        """Those of the orbit, and of the parameter."""
+        """Weights of the orbit, and of the parameter."""
         return np.append(self.orbit.weights(), self.width**-2.0)
 
     def orientation(self, linearisation: Any, tangent: Array) -> float:

@@ -191,7 +191,7 @@ def _method_of(point: BranchPoint) -> Method:
 
 
 def method_of_several(at: StrongResonance) -> Collocation:
-    """That of a curve of tori, with intervals for orbits of several periods beside a resonance."""
+    """Collocation for a curve of tori: intervals for orbits of several periods near a resonance."""
     usual = _method_of(at.point)
     assert isinstance(usual, Collocation)
     return replace(usual, intervals=at.order * at.orbit.intervals,
@@ -453,7 +453,7 @@ def _sizes(method: Collocation) -> Intervals | None:
 
 
 def attributes_of(problem: CollocationProblem, limits: Array | None) -> dict[str, Any]:
-    """What a branch of orbits by collocation keeps besides its points."""
+    """Attributes of a branch of orbits by collocation, besides its points."""
     field = problem.field
     kept: dict[str, Any] = {
         "state_names": list(field.state_names), "parameter_names": list(field.parameters),

@@ -88,7 +88,7 @@ class Intervals:
         return min(_whole(min(self._wanted(given, error, degree), given)), given)
 
     def note(self, points: Sequence[BranchPoint]) -> str:
-        """Where orbits of a branch are less accurate than the tolerance, and why."""
+        """Note on orbits of a branch that are less accurate than the tolerance, with the reason."""
         poor = [point for point in points if _error_of(point) > self.tolerance]
         if not poor:
             return ""
@@ -170,7 +170,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         return CollocationLinearisation(self, u)
 
     def evaluate(self, u: Array) -> CollocationLinearisation:
-        """As :meth:`linearise`, for the residual alone."""
+        """Residual at u, without derivatives."""
         return CollocationLinearisation(self, u, "nothing")
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
@@ -181,7 +181,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         self, u: Array, linearisation: Any,
         beside: Callable[[CollocationLinearisation, Array], Array],
     ) -> dict[str, Any]:
-        """As :meth:`point`; ``beside`` tells how right-hand sides change the orbit."""
+        """Values of :meth:`point`; ``beside`` gives the change of the orbit by right-hand sides."""
         stability = linearisation.floquet
         low, high = extremes(self.nodes(u), self.degree)
         error = state_error(self, u, linearisation, beside)
@@ -192,7 +192,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
                 "maximum": high, "state_error": error}
 
     def note(self, points: Sequence[BranchPoint]) -> str:
-        """Where multipliers are lost, or miss jumps of forces."""
+        """Note on multipliers that are lost, or miss jumps of forces."""
         missed = missed_jumps(self.field, points) if self.second is None else ""
         return " ".join(filter(None, (super().note(points), missed)))
 

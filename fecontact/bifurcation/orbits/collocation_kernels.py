@@ -216,7 +216,7 @@ def fill_smooth_errors(
             after = j + 1 if j + 1 < N else 0
             jump = abs(slopes[after] - slopes[j]) / sizes[i]
             rate = 2.0 * jump / (widths[j] + widths[after])
-            # What a much narrower neighbour resolves does not go on through an interval.
+            # A derivative resolved by a much narrower neighbour does not span an interval.
             one = min(widths[j], _MOST_REACH * widths[after])
             other = min(widths[after], _MOST_REACH * widths[j])
             errors[j] = max(errors[j], rate * _power(one, m + 1))

@@ -238,7 +238,7 @@ class CollocationLinearisation:
     def derivatives_beside(
         self, shifts: list[Array], *, states_alone: bool = False
     ) -> tuple[Array, Array, Array]:
-        """As :attr:`derivatives`, (k, N m, ...), beside the orbit by k shifts (N m, d)."""
+        """Derivatives (k, N m, ...) as :attr:`derivatives`, at the orbit plus k shifts (N m, d)."""
         x, times = self._beside(shifts)
         found = (self.problem.field.derivatives(times, x, self.problem.parameters(self.u), ())
                  if states_alone else self._derivatives_at(times, x))

@@ -305,7 +305,7 @@ class FloquetTests:
         return lost(values)
 
     def note(self, points: Sequence[BranchPoint]) -> str:
-        """Where multipliers are lost, if anywhere."""
+        """Note on lost multipliers; empty if there are none."""
         places = [point.parameter for point in points if lost(point.values)]
         folds = [f"{point.parameter:.10g}" for point in points
                  if point.kind == "fold" and lost(point.values)]

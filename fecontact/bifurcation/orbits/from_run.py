@@ -93,7 +93,7 @@ def periodic_motion(
     size = np.ptp(fine.states, axis=0)
     size = np.maximum(size, 1e-9 * np.abs(fine.states).max(axis=0)) + 1e-300
     if isinstance(moving, ContactSystem):
-        # What a stop holds at rest moves by rounding.
+        # States that a stop holds at rest move by rounding.
         m = moving.basis.modes
         for kind in (slice(0, m), slice(m, 2 * m)):
             size[kind] = np.maximum(size[kind], 1e-9 * size[kind].max())

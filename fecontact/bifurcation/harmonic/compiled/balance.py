@@ -32,7 +32,7 @@ _OF_BODY = frozenset({"stiffness", "damping", "modal_damping", "constant_load", 
 
 @dataclass(eq=False)
 class CompiledBalance:
-    """What compiled code needs of a field over one parameter, kept for all problems along a branch.
+    """Data of a field over one parameter for compiled code, kept for all problems along a branch.
 
     Problems are those of :class:`fecontact.bifurcation.harmonic.balance.Balance`.
 
@@ -42,7 +42,7 @@ class CompiledBalance:
     affine : AffineArrays or None
         Arrays of the system about the last value.
     held : tuple, optional
-        Index of the parameter, period times it, and the values of the others, for which these are.
+        Index of the parameter, period times it, and the values of the others for ``affine``.
     known : dict
         Equations by harmonics, samples and periods.
     """

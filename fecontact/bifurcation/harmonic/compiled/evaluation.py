@@ -252,7 +252,7 @@ def _harmonics_of_derivatives(T, s, e):
 
 @helper
 def _by_parameter(u, T, e):
-    """As :func:`_beside` where contact forces depend on the parameter through speeds alone."""
+    """Fill as :func:`_beside`, where forces depend on the parameter through speeds alone."""
     room = e.room
     p, m, L = u[len(u) - 1], e.springs.shape[1], e.values.shape[1]
     N, c = len(e.tau), len(e.offsets)

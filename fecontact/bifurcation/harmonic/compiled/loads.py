@@ -24,10 +24,10 @@ def forces_at_rest(
     """Fill body (4, m, m) and given (2, N, m), affine in a parameter p, from its first two places.
 
     These are stiffness and damping, and loads at the samples: values at p = 0 and their slopes. The
-    arrays of the system are ``flat`` = ``base`` + p ``slope``. told (3,) says how far loads are
-    from being affine at all places, relative to the largest; the largest mean of the forces of
-    loads and contact at rest for the last place, relative to the largest force; and the largest
-    change of the mean of the loads, relative to the largest load.
+    arrays of the system are ``flat`` = ``base`` + p ``slope``. Entries of ``told`` (3,) are the
+    largest deviation of the loads from the affine ones over all places, relative to the largest;
+    the largest mean of the forces of loads and contact at rest for the last place, relative to the
+    largest force; and the largest change of the mean of the loads, relative to the largest load.
     """
     n, _, m = s.rows.shape
     P, N, states = len(places), len(tau), s.memory.max()

@@ -17,7 +17,7 @@ from fecontact.bifurcation.harmonic.compiled.newton import settled
 from fecontact.core.compiled import kernel
 from fecontact.core.records import Matrix, Vector
 
-# What is wanted at an orbit.
+# Kinds of results at an orbit.
 RESIDUAL, DERIVATIVES, SOLUTION, ORBIT = range(4)
 
 

@@ -132,14 +132,14 @@ class Strides:
             whole = self._before_changes(problem, here, found, tangents, folds, whole)
         later = _LATER if problem.stability is not None else _WITHOUT_STABILITY
         self.count = later if whole == made else max(_FIRST, min(self.count // 2, 2 * whole))
-        # The last tangent is made exact: what lies behind it relies on its signs.
+        # The last tangent is made exact: later steps rely on its signs.
         while 0 < whole < made and (folds[whole - 1] or not self._made_exact(
                 problem, u[whole - 1], _weights(problem, sizes[whole - 1 : whole])[0],
                 tangents[whole - 1])):
             whole -= 1
         if whole == 0:
             return None
-        # What points keep is cut to the points that there are.
+        # Points keep copies of their own rows, not the whole arrays.
         u, tangents = u[:whole].copy(), tangents[:whole].copy()
         values = problem.stored(
             u, *(each[:whole].copy() for each in (out.z, out.forces, out.mean, out.scales[:, :m])),
@@ -186,7 +186,7 @@ class Strides:
         distances = np.abs(u[:, -1] - start.u[-1]) / width
         near = np.flatnonzero(distances <= 6.0 * lengths)
         if here is start:
-            # As long as the parameter goes on from the start, it does not come back to it.
+            # The parameter does not come back to the start before it turns.
             p = u[:, -1]
             turned = np.flatnonzero((p[1:] - p[:-1]) * (p[0] - start.u[-1]) <= 0.0)
             near = near[near > turned[0]] if len(turned) else near[:0]

@@ -134,7 +134,7 @@ class _Closing:
         base[:d, :d] = matrix * self._balance[:, None]
         if self.drifts:
             drive = _reduced(of.at, of.widths * of.velocity)[1] * self._balance
-            # As large as other columns.
+            # Scaled to the size of the other columns.
             self._drift_unit = 1.0 / np.linalg.norm(drive)
             base[:d, d] = drive * self._drift_unit
             row = of.velocity[0] / of.span**2

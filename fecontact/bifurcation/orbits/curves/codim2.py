@@ -94,7 +94,7 @@ class OrbitCurve(Problem):
         return CurveLinearised(self, u)
 
     def evaluate(self, u: Array) -> "CurveLinearised":
-        """As :meth:`linearise`, for the residual alone."""
+        """Residual at u, without derivatives."""
         return CurveLinearised(self, u, whole=False)
 
     def weights(self) -> Array:
@@ -124,7 +124,7 @@ class OrbitCurve(Problem):
     def met_again(
         self, origin: Problem, u: Array, tangent: Array, like: Array, heading: Array, within: float,
     ) -> Array | None:
-        """That of the orbits."""
+        """Start of the curve in the unknowns of its orbit; see :meth:`Problem.met_again`."""
         if not isinstance(origin, OrbitCurve):
             return None
         return self.orbit.met_again(origin.orbit, u, tangent, like, heading, within)
@@ -141,7 +141,7 @@ class OrbitCurve(Problem):
     def tests(
         self, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, float | Callable[[], float]]:
-        """Those of points of codimension two, and of orbits that shrink or become single ones."""
+        """Tests for points of codimension two, and for orbits that shrink or become single ones."""
         found = self._codimension_two(u, linearisation)
         if self.orbit.autonomous:
             found[VANISHING] = vanishing(self.orbit, u, VANISHED_ON_CURVES)
@@ -314,7 +314,7 @@ def orbit_curve(
         If the point is not on a branch of orbits by collocation, belongs to another field, or its
         period, which is to be kept, is that of the excitation.
     """
-    # What came before does not choose how derivatives of the curve are formed.
+    # Earlier uses of the field do not choose how derivatives of the curve are formed.
     problem, u, _ = restored(field.as_new(), point)
     problem = rescaled(problem, scales, widths.get(point.branch.parameter_name))
     index = field.index(second)

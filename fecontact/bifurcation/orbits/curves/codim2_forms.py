@@ -42,10 +42,10 @@ _CANCELLATION = 1e-9
 
 
 class Form(NamedTuple):
-    """What a normal form is made of.
+    """Data of a normal form.
 
-    multipliers are those of the amplitudes, from the critical pair (first) and the pair beside it,
-    order that of the series, and formula gives the coefficients.
+    ``multipliers`` are those of the amplitudes, from the critical pair (first) and the pair beside
+    it, ``order`` is that of the series, and ``formula`` gives the coefficients.
     """
 
     multipliers: Callable[[complex, complex], Sequence[complex]]
@@ -139,7 +139,7 @@ def _at_1_4(series: Series) -> list[float]:
 
 
 def _with_fold(series: Series) -> list[float]:
-    """Those of a fold with a doubling (u, v) or a pair (u, z, conj(z))."""
+    """Coefficients of a fold with a doubling (u, v) or a pair (u, z, conj(z))."""
     pair = (1, 1) if len(series.powers[0]) == 3 else (2,)
     none = (0,) * len(pair)
     one = (1, *none[1:])
@@ -156,7 +156,7 @@ def _with_fold(series: Series) -> list[float]:
 
 
 def _two_cubic(series: Series) -> list[float]:
-    """Those of a doubling (u) or a pair (w, conj(w)), and a pair (z, conj(z)) besides."""
+    """Coefficients of a doubling (u) or a pair (w, conj(w)), and another pair (z, conj(z))."""
     none, square, cube, one = (((0,), (2,), (3,), (1,)) if len(series.powers[0]) == 3
                                else ((0, 0), (1, 1), (2, 1), (1, 0)))
     place = len(none)

@@ -32,9 +32,9 @@ class Finer(NamedTuple):
 def with_errors(curve: OrbitCurve, branch: Branch, events: Sequence[str]) -> Branch:
     """The special points, each on intervals that suffice for both parameters, with their errors.
 
-    These are the changes on twice the intervals, and normal forms those on the finest mesh. Of
-    points that are not found there the errors are the changes over the stretch that was searched,
-    and the branch's message tells of them; their normal forms are left out.
+    The errors are the changes on twice the intervals, and normal forms those on the finest mesh.
+    Where a point is not found there, the error is the change over the stretch that was searched,
+    the branch's message names the point, and its normal form is left out.
     """
     points, missing = list(branch.points), []
     try:
