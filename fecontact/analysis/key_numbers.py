@@ -34,7 +34,7 @@ class KeyNumbers:
     interval : (float, float)
         Time over which the values are taken [s].
     titles : mapping of name to text
-        Names for display, also of frequencies that the interval is too short to tell.
+        Names for display, also of frequencies that the interval is too short to resolve.
     drive_period : float or None
         Period of the drive [s].
     """

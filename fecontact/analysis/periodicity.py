@@ -88,7 +88,7 @@ class Steadiness:
     Attributes
     ----------
     kind : 'at rest', 'periodic', 'not steady' or 'unknown'
-        'unknown' if the run has too few output times to tell.
+        'unknown' if the run has too few output times to decide.
     period : float or None
         Period of a periodic motion [s].
     misfit : float
@@ -359,7 +359,7 @@ def periodicity(
 
 
 def steadiness(trajectory: Trajectory, *, tolerance: float = 1e-2) -> Steadiness:
-    """Tell whether a run has become steady: at rest, periodic, or neither.
+    """Determine whether a run has become steady: at rest, periodic, or neither.
 
     The displacements x of B and the contact nodes are observed in the last quarter of the run.
 

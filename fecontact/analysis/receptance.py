@@ -53,7 +53,7 @@ class Receptance:
 
     @property
     def stable(self) -> bool:
-        """Whether no free vibration grows."""
+        """True if no free vibration grows."""
         return len(self.growing) == 0
 
     @property

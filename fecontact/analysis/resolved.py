@@ -51,7 +51,7 @@ _KNOWN: "WeakKeyDictionary[Trajectory, Resolved]" = WeakKeyDictionary()
 
 
 def resolved(trajectory: Trajectory) -> Resolved:
-    """Add what the run has kept wherever outputs are too far apart to be joined by straight lines.
+    """Add kept steps of a run wherever outputs are too far apart for straight lines between them.
 
     They are too far apart where chords deviate by more than 1/400 of the range from displacements
     and velocities of the named points, or from normal and friction forces. Existing outputs do not

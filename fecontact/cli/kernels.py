@@ -185,7 +185,7 @@ def say_made_with(folder: Path, family: str) -> None:
 
 def _run(command: Sequence[str], variables: dict[str, str] | None = None) -> str:
     """Output of a command; FecontactError if it fails."""
-    # Its progress and errors go to stderr, and are shown.
+    # Progress and errors of the command go to stderr, and are shown.
     found = subprocess.run(command, env=os.environ | (variables or {}), stdout=subprocess.PIPE,
                            text=True, check=False)
     if found.returncode != 0:

@@ -25,12 +25,12 @@ class _FunctionAt(types.Callable):
         super().__init__(name=f"FunctionAt({signature}, {only_reads})")
 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
-        """Its signature, for as many arguments."""
+        """Signature of the function if the number of arguments agrees, else None."""
         wanted = self.prototype.signature
         return wanted.replace(recvr=self) if len(args) == len(wanted.args) else None
 
     def get_call_signatures(self) -> Any:
-        """Its signature."""
+        """Signature of the function."""
         return [self.prototype.signature], False
 
     def get_impl_key(self, sig: Any) -> Any:

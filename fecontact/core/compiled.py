@@ -45,7 +45,7 @@ _COMPILING = ("Compiling {}{}, once on this machine; 'fecontact compile --all' c
 
 
 def source_digest(function: Any) -> str:
-    """A mark of all code and constants that a function is compiled from.
+    """Hash of all code and constants that a function is compiled from.
 
     It covers the functions that it calls, in whatever file they are, and the values of the
     globals that they name; comments, docstrings and times of files do not count. Numba by itself
@@ -66,7 +66,7 @@ def source_digest(function: Any) -> str:
 
 @cache
 def _own_digest(item: Any) -> tuple[str, tuple[Any, ...]]:
-    """A mark of one function, compiled or plain, and the functions that it refers to."""
+    """Hash of one function, compiled or plain, and the functions that it refers to."""
     called: list[Any] = []
     intrinsic_code = getattr(item, "_defn", None)
     function = intrinsic_code or getattr(item, "py_func", item)

@@ -44,7 +44,7 @@ class _NoMachineCode:
         return getattr(self._codegen, name)
 
     def set_env(self, env_name: str, env: Any) -> None:
-        """Nothing: the environment is that of the kernel."""
+        """Do nothing: the kernel provides the environment."""
 
 
 class _PartLibrary(JITCodeLibrary):
@@ -105,7 +105,7 @@ class _Borrow(FunctionPass):
     _name = "borrow"
 
     def __init__(self) -> None:
-        """Nothing to prepare."""
+        """Do nothing: the pass has no state."""
 
     def run_pass(self, state: Any) -> bool:
         """Put calls of :func:`borrowed` before the first use of arguments."""

@@ -52,7 +52,7 @@ class Size:
         return self.name
 
     def of(self, sizes: Mapping["Size", int]) -> int | None:
-        """Its value where ``sizes`` are known; None if it takes one that is not among them."""
+        """Value of the size for known ``sizes``; None if it depends on one that is not known."""
         try:
             return sizes[self] if self._value is None else self._value(sizes)
         except KeyError:

@@ -26,7 +26,7 @@ from numba.core.caching import IndexDataCacheFile
 
 from fecontact.core.errors import ModelWarning
 
-# Families of processors, the newest first, and the features that tell them from older ones.
+# Families of processors, the newest first, and the features that older ones lack.
 _V2 = ("cx16", "popcnt", "sahf", "sse3", "ssse3", "sse4.1", "sse4.2")
 FAMILIES = {
     "x86-64-v3": (*_V2, "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"),

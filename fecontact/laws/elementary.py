@@ -54,7 +54,7 @@ def _reduced(x):
         quarters * _QUARTER[2])
 
 
-# Its sums must not be reordered.
+# Sums of this function must not be reordered.
 _reduced = part(_reduced, error_model="numpy", fastmath=False, forceinline=True)
 
 

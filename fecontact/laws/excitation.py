@@ -123,7 +123,7 @@ class Drive:
 
     @property
     def in_space(self) -> bool:
-        """Whether something acts along z."""
+        """True if the drive acts along z."""
         return bool(self.stiffness_z or self.damping_z or self.amplitude_z
                     or self.motion_z is not None)
 
@@ -203,7 +203,7 @@ class PointLoad:
         return f"({', '.join(f'{part:.4g}' for part in self.component)})"
 
     def suits(self, components: Sequence[str]) -> bool:
-        """Whether points with these components of displacement can be loaded so."""
+        """True if points with these components of displacement can carry this force."""
         if isinstance(self.component, str):
             return self.component in components
         return len(self.component) == sum(len(name) == 1 for name in components)

@@ -200,7 +200,7 @@ class Measurement(Summarised):
     def with_units(self, units: Mapping[str, str]) -> "Measurement":
         """Copy whose channels are read in other units, by name: ``{"x": "mm"}``.
 
-        A value v that the file gives in mm becomes 1e-3 v m, whatever it was taken for before.
+        A value v that the file gives in mm becomes 1e-3 v m, regardless of its previous unit.
 
         Raises
         ------

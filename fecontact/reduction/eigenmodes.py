@@ -149,7 +149,7 @@ class FreeSystem:
 
     @property
     def iterates(self) -> bool:
-        """Whether deflections are iterated: there is a solver, and no factors were needed."""
+        """True if deflections are iterated: there is a solver, and no factors were needed."""
         return "factors" not in self.__dict__ and self.iterative is not None
 
     def deflection(self, forces: Array, accuracy: float = 1e-9) -> Array:

@@ -353,7 +353,7 @@ def ends_of_bodies(
 
 
 def displacement_rows(rows: Any, dimension: int) -> Any:
-    """Of rows of points, those of displacements, without those of rotations."""
+    """Rows of displacements among the rows of points, without those of rotations."""
     return rows[np.arange(rows.shape[0]) % (3 * (dimension - 1)) < dimension]
 
 
@@ -448,7 +448,7 @@ def _quality(
 
 
 def _deforms(system: FreeSystem, forces: Array) -> Array:
-    """Whether forces (f, k) are more than what accelerates the body as a whole."""
+    """Boolean mask (k,) of forces (f, k) that do more than accelerate the body as a whole."""
     rest = forces - system.inertia @ (system.rigid.T @ forces)
     return np.asarray(np.abs(rest).max(axis=0) > 1e-9 * np.abs(forces).max(axis=0))
 

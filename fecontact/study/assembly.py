@@ -130,7 +130,7 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
 
 
 def _rubs(study: Described, basis: ModalBasis) -> bool:
-    """Whether a node of an interface without own friction law can move along its other side."""
+    """True if a node of an interface without own friction law can move along its other side."""
     own, first = _own(study, "friction"), 0
     for name, count in basis.groups:
         moves = basis.contact_T[first : first + count, 0].any()

@@ -153,7 +153,7 @@ def _row(batch: Batch, base: Study, case: SweepCase, summaries: dict[Any, Functi
 def _run(batch: Batch, base: Study, case: SweepCase) -> tuple[Trajectory, Study]:
     study = prepared(batch, base, case)
     with warnings.catch_warnings():
-        # They go into the row.
+        # Warnings go into the row of the case.
         warnings.simplefilter("ignore", ModelWarning)
         trajectory = study.run(keep_steps=False)
     if trajectory.status is Status.INTERRUPTED:

@@ -76,7 +76,7 @@ class _Wheels:
     cases: tuple[tuple[str, Array], ...] = ()
 
     def of(self, deviations: Array) -> "_Wheels":
-        """The wheels with deviations (n, N); keys tell them from any others."""
+        """Wheels with deviations (n, N); their keys differ from those of any others."""
         same = hashlib.sha256(repr(self.band).encode())
         for part in (self.excitation.force, self.excitation.rows, self.excitation.damping,
                      self.tuned, self.sectors):

@@ -211,7 +211,7 @@ class SweepTable(Summarised):
                   for name, values in self.parameters.items()}
         axes = {name: list(dict.fromkeys(values)) for name, values in labels.items()}
         shape = tuple(map(len, axes.values()))
-        # Tables read from files do not tell whether they were grids.
+        # Tables read from files do not record whether they were grids.
         if list(product(*axes.values())) != list(zip(*labels.values(), strict=True)):
             raise InputError("The sweep is not a grid, so that it has no axes; its cases are rows "
                              "of to_pandas().")

@@ -83,7 +83,7 @@ def _beside(file: Path) -> Path:
 
 
 def distinct_names(paths: "Sequence[Path]") -> list[str]:
-    """Short names of files, with as many of their folders as tell them apart."""
+    """Short names of files, with as many of their folders as make them distinct."""
     parts = [path.resolve().with_suffix("").parts for path in paths]
     for count in range(1, max(map(len, parts)) + 1):
         names = ["/".join(one[-count:]) for one in parts]

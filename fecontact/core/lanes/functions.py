@@ -97,7 +97,7 @@ def logarithm(x):
 
 @helper
 def sine_and_cosine(x):
-    """Both, of angles up to 1e9."""
+    """Sine and cosine of angles up to 1e9."""
     quarters = whole(x * (2.0 / math.pi) + 0.5)
     r = fused(quarters, spread(-_QUARTER[1]), fused(quarters, spread(-_QUARTER[0]), x))
     y = r * r

@@ -49,7 +49,7 @@ class CellKind:
 
     @property
     def simplex(self) -> bool:
-        """Whether these are triangles or tetrahedra."""
+        """True for triangles and tetrahedra."""
         return self.corners == self.dimension + 1
 
 

@@ -160,7 +160,7 @@ class DeformedFace:
         return 1.0 / 3.0 if self.facets.shape[1] in (3, 6) else 0.5
 
     def _beside(self, local: Array) -> Array:
-        """How far local coordinates lie beside their facets, in parts of these."""
+        """Distance of local coordinates outside their facets, relative to the facets' size."""
         far = np.maximum(-local, local - 1.0).max(axis=1)
         if local.shape[1] == 2 and self.facets.shape[1] in (3, 6):
             far = np.maximum(far, local.sum(axis=1) - 1.0)

@@ -46,7 +46,7 @@ class SolidFace:
 
     @property
     def surface(self) -> Surface:
-        """Its facets."""
+        """Facets of the face."""
         return face_surface(self.body, self.boundary)
 
     @property
@@ -61,7 +61,7 @@ class Feet:
 
     ``facets`` and ``weights`` (s, n) are the facet and its shape functions at the foot, ``places``
     and ``normals`` (s, 3) the foot and the outward normal there, ``gaps`` (s,) the distances along
-    it, below zero behind the surface [m]. ``averted`` tells which look away from what is closest.
+    it, below zero behind the surface [m]. ``averted`` marks places that face away from it.
     """
 
     valid: NDArray[np.bool_]

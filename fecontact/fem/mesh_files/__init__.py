@@ -449,7 +449,7 @@ def _groups_of_meshio(found: Any) -> Iterator[tuple[str, int, Any]]:
     """Name, number of the block, and chosen rows of it, of each group of cells."""
     for name, sets in found.cell_sets.items():
         for number, rows in enumerate(sets):
-            # Sets of Gmsh's own names tell which entities bound which.
+            # Sets of Gmsh's own names list which entities bound which.
             if rows is not None and len(rows) and not name.startswith("gmsh:"):
                 yield name, number, np.asarray(rows, np.int64)
     names = {(int(tag), int(dim)): name for name, (tag, dim) in (

@@ -423,7 +423,7 @@ def _curved_edges(
 
 
 def _curved(points: Array, ends: Integers, middle: Array, size: float) -> tuple[Integers, Array]:
-    """Of edges (M, e, 2) with middles (M, e, d) those that are not straight."""
+    """Nodes (c, 2) and middles (c, d) of the curved ones of edges (M, e, 2)."""
     at = points[ends]
     chord = at[:, :, 1] - at[:, :, 0]
     length = np.linalg.norm(chord, axis=2)

@@ -372,5 +372,5 @@ class CubicFriction(SmoothedFriction):
 
 @friction_law
 def no_friction(v, F, p):
-    """Return R = 0, whatever the parameters: for nodes that cannot slide, such as springs."""
+    """Return R = 0 for all parameters: for nodes that cannot slide, such as springs."""
     return 0.0, 0.0, 0.0

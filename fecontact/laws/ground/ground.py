@@ -226,7 +226,7 @@ class Ground:
 
     @property
     def surface_kernel(self) -> CompiledLaw | None:
-        """Compiled map of heights; None where the profile tells the height."""
+        """Compiled map of heights; None where a profile gives the height."""
         return None if self.height_map is None else self.height_map.kernel
 
     def profile_parameters(self) -> Array:

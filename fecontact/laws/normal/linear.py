@@ -75,7 +75,7 @@ class LinearContact(NormalLaw):
         return self.onsets(nodes)[0] if self.kernel is _linear else np.full(nodes, -np.inf)
 
     def pieces(self, share: Array) -> Array | None:
-        """Nothing, and the force N_0 + c u + d v."""
+        """Two pieces: no force below the onset -N_0 / c, and N_0 + c u + d v above it."""
         if self.kernel is not _linear:
             return None
         c, d, preload = self.table(share).T

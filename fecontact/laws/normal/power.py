@@ -68,7 +68,7 @@ class _Power(NormalLaw):
         return np.full(nodes, 0.0 if self.kernel is _power else -np.inf)
 
     def pieces(self, share: Array) -> Array | None:
-        """Nothing, and the force, for n = 1 or n = 2; else None."""
+        """Two pieces, no force for u < 0 and the force above, for n = 1 or n = 2; else None."""
         scale, length, exponent, factor = self.table(share).T
         if self.kernel is not _power or not np.isin(exponent, (1.0, 2.0)).all():
             return None

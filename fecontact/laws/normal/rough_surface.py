@@ -164,7 +164,7 @@ class RoughSurface(NormalLaw):
         return np.full(nodes, 0.0 if self.kernel in _BEDS else -np.inf)
 
     def pieces(self, share: Array) -> Array | None:
-        """Nothing, part of the asperities, and all of them, for uniform heights; else None."""
+        """Three pieces for uniform heights: no asperity, a part, all in contact; else None."""
         if self.kernel is not uniform:
             return None
         c, R, d = self.table(share).T

@@ -101,7 +101,7 @@ class Harmonic(Signal):
 
     @property
     def fundamental_hz(self) -> float | None:
-        """Its frequency [Hz]; None for a constant."""
+        """Frequency of the signal [Hz]; None for a constant."""
         return None if self.shortest_period is None else self.frequency_hz
 
     @property

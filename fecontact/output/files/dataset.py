@@ -26,7 +26,7 @@ _NODES_IN_SPACE = {
     "normal_force": "N", "friction_forces": "N", "penetration": "m", "slip_velocities": "m/s",
     "pressure": "Pa", "friction_work": "J", "contact_state": "0 open, 1 stick, 2 slip",
 }
-# Where the name alone does not tell the sign.
+# Titles of quantities whose name does not define the sign.
 _TITLES = {"friction_force": "friction force on the body in -x"}
 # Between several bodies they act along the tangents of the contact nodes.
 _TITLES_OF_SEVERAL = {"friction_force": "friction force on the body in -t"}

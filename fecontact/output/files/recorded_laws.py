@@ -99,17 +99,17 @@ class RecordedSystem(ContactSystem):
 
     @property
     def arrays(self) -> Any:
-        """Not available: needs the compiled laws."""
+        """Raise InputError: needs the compiled laws."""
         raise InputError(self.needs)
 
     def with_(
         self, changes: Mapping[str, Any] | None = None, /, **by_name: Any
     ) -> ContactSystem:
-        """Not available: needs the laws."""
+        """Raise InputError: needs the laws."""
         raise InputError(self.needs)
 
     def parameters(self) -> dict[str, Any]:
-        """Not available: needs the laws."""
+        """Raise InputError: needs the laws."""
         raise InputError(self.needs)
 
     def contact_history(self, times: Array, states: Array) -> Array:

@@ -282,7 +282,7 @@ def _numbered_files(path: Path) -> Iterator[Callable[[Image], Any]]:
 
 
 def _is_ours(picture: Path) -> bool:
-    """Whether this package has drawn a picture."""
+    """True if a picture was drawn by this package."""
     with picture.open("rb") as file:
         return _OURS in file.read(1000)
 

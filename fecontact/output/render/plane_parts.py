@@ -60,7 +60,7 @@ def needed_height(motion: Motion) -> float:
 
 
 def _reach(motion: Motion) -> tuple[float, float]:
-    """How far the body, or the ground, is drawn above and below the level of the ground [m]."""
+    """Heights drawn above and below the level of the ground, of the body or the ground [m]."""
     bottom, top = motion.bounds[:, 1]
     low, high = motion.trajectory.system.ground.height_range
     return (max(top - motion.ground_level, motion.scale * high, 0.0),

@@ -63,7 +63,7 @@ class SolidGround:
         self._draw_arrows(frame)
 
     def _add_slab(self) -> None:
-        """Its top as a grid, and a skirt around it."""
+        """Add the slab: its top as a grid, and a skirt around it."""
         motion, size = self._motion, self._high - self._low
         count = np.maximum(np.round(_FINE * size / size.max()).astype(int), 2) if self._wavy else (
             np.array([1, 1]))
@@ -115,7 +115,7 @@ class SolidGround:
         middle = 0.5 * (self._low + self._high)
         found = []
         for normal in (np.array([cosine, sine]), np.array([-sine, cosine])):
-            # Those with normal . (r - origin) = k spacing for whole numbers k around the middle.
+            # Lines normal . (r - origin) = k spacing for whole numbers k around the middle.
             nearest = np.round(float(normal @ (middle - origin)) / self._spacing)
             k = nearest + np.arange(self._count) - self._count // 2
             start = origin + (k * self._spacing)[:, None] * normal
@@ -145,7 +145,7 @@ class SolidGround:
         return np.where(empty[:, None, None], self._low, ends)
 
     def _add_arrows(self) -> None:
-        """Arrows along the front, which tell where the ground goes."""
+        """Add arrows along the front that show the velocity of the ground."""
         place = self._low[1] + 0.45 * _BESIDE * self._extent
         x = np.linspace(self._low[0], self._high[0], 7)[1::2]
         self._arrow_places = np.column_stack([x, np.full(3, place)])

@@ -43,12 +43,12 @@ class SolidMotion(Motion):
 
     @cached_property
     def has_ground(self) -> bool:
-        """Whether there is a ground to be drawn: from below it would hide everything."""
+        """True if the ground is drawn: seen from below it would hide everything."""
         return self.on_ground and self.view == "above"
 
     @property
     def on_ground(self) -> bool:
-        """Whether any of the bodies stands on the ground."""
+        """True if any of the bodies stands on the ground."""
         return bool(self.trajectory.system.basis.ground_nodes.any())
 
     @cached_property
@@ -117,7 +117,7 @@ class SolidMotion(Motion):
 
 
 def motion_words(motion: SolidMotion) -> list[str]:
-    """How the ground moves: speed and direction, and turns."""
+    """Words for the motion of the ground: speed and direction, and rotation."""
     ground = motion.trajectory.system.ground
     if not motion.on_ground:
         return []

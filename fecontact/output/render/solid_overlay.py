@@ -59,7 +59,7 @@ class SolidOverlay(Overlay):
 
     @cached_property
     def _moving(self) -> NDArray[np.float64] | None:
-        """How ground and sliding bodies move, for the corner of the scene."""
+        """Image of the words for the motion of ground and sliding bodies; None without any."""
         moving = [*motion_words(self.motion), *self.motion.sliding]
         return label_image("   ".join(moving), 14.0 * self.size) if moving else None
 

@@ -26,7 +26,7 @@ _LAMPS = ((-0.55, 0.85, 0.8, 0.72), (0.7, 0.1, 0.9, 0.38))
 
 
 def from_below(motion: Shown) -> bool:
-    """Whether the contact faces of a run are looked at."""
+    """True if the view is from below, onto the contact faces of a run."""
     return isinstance(motion, SolidMotion) and motion.view == "below"
 
 
@@ -148,7 +148,7 @@ class Triad:
                        for name, end in zip("xyz", ends, strict=True)]
 
     def draw(self, frame: int) -> None:
-        """They stand still."""
+        """Do nothing: the axes stand still."""
 
     def names(self) -> Sequence[tuple[NDArray[np.float64], Array]]:
         """x, y and z at their ends."""

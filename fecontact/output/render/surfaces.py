@@ -78,7 +78,7 @@ def _edges(facets: Integers) -> tuple[Integers, Integers, Integers]:
 
 
 def _neighbours(nodes: Array, facets: Integers, edges: Any = None) -> tuple[Any, Any, Any]:
-    """Both facets of each edge that two have, and whether the surface is smooth there."""
+    """Facets on both sides of each inner edge, and True where the surface is smooth there."""
     _, which, counts = _edges(facets) if edges is None else edges
     normals = facet_vectors(nodes, facets)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)

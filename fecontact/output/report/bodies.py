@@ -64,7 +64,7 @@ class Motions:
 
     @cached_property
     def _magnified(self) -> _Reached:
-        """Without the drift."""
+        """Range of the displacements without the drift."""
         if self.drift is None or not self.drift.any():
             return self._whole
         shapes = self.bodies.shapes.copy()
@@ -95,7 +95,7 @@ class Motions:
 
     @property
     def largest_stress(self) -> float:
-        """Of von Mises [Pa]."""
+        """Largest von Mises stress [Pa]."""
         return float(self._stresses.max())
 
     @property

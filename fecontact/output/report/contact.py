@@ -182,7 +182,7 @@ def drawn_ground(motion: Motion, box: Sequence[float]) -> DrawnGround | None:
 
 
 def _with_map(ground: DrawnGround, heights: HeightMap, box: Sequence[float]) -> DrawnGround:
-    """With the part of a map that comes below the bodies, or all of it."""
+    """Add the part of a map of heights that comes below the bodies, at most one period."""
     lines = []
     beside = _BESIDE * max(box[1] - box[0], box[3] - box[2])
     for axis, count in enumerate(np.shape(heights.heights)):
@@ -190,7 +190,7 @@ def _with_map(ground: DrawnGround, heights: HeightMap, box: Sequence[float]) -> 
         way = ground.travel[:, axis]
         first = box[2 * axis] - beside - float(way.max())
         size = box[2 * axis + 1] + beside - float(way.min()) - first
-        # Beyond its period it begins anew.
+        # The map repeats itself: one period is enough.
         size = min(size, count * spacing)
         points = int(np.clip(np.ceil(_MAP * size / spacing), 4, _MOST_OF_MAP))
         lines.append((first, size / points, points))

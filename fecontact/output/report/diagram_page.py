@@ -132,7 +132,7 @@ def _scales(seen: Motions, count: int) -> list[float]:
 
 
 def _status(named: Mapping[str, Branch]) -> str:
-    """How the branches ended: one sentence where all ended alike."""
+    """Reasons for the ends of the branches: one sentence where all are equal."""
     ends = {branch.end for branch in named.values()}
     if len(ends) == 1 and len(named) > 1:
         return f"All branches: {ends.pop()}"

@@ -69,7 +69,7 @@ class DrawnBodies:
 
     @property
     def dimension(self) -> int:
-        """Of the space that they lie in."""
+        """Dimension of the space, 2 or 3."""
         return int(self.nodes.shape[1])
 
     @property
@@ -127,7 +127,7 @@ class DrawnContact:
 class DrawnGround:
     """The ground below the bodies: its height is ``profile(x - travel)`` above its level.
 
-    In space x is the distance along ``direction``; or a map tells the heights over x and y.
+    In space x is the distance along ``direction``; or a map gives the heights over x and y.
 
     Attributes
     ----------

@@ -178,7 +178,7 @@ def _together(tokens: list[tuple[str, str]]) -> list[tuple[str, str]]:
 
 
 def _is_method(code: list[tuple[str, str]], at: int) -> bool:
-    """Whether the bracket at a place closes before a body."""
+    """True if a body follows the bracket that opens at a place."""
     depth = 0
     while at < len(code):
         if code[at][0] == "sign":

@@ -100,13 +100,13 @@ def welded_rows(basis: ModalBasis, weld: FaceWeld) -> Array:
 
 
 def _displacements(rows: Any, pairing: Pairing) -> Any:
-    """Of the rows of each node those of displacements."""
+    """Rows of displacements, without those of rotations, of all nodes."""
     d = pairing.places.shape[1]
     return rows[np.flatnonzero(np.arange(rows.shape[0]) % (3 * (d - 1)) < d)]
 
 
 def _rotations(rows: Any, pairing: Pairing) -> Any:
-    """Of the rows of each node those of rotations."""
+    """Rows of rotations, without those of displacements, of all nodes."""
     d = pairing.places.shape[1]
     return rows[np.flatnonzero(np.arange(rows.shape[0]) % (3 * (d - 1)) >= d)]
 

@@ -80,7 +80,7 @@ class InterfaceCompliance(Summarised):
 
     @property
     def enough(self) -> bool:
-        """Whether 90 % are resolved under each of these loads."""
+        """True if 90 % of the compliance are resolved under each of these loads."""
         return self.worst >= _ENOUGH - 1e-9
 
     @property
@@ -209,7 +209,7 @@ def _compared(
 def _elastic_rows(
     basis: ModalBasis, bodies: ElasticBody | Mapping[str, ElasticBody]
 ) -> dict[str, tuple[ElasticBody | None, Any, slice]]:
-    """Of each body the finite-element model, rows (d n, d N_k) of the contact, and modes."""
+    """Finite-element model, contact rows (d n, d N_k) and modes of each body, by its name."""
     import scipy.sparse as sp
 
     field, n = basis.mode_shapes, basis.contact_nodes

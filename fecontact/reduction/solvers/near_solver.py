@@ -71,7 +71,7 @@ class NearSolver:
         B = sp.bsr_array((spread.data[:, None, None] * np.eye(3), spread.indices, spread.indptr),
                          shape=(3 * spread.shape[0], 3 * spread.shape[1]))
         KB = sp.bsr_array(K @ B)
-        # Those that follow couple fixed displacements with others.
+        # Nodes that follow couple fixed displacements with others.
         gather, free = sp.bsr_array(B.T), moving[own]
         near = held_matrix(_sorted(sp.bsr_array(gather @ KB)), free)
         mass = _sorted(sp.csr_array(spread.T @ (M @ spread)))

@@ -39,7 +39,7 @@ _SINGLE = 1e-3
 
 
 def suited(body: ElasticBody) -> bool:
-    """Whether the iterative solver is the better one for a body.
+    """True if the iterative solver is expected to be better for a body than factorisation.
 
     It is not for small and plane bodies, hinges, constraints, nearly incompressible or strongly
     anisotropic material, and where a tenth of the cells are longer than five times their width, as
@@ -51,7 +51,7 @@ def suited(body: ElasticBody) -> bool:
 
 
 def possible(body: ElasticBody) -> bool:
-    """Whether the iterative solver knows such bodies: solids with plain supports alone."""
+    """True if the iterative solver supports a body: solids with plain supports only."""
     return body.dimension == 3 and not (body.hinges or body.equations or body.added)
 
 
@@ -212,7 +212,7 @@ class SolidSolver:
 
 
 def moving_components(body: ElasticBody) -> Array:
-    """One for each displacement (N, 3) that is not fixed, else zero."""
+    """Mask (N, 3) of the displacements: one where free, zero where fixed."""
     moving = np.ones(3 * len(body.nodes))
     moving[body.fixed_dofs] = 0.0
     return moving.reshape(-1, 3)

@@ -60,8 +60,8 @@ def craig_bampton(
 def _told_apart(system: FreeSystem, vectors: Array) -> Array:
     """Vectors (f, p) of the same span, with similar energies and nearly orthogonal.
 
-    Products of vectors that nearly depend on each other lose what tells them apart to rounding,
-    about 1e-16 of their squares; their differences lose its root alone. Constraint modes and
+    Products of nearly dependent vectors lose their differences to rounding, about 1e-16 of their
+    squares; the differences themselves lose only its root. Constraint modes and
     fixed-interface modes of slender bodies are such vectors.
     """
     stiffness = vectors.T @ (system.stiffness @ vectors)

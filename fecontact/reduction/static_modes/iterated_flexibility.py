@@ -111,7 +111,7 @@ class TrialSpace:
         return np.asarray(self._expansion @ self.system.deflection(self._expansion.T @ forces))
 
     def at_followers(self, forces: Array) -> Array:
-        """Of forces (f, k) those at the nodes that follow."""
+        """Forces at the nodes that follow, from forces (f, k) at all free unknowns."""
         if self.near is None:
             return forces[:0]
         whole = np.asarray(self._expansion @ forces).reshape(-1, 3, forces.shape[1])

@@ -181,7 +181,10 @@ class _Gram:
     own: Array
 
     def of(self, coordinates: Array, part: Array) -> Array:
-        """Of coordinates Z (s, p) and coefficients c (q, p + l); the last l have no Z."""
+        """Products of sums with coordinates Z (s, p) and coefficients c (q, p + l).
+
+        The last l sums have no Z.
+        """
         p, n = coordinates.shape[1], part.shape[1]
         found = np.zeros((n, n))
         for first in range(0, p, _COLUMNS):
