@@ -89,7 +89,7 @@ def campbell(
     Parameters
     ----------
     basis : ModalBasis
-        Of a body that rotates, ``modal_basis(body, ..., rotation=Rotation(speed))``.
+        Modal basis of a rotating body, ``modal_basis(body, ..., rotation=Rotation(speed))``.
     speeds : (n,) sequence
         Ascending [rad/s].
     count : int, optional

@@ -78,7 +78,7 @@ def compare_runs(
     runs : mapping of name to Trajectory
         The runs; the first is the reference.
     points, t_start
-        As for :func:`fecontact.analysis.key_numbers`.
+        See :func:`fecontact.analysis.key_numbers`.
     studies : sequence of str or None
         Study of each run as TOML text, as :attr:`fecontact.io.Case.study` holds it.
 

@@ -52,7 +52,7 @@ def history(
         'friction_work' of a contact node; 'total_normal_force', 'total_friction_force' or
         'total_friction_work' of the whole face.
     point : str, int, (x, y) or (x, y, z)
-        As for :meth:`Trajectory.displacement`.
+        See :meth:`Trajectory.displacement`.
     component : 'x', 'y' or 'phi', of solids also 'z', 'phi_x', 'phi_y', 'phi_z'
         Component of displacements and velocities: tangential, normal, or rotation. Contact nodes
         of several bodies move relative to the other side, along their tangents and normals.

@@ -178,18 +178,18 @@ def find_rests(
     trajectory : Trajectory
         The run.
     nodes : int, str or None
-        As for :func:`find_impacts`.
+        See :func:`find_impacts`.
     longer_than : float, optional
         Minimum duration of the contact [s]; a tenth of the drive period by default.
     slower_than : float
         Velocity limit at rest, as a fraction of the largest impact velocity of the run.
     shortest_flight : float
-        As for :func:`find_impacts`.
+        See :func:`find_impacts`.
 
     Raises
     ------
     InputError, AnalysisError
-        As :func:`find_impacts`, and for a run without a drive if ``longer_than`` is not given.
+        As in :func:`find_impacts`, and for a run without a drive if ``longer_than`` is not given.
     """
     require_kind("find_rests", Trajectory, trajectory=trajectory)
     require_positive("find_rests", slower_than=slower_than)

@@ -122,9 +122,9 @@ def mistuned_response(
     order : int
         m, from 0 to N.
     frequencies_hz : (F,) array
-        Of the force [Hz].
+        Frequencies of the force [Hz].
     force : (point, component)
-        Where a force of 1 N acts in each sector, with the phase ``-2 pi m s / N``: ``("blade.tip",
+        Place of a force of 1 N in each sector, with the phase ``-2 pi m s / N``: ``("blade.tip",
         "y")``.
     observe : (point, component), optional
         The displacement, by default that of the force.
@@ -148,16 +148,16 @@ def amplification(
     Parameters
     ----------
     whole : WholeWheel
-        With deviations.
+        Wheel with deviations.
     order, force, observe : int, (point, component), (point, component)
-        As for :func:`mistuned_response`.
+        See :func:`mistuned_response`.
     band_hz : (float, float)
         Frequencies over which both are looked for [Hz].
 
     Raises
     ------
     InputError
-        As :func:`mistuned_response`.
+        As in :func:`mistuned_response`.
     AnalysisError
         For a band without a natural frequency of either wheel.
     """

@@ -175,7 +175,7 @@ def section_states(
     trajectory : Trajectory
         The run.
     point, component
-        As for :meth:`Trajectory.displacement`; by default the component with the fastest motion of
+        See :meth:`Trajectory.displacement`; by default the component with the fastest motion of
         B and the contact nodes.
     t_start : float, optional
         Start of the evaluation, after the transient [s]; the middle of the run by default.
@@ -322,14 +322,14 @@ def periodicity(
         A run over at least ``3 largest`` periods after ``t_start``, with at least eight outputs
         per period to measure the size of the attractor.
     period, t_start
-        As for :func:`strobed_states`.
+        See :func:`strobed_states`.
     largest, tolerance
-        As for :func:`count_periods`.
+        See :func:`count_periods`.
 
     Raises
     ------
     InputError
-        As :func:`strobed_states` and :func:`count_periods`, and for too few outputs per period.
+        As in :func:`strobed_states` and :func:`count_periods`, and for too few outputs per period.
     """
     require_kind("periodicity", Trajectory, trajectory=trajectory)
     basis = trajectory.system.basis

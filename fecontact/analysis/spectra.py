@@ -36,7 +36,7 @@ class Spectrum:
     Attributes
     ----------
     frequency_hz : (F,) array
-        From zero to half the sampling rate [Hz].
+        Frequencies from zero to half the sampling rate [Hz].
     values : (F,) array
         Amplitudes in the unit u of the history, or power spectral density in u^2/Hz.
     kind : 'amplitude' or 'density'
@@ -159,7 +159,7 @@ def amplitude_spectrum(
     Parameters
     ----------
     time, values, resample
-        As for :func:`evenly_sampled`.
+        See :func:`evenly_sampled`.
     window : str
         Window of :func:`scipy.signal.get_window`: 'hann', 'flattop' for exact heights, 'boxcar'
         for histories of whole periods.
@@ -203,12 +203,12 @@ def power_spectral_density(
     Parameters
     ----------
     time, values, resample
-        As for :func:`evenly_sampled`.
+        See :func:`evenly_sampled`.
     piece : float, optional
         Length of the segments [s]; by default an eighth of the history, or ten periods of its
         mean frequency if these are longer.
     window : str
-        Of :func:`scipy.signal.get_window`.
+        Name of a window of :func:`scipy.signal.get_window`.
 
     Raises
     ------
@@ -247,19 +247,19 @@ def spectrogram(
     Parameters
     ----------
     time, values, resample
-        As for :func:`evenly_sampled`.
+        See :func:`evenly_sampled`.
     piece : float, optional
         Length of the segments [s]; by default 1/32 of the history, or ten periods of its mean
         frequency if these are longer.
     overlap : float
         Fraction by which adjacent segments overlap, at least 0 and below 1.
     window : str
-        Of :func:`scipy.signal.get_window`.
+        Name of a window of :func:`scipy.signal.get_window`.
 
     Raises
     ------
     InputError
-        As :func:`power_spectral_density`, and for an overlap out of range.
+        As in :func:`power_spectral_density`, and for an overlap out of range.
     """
     from scipy.signal import get_window
 

@@ -48,7 +48,7 @@ class Finding:
     what : str
         Name of the component.
     works : bool
-        Whether it is installed and works.
+        True if it is installed and works.
     detail : str
         Version, or the reason why it does not work.
     remedy : str

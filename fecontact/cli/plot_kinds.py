@@ -32,7 +32,7 @@ class PlotRequest:
     Attributes
     ----------
     quantity, component : str
-        As for :func:`fecontact.analysis.history`; the component by default that of the drive.
+        See :func:`fecontact.analysis.history`; the component by default that of the drive.
     points : tuple of points
         Named points and contact nodes; a history shows all of them, other plots only the first.
     highest_hz : float or None

@@ -280,7 +280,7 @@ class CompiledLaw:
     python : callable
         The function as written, for other compilers and for tests.
     form : str
-        Its arguments and results, for people.
+        Arguments and results of the function, for messages.
     """
 
     python: Callable[..., Any]

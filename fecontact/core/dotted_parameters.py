@@ -39,7 +39,7 @@ def with_parameters(whole: Any, changes: Mapping[str, Any]) -> Any:
     Raises
     ------
     KeyError
-        With the dotted name that does not exist.
+        Names the dotted name that does not exist.
     """
     members = _members(whole)
     direct: dict[str, Any] = {}

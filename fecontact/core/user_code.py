@@ -54,7 +54,7 @@ def user_function(file: Path, name: str) -> Callable[[Any], float]:
     Raises
     ------
     InputError
-        As :func:`user_module`, or if the file has no such function.
+        As in :func:`user_module`, or if the file has no such function.
     """
     module = user_module(file)
     function = getattr(module, name, None)

@@ -112,7 +112,7 @@ def pattern(dofs: Integers, size: int) -> tuple[Any, Any, Any]:
     indptr (N + 1,), indices : integer arrays
         By rows, sorted.
     slots : (c, k, k) integer array
-        Where the entry between two of the k nodes of each cell stands.
+        Index of the entry between two of the k nodes of each cell.
     """
     count, width = dofs.shape
     starts = np.zeros(size + 1, dtype=np.int64)

@@ -119,7 +119,7 @@ class PointSpring:
     Parameters
     ----------
     terms : sequence of Term
-        As of a :class:`~fecontact.fem.LinearEquation`.
+        Terms of a :class:`~fecontact.fem.LinearEquation`.
     stiffness : float
         k, zero or above [N/m]; [N m] for an elongation that is an angle.
     damping : float

@@ -50,7 +50,7 @@ def contact_groups(
     Raises
     ------
     InputError
-        As :func:`contact_nodes`, or if a boundary is named twice, two of them share an edge, or the
+        See :func:`contact_nodes`; if a boundary is named twice, two of them share an edge, or the
         number of counts differs from that of the boundaries.
     """
     import scipy.sparse as sp

@@ -76,7 +76,7 @@ class ElasticBody(Summarised):
     thickness : float
         Out-of-plane thickness of a plane body, positive [m].
     plane : 'stress' or 'strain'
-        Of a plane body; solids have neither thickness nor plane.
+        Plane stress or plane strain; solids have neither thickness nor plane.
     degree : 2 or 1
         Quadratic (P2, Q2) or linear (P1, Q1) displacements.
     fixed : mapping of name to 'x', 'y', 'xy', of solids also 'z', 'xz', 'yz', 'xyz', or a hinge
@@ -89,7 +89,7 @@ class ElasticBody(Summarised):
         Linear equations between displacements, see :mod:`fecontact.fem.constraints`; by default
         those of the mesh, which a file may hold.
     bricks : 'full' or 'incompatible', optional
-        Of hexahedra with ``degree = 1``: trilinear displacements alone, or with incompatible modes
+        Hexahedra with ``degree = 1``: trilinear displacements alone, or with incompatible modes
         of each cell, which bend without locking; by default those of the mesh. See
         :mod:`fecontact.fem.incompatible_modes`.
     attachments : sequence of PointMass or PointSpring, optional

@@ -59,7 +59,7 @@ class StrainState:
     strain : float
         Largest component of E at a point of quadrature, without sign.
     contacts : bytes
-        Which contacts are closed, and which slide; empty without contacts.
+        Set of closed and of sliding contacts, as bytes; empty without contacts.
     rounding : float
         Error of the forces of contacts by rounding of places [N].
     """

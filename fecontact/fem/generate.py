@@ -114,7 +114,7 @@ def generate(shape: Shape | SolidShape) -> Mesh:
     Returns
     -------
     Mesh
-        With the named boundaries and points of the shape; its points are nodes.
+        Mesh with the named boundaries and points of the shape; its points are nodes.
 
     Raises
     ------

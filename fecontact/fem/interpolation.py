@@ -30,7 +30,7 @@ def interpolation(
     place : d floats
         [m].
     name : str
-        What is looked for, for messages.
+        Name of the object at the place, for messages.
 
     Raises
     ------

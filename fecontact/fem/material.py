@@ -123,7 +123,7 @@ class AnisotropicMaterial:
     density : float
         rho, positive [kg/m^3].
     axes : MaterialAxes or CylindricalAxes
-        By default those of the body: x, y, z.
+        Axes of the material; by default those of the body: x, y, z.
     loss_factor : float
         Share of the elastic energy that a cycle dissipates, over 2 pi; zero or above.
 
@@ -185,7 +185,7 @@ class AnisotropicMaterial:
         shear_moduli : (G_12, G_13, G_23)
             [Pa]
         density, axes, loss_factor
-            As of the class.
+            See the class.
 
         Raises
         ------
@@ -244,12 +244,12 @@ class AnisotropicMaterial:
         shear_modulus : float
             G_12 = G_13 [Pa]; ``G_23 = E_2 / (2 (1 + nu_23))``.
         density, axes, loss_factor
-            As of the class.
+            See the class.
 
         Raises
         ------
         InputError
-            As :meth:`orthotropic`.
+            As in :meth:`orthotropic`.
         """
         for name, values in (("youngs_moduli", youngs_moduli), ("poisson_ratios", poisson_ratios)):
             if as_floats(values, f"AnisotropicMaterial: {name}").shape != (2,):

@@ -42,7 +42,7 @@ class _Checked:
     Attributes
     ----------
     nodes, cells : arrays
-        As of the mesh; read-only.
+        Nodes and cells of the mesh; read-only.
     kind : CellKind
     facets : (M f, n) array
         Sides of each cell in turn, so that inner ones occur twice.
@@ -125,7 +125,7 @@ class Mesh(Summarised):
     curved_edges : (k, 2) integer array
         Nodes of the edges of cells that are curved, each edge once; none by default.
     curved_middles : (k, 2) or (k, 3) array
-        Their middles [m]: an edge is the parabola through its ends and this place.
+        Places at the middles of these edges [m]: an edge is the parabola through ends and middle.
     constraints : sequence of LinearEquation, Tie or Coupling
         Constraints between displacements that a file holds, for bodies of this mesh; none by
         default.
@@ -175,7 +175,7 @@ class Mesh(Summarised):
         Returns
         -------
         Mesh
-            With the boundaries ``left`` (first x), ``right``, ``bottom`` and ``top``; in space
+            Mesh with the boundaries ``left`` (first x), ``right``, ``bottom`` and ``top``; in space
             bottom and top are those of z, ``front`` (first y) and ``back`` those of y. Points are
             the corners, such as ``"bottom left"`` or ``"top back right"``.
 

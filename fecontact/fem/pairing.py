@@ -108,9 +108,9 @@ class TwoPassPairing(Summarised):
     Parameters
     ----------
     first : Pairing
-        With the nodes on the first face.
+        Pass with the nodes on the first face.
     second : Pairing
-        With the nodes on the other one, whose normals are the opposite ones.
+        Pass with the nodes on the other face, whose normals are the opposite ones.
     """
 
     first: Pairing
@@ -164,7 +164,7 @@ def pair_faces(
         whose loads are even also where the meshes do not match. Of solids every facet, or patches
         of about equal area; two numbers are those along the first and the second tangent.
     nodes_on : "finer" or "face"
-        Which face has the nodes: ``other`` if it is finer than ``face``, or ``face`` in any case.
+        Face with the nodes: ``other`` if it is finer than ``face``, or ``face`` in any case.
     reach : float or None
         Largest distance of a partner [m]; None: the extent of the larger face; any above ground.
     overlap : float

@@ -30,7 +30,7 @@ class PairingReport(Summarised):
     left_out : (k, d) array
         Places of the face's displacement nodes without a partner, of solids of its facets [m].
     reasons : tuple of str
-        Why each of them has none.
+        Reason why each of these places has no partner.
     covered : float
         Share of the length of the face that has a partner.
     unevenness : float

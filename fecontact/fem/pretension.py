@@ -63,9 +63,9 @@ def with_pretension(mesh: Mesh, name: str, section: PretensionSection) -> Mesh:
     Parameters
     ----------
     mesh : Mesh
-        Of a solid or a plane body.
+        Mesh of a solid or a plane body.
     name : str
-        Of the control point.
+        Name of the control point.
     section : PretensionSection
         Place, direction and cells of the cut.
 

@@ -40,13 +40,13 @@ class Rotation:
     centrifugal_load : bool
         The centrifugal force on the undeformed body, which stretches it.
     spin_softening : bool
-        What the centrifugal force adds with the displacement, ``-Omega^2 M P u``.
+        Change of the centrifugal force with the displacement, ``-Omega^2 M P u``.
     stress_stiffening : bool
         The geometric stiffness K_sigma of the stress under the centrifugal force.
     axis : (x, y, z)
         e, of any length above zero, of solids; in the plane z.
     frame : 'rotating' or 'standing'
-        In which displacements, supports, contact and loads are given.
+        Frame of displacements, supports, contact and loads.
 
     Raises
     ------

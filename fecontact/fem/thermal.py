@@ -33,7 +33,7 @@ def nodal_temperatures(body: ElasticBody, temperature: Temperature) -> Array:
     Parameters
     ----------
     body : ElasticBody
-        Of isotropic materials with a thermal expansion.
+        Body of isotropic materials with a thermal expansion.
     temperature : float, (N,) array, function of the coordinates or 'mesh'
         The change from the state without stress [K]; ``lambda x, y: 100.0 * y``, of solids of x, y
         and z; 'mesh' for that of its file, ``body.mesh.temperature``.

@@ -74,7 +74,7 @@ class Curve:
     y_label : str
         Label of the values, with their unit.
     part : slice
-        Which of the numbers of the data set they are.
+        Part of the numbers of the data set.
     logarithmic : bool
         Whether the abscissa has a logarithmic axis.
     """
@@ -142,7 +142,7 @@ class FunctionData(FitData):
     values : (n,) array
         Measured numbers.
     deviation : float or (n,) array, optional
-        Their standard deviations; without any, they follow from the residuals.
+        Standard deviations of the numbers; without any, they follow from the residuals.
     abscissa : (n,) array, optional
         Places at which they are drawn.
     labels : (str, str)

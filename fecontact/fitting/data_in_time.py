@@ -51,7 +51,7 @@ class HistoryData(FitData):
     deviation : float or (n,) array, optional
         Standard deviations; without any, they follow from the residuals.
     quantity, point, component
-        As for :func:`fecontact.analysis.history`.
+        See :func:`fecontact.analysis.history`.
     initial : optional
         State at the first time, as for :func:`fecontact.simulate`, or a function of the system that
         gives it.
@@ -154,13 +154,13 @@ class DecayData(CurveData):
     Parameters
     ----------
     curve : AmplitudeCurve
-        What :func:`fecontact.measured.ring_down` found in the measurement, with its deviations.
+        Result of :func:`fecontact.measured.ring_down` for the measurement, with its deviations.
     initial : array or function
         State from which the run decays, as for :class:`HistoryData`.
     t_end : float
         Duration of the run [s].
     quantity, point, component
-        What is evaluated, as for :func:`fecontact.analysis.history`.
+        Quantity of the run, see :func:`fecontact.analysis.history`.
     options : mapping
         Arguments of :func:`fecontact.measured.ring_down`, the same as for the measurement.
     rtol : float
@@ -231,13 +231,13 @@ class LoopData(FitData):
     deviation : float or (n,) array, optional
         Standard deviations of the forces; without any, they follow from the residuals.
     along : str
-        What the displacement is: 'motion_x', 'motion_y', 'motion_z' of the driven end of the
+        Kind of displacement: 'motion_x', 'motion_y', 'motion_z' of the driven end of the
         springs at B, or 'travel', 'travel_y' of the ground.
     path : LoadPath, optional
         Path with n points, in place of the one along the displacements; the forces are those of
         ``along``, any action of :meth:`fecontact.system.LoadHistory.loop`.
     tangential_ratio, tangential_stiffness, rtol
-        As for :func:`fecontact.load_history`.
+        See :func:`fecontact.load_history`.
 
     Raises
     ------

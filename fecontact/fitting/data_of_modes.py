@@ -37,7 +37,7 @@ class FrequencyData(FitData):
     deviation : float or (n,) array, optional
         Standard deviations [Hz]; without any, they follow from the residuals.
     modes : (n,) integers, optional
-        Which modes of the model they belong to, from 1 by ascending frequency, rigid ones left out;
+        Numbers of the model's modes, from 1 by ascending frequency, rigid ones left out;
         by default the first ones. Pair modes by their shapes first, see
         :func:`fecontact.measured.pair_modes`.
     about : 'rest', 'sliding' or LoadPath, optional
@@ -151,7 +151,7 @@ class ReceptanceData(FitData):
     values : (F,) complex array
         Measured response per force.
     excitation, response : (point, component)
-        Where it was excited and measured.
+        Point and component of the excitation and of the response in the measurement.
     deviation : float or (F,) array, optional
         Standard deviations of real and of imaginary part; without any, they follow from the
         residuals.

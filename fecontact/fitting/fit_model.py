@@ -40,7 +40,7 @@ def fit(
     model : ContactSystem, Study or path of a study
         The model.
     parameters : mapping of dotted name to FitParameter, (low, high) or table
-        What is sought, by the names of :meth:`ContactSystem.with_` or of a study.
+        Parameters to find, by the names of :meth:`ContactSystem.with_` or of a study.
     data : FitData or sequence of FitData
         Measurements of any kinds, with their standard deviations.
     starts : int
@@ -58,7 +58,7 @@ def fit(
     executor : concurrent.futures.Executor, optional
         In place of processes.
     folder : path, optional
-        Where evaluations are kept: a fit that was cancelled goes on there.
+        Folder that stores evaluations: a fit that was cancelled goes on there.
     overwrite : bool
         Whether to replace the evaluations in this folder.
     progress : bool or callable, optional

@@ -39,7 +39,7 @@ def fit_study(
     study : Study
         Study with a section ``[fit]``.
     workers, folder, overwrite, progress
-        As for :func:`fecontact.fit`.
+        See :func:`fecontact.fit`.
 
     Raises
     ------

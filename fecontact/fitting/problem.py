@@ -39,9 +39,9 @@ class Problem:
     names : tuple of str
         Dotted names of the p parameters.
     parameters : tuple of FitParameter
-        Their ranges.
+        Ranges of the parameters.
     data : tuple of FitData
-        What the model is compared with.
+        Data that the model is compared with.
     exact : bool
         Whether exact derivatives are used where there are some.
     """

@@ -26,7 +26,7 @@ class ProfileLikelihood(Summarised):
     name : str
         Name of the parameter.
     values : (k,) array
-        Its values, ascending.
+        Values of the parameter, ascending.
     chi_square : (k,) array
         Least weighted sums of squares, divided by chi^2 / (n - p) of the fit where the data have no
         deviations; NaN where the model fails.

@@ -35,9 +35,9 @@ class FitStart:
         Sum of squares of the weighted residuals; of a robust loss twice the cost. Infinite if it
         failed.
     message : str
-        Why it failed, or did not end; else empty.
+        Reason why the start failed, or did not end; else empty.
     evaluations : int
-        How often the model was evaluated.
+        Number of evaluations of the model.
     """
 
     start: Array

@@ -59,7 +59,7 @@ def coefficient(law: Curve, velocity: Array | float, normal_force: float = 1.0) 
     law : FrictionLaw
         A law without memory.
     velocity : (...) array or float
-        With parameters per node, (n,) of them, velocities broadcast against (n,).
+        Slip velocities [m/s]; with parameters per node, (n,) of them, they broadcast against (n,).
     normal_force : float
         F [N]; it matters only if the friction force is not proportional to F.
 

@@ -46,7 +46,7 @@ class AmplitudeCurve(Summarised):
     observed : str
         Title of the amplitude, such as 'B x'.
     note : str
-        Which part of the data was left out and why; empty for none.
+        Part of the data that was left out and the reason; empty for none.
 
     Raises
     ------

@@ -120,7 +120,7 @@ def pair_modes(
     Raises
     ------
     InputError
-        As :func:`modal_assurance`, for numbers of frequencies that do not fit, or a bound out of
+        As in :func:`modal_assurance`, for numbers of frequencies that do not fit, or a bound out of
         range.
     """
     from scipy.optimize import linear_sum_assignment
@@ -178,7 +178,7 @@ def scale_question(measured: ArrayLike, computed: ArrayLike, names: Sequence[str
     Raises
     ------
     InputError
-        As :func:`response_assurance`.
+        As in :func:`response_assurance`.
     """
     x, y = _responses(measured, computed)
     ratio = np.linalg.norm(x, axis=0) / np.linalg.norm(y, axis=0)

@@ -87,14 +87,14 @@ def read_measurement(
     path : str or Path
         The file.
     axis : 'time' or 'frequency', optional
-        Which measurement of a file with both.
+        Abscissa of the measurement, for a file with both.
     units : mapping of channel to unit, optional
         Units in which the file gives channels, in place of its own.
 
     Raises
     ------
     InputError
-        As :func:`read_measurements`, and if the file holds none or several over this axis.
+        As in :func:`read_measurements`, and if the file holds none or several over this axis.
     """
     if axis not in (None, "time", "frequency"):
         raise InputError(f"read_measurement: axis = {axis!r} must be 'time' or 'frequency'.")

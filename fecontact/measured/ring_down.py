@@ -58,7 +58,7 @@ def ring_down(
     t_start, t_end : float, optional
         Part of the record [s], such as without the blow at its beginning.
     derivative : 0, 1 or 2, optional
-        Of the displacement that the values are, by default by their unit.
+        Order of the time derivative of displacement that the values are; by default by their unit.
     resample : bool
         Whether to interpolate uneven times by splines.
     **channel

@@ -115,7 +115,7 @@ def basis_from_modes(
     shapes : (d, m) array
         Real mode shapes, one per column.
     rows : mapping
-        As for :func:`~fecontact.basis_from_matrices`.
+        See :func:`~fecontact.basis_from_matrices`.
     frequencies_hz, angular_frequencies : (m,) array
         One of the two [Hz, rad/s]; exactly zero for rigid modes.
     mass : dense or sparse (d, d) array, or AssembledMatrix
@@ -128,7 +128,7 @@ def basis_from_modes(
     orthogonality : float
         Largest accepted product ``|s_i^T M s_j|`` of two mass-normalised shapes.
     contact_x, tributary, thickness, dimension, contact_places, recovery : optional
-        As for :func:`~fecontact.basis_from_matrices`.
+        See :func:`~fecontact.basis_from_matrices`.
     translations : (2, d) array, in space (3, d), optional
         Likewise; needs the mass matrix.
 

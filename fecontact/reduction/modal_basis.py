@@ -44,8 +44,8 @@ class ModalBasis(Summarised):
     Attributes
     ----------
     angular_frequencies : (m,) array
-        Of the symmetric part of the stiffness without rotation [rad/s], ascending, of several
-        bodies one after the other; exactly zero for rigid modes.
+        Frequencies of the symmetric part of the stiffness without rotation [rad/s], ascending, of
+        several bodies one after the other; exactly zero for rigid modes.
     damping : (m, m) array
         Modal damping matrix [1/s], ``diag(2 D w)`` for damping ratios D. Its skew part is
         gyroscopic and does no work.

@@ -28,7 +28,7 @@ class NonlinearStress:
     coordinates : (d, m) array
         Rows of the coordinates of modes with large deflections.
     powers : (p, d) integer array
-        Their exponents in each of p products.
+        Exponents of the coordinates in each of p products.
     stress : (N, 4, p), of solids (N, 6, p) array
         Stress at the nodes, of large deflections the second one of Piola and Kirchhoff [Pa per
         unit of each product].

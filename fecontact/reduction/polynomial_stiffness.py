@@ -44,7 +44,7 @@ def polynomial_stiffness(
         Displacements of n nodes, one for each spring, for
         :func:`fecontact.basis_from_matrices`, ``{"contact": rows}``.
     law : BilateralPolynomial
-        Their normal law.
+        Normal law of the springs.
 
     Raises
     ------

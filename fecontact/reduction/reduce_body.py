@@ -116,7 +116,7 @@ def modal_basis(
         Stress that stiffens the body; forces of large deflections, see its own documentation.
         With both, displacements count from the stressed body, without the loads of the stress.
     temperature : float, (N,) array, function of the coordinates or 'mesh', optional
-        Its change [K], a constant load that completes the modes; see :mod:`fecontact.fem.thermal`.
+        Change [K], a constant load that completes the modes; see :mod:`fecontact.fem.thermal`.
     rows, eigensolver : sequence of sparse (k, d N) arrays; 'auto', 'direct' or 'iterative'
         Further motions with forces, see :func:`fecontact.reduction.reduce_bodies`; of solids, see
         :func:`fecontact.reduction.eigenmodes.eigenmodes`.
@@ -280,9 +280,9 @@ def reduce_bodies(
     bodies : mapping of name to ElasticBody
         The bodies.
     pairings : sequence of Pairing or TwoPassPairing
-        Where the bodies may touch each other or the ground; they name the bodies.
+        Faces where the bodies may touch each other or the ground; the pairings name the bodies.
     links : sequence, or mapping of name to link
-        What joins them; points of the meshes need not be among ``points``.
+        Links between the bodies; points of the meshes need not be among ``points``.
     modes : int or mapping of name to int
         Number of modes of each body, rigid ones included, without residual vectors.
     each : mapping of name to mapping, optional

@@ -48,7 +48,7 @@ class BasisReport:
     ----------
     basis : ModalBasis
     interfaces : tuple of str, optional
-        Of one of several bodies, the interfaces at which it touches others; see
+        Interfaces at which one of several bodies touches others; see
         :func:`fecontact.reduction.interface_compliance` for their compliance.
     """
 

@@ -175,7 +175,7 @@ class InterfaceSettings:
         patches of about equal area, or ``[n, m]`` along the first and second tangent, or around and
         across a ring, bore or shaft.
     nodes_on : 'finer' or 'face', optional
-        Which face has the contact nodes: the finer of the two, or ``face``; by default the finer
+        Face with the contact nodes: the finer of the two, or ``face``; by default the finer
         one, and ``face`` where the other side slides.
     reach : float, optional
         Largest distance between partners [m]; by default the extent of the larger face.

@@ -30,7 +30,7 @@ def study_convergence(
     Parameters
     ----------
     study : Study
-        Of one or several bodies.
+        Study of one or several bodies.
     levels : int, optional
         Number of meshes, at least two; by default three, four for a single body of few unknowns.
     progress : bool or callable, optional
@@ -40,7 +40,7 @@ def study_convergence(
     Raises
     ------
     InputError, AnalysisError
-        As the models of the study.
+        As in the models of the study.
     """
     require_kind("study_convergence", Study, study=study)
     if levels is not None:

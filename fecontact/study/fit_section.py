@@ -123,7 +123,7 @@ class FitDataSettings:
     channel : str, optional
         Channel that is compared; the only one by default.
     against : str, optional
-        Of a loop the channel of the displacement.
+        Channel of the displacement, for a loop.
     units : mapping of channel to unit
         Units in which the file gives channels, in place of its own.
     deviation : float, optional
@@ -134,13 +134,13 @@ class FitDataSettings:
     component : str
         Direction there, 'x', 'y', of solids also 'z', or a rotation.
     quantity : str
-        What was measured over time: 'displacement', 'velocity', 'friction_force', ...
+        Quantity measured over time: 'displacement', 'velocity', 'friction_force', ...
     t_start, t_end : float, optional
         Part of the record [s]; of a ring-down t_end is also the end of the run of the model.
     initial : 'rest', 'sliding', 'preload' or list
         State from which the model runs [q, q', z].
     along : str
-        Of a loop what the displacement is: 'motion_x', 'motion_y', 'motion_z' of the drive, or
+        Kind of displacement of a loop: 'motion_x', 'motion_y', 'motion_z' of the drive, or
         'travel', 'travel_y' of the ground.
     frequencies_hz : list, optional
         Measured natural frequencies [Hz].
@@ -149,19 +149,19 @@ class FitDataSettings:
     about : 'none', 'rest' or 'sliding'
         Equilibrium about which the contact is linearised for natural frequencies and receptances.
     frequency_hz : float, optional
-        Of a decay the frequency of the mode [Hz]; by default that of the highest peak.
+        Frequency of the mode of a decay [Hz]; by default that of the highest peak.
     window : float
-        Of a decay the length of the windows, in periods.
+        Length of the windows of a decay, in periods.
     mode : int
-        Of a backbone the number of the linear mode, from 1.
+        Number of the linear mode of a backbone, from 1.
     harmonics : int
-        Of backbones and responses.
+        Number of harmonics, for backbones and responses.
     excitation : str or int
-        Of a receptance the point of the force.
+        Point of the force, for a receptance.
     excitation_component : str
         Direction of this force.
     changes : mapping of dotted name to float
-        Of a response the parameters of the model in this measurement, such as its level.
+        Parameters of the model in the measurement of a response, such as its level.
 
     Raises
     ------

@@ -47,7 +47,7 @@ class Imported:
     interfaces : tuple of (str, str)
         Pairs "BODY.BOUNDARY" of surfaces that face each other.
     notes : tuple of str
-        What is not read or not proposed, and what is implausible, as sentences.
+        Sentences on data that are not read or not proposed, and on implausible values.
     has_parts : bool
         Whether the names of the bodies are those of parts of the file.
     """
@@ -206,7 +206,7 @@ def imported(path: str | Path, scale: float = 1.0) -> Imported:
     Raises
     ------
     InputError, MeshError
-        As :func:`fecontact.read_mesh`.
+        As in :func:`fecontact.read_mesh`.
     """
     path = as_path(path, "a mesh")
     with warnings.catch_warnings(record=True) as caught:

@@ -34,7 +34,7 @@ class FaceWeldSettings:
     first, second : str
         'BODY.BOUNDARY', the two faces, which touch each other.
     nodes : int or 'all'
-        At every displacement node of the finer face, or in the mean over so many segments.
+        Welds at every displacement node of the finer face, or in the mean over so many segments.
     reach : float, optional
         Largest distance between welded places [m]: shorter for faces that part; by default the
         extent of the larger face.

@@ -29,8 +29,8 @@ class MaterialSettings:
     poisson_ratio : float or list
         One; nu_12 and nu_23; nu_12, nu_13, nu_23.
     shear_modulus : float or list, optional
-        Of an isotropic material none; G_12 of a transversely isotropic one; G_12, G_13, G_23 of an
-        orthotropic one [Pa].
+        None for an isotropic material; G_12 of a transversely isotropic one; G_12, G_13, G_23 of
+        an orthotropic one [Pa].
     stiffness : list, optional
         In place of these constants 6 rows of 6 numbers, in the order 11, 22, 33, 12, 23, 13 [Pa].
     density : float, optional

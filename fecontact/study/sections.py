@@ -60,7 +60,7 @@ class BodySettings:
     degree : 1 or 2
         Polynomial degree of the finite elements.
     bricks : 'full' or 'incompatible', optional
-        Of hexahedra with ``degree = 1``; by default as the mesh file gives them.
+        Kind of hexahedra with ``degree = 1``; by default as the mesh file gives them.
     fixed : mapping of name to 'x', 'y', 'xy', of solids also 'z', 'xz', 'yz', 'xyz', or 'hinge'
         Supports on boundaries and points of the mesh: the directions that are held, or a hole
         that turns about its centre; 'hinge_x', 'hinge_y', 'hinge_z' name the axis in a solid.
@@ -461,7 +461,7 @@ class RenderSettings:
     t_start, t_end : float, optional
         Time interval to draw [s].
     view : 'above' or 'below'
-        Where solids are seen from; from below their contact faces show.
+        View of solids, from above or from below, where their contact faces show.
     """
 
     frames: int = 200

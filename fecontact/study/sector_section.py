@@ -43,7 +43,7 @@ class MistuningSettings:
     samples : int
         Number of random wheels.
     seed : int
-        Of the random numbers; equal seeds give equal wheels.
+        Seed of the random numbers; equal seeds give equal wheels.
     """
 
     group: str

@@ -396,7 +396,7 @@ class Study(Summarised, StudyModels):
         Raises
         ------
         FecontactError
-            With file and section in front of the message, as for the other methods.
+            Error with file and section in front of the message, as for the other methods.
         """
         return contact_system(self, self.reduced, _title(self.path))
 

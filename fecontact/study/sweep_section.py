@@ -76,7 +76,7 @@ class Distribution:
         high; 'uniform', 'loguniform' with low, high; 'triangular' with low, mode, high; 'beta'
         with a, b, low, high; 'weibull' with shape, scale.
     mean, std : float, optional
-        Of the parameter itself, not of its logarithm, and before truncation.
+        Mean and standard deviation of the parameter, not of its logarithm, before truncation.
     low, high : float, optional
         Bounds.
     mode : float, optional

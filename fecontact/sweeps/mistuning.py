@@ -132,7 +132,7 @@ def mistuning_sweep(
     Parameters
     ----------
     wheel : CyclicBasis
-        With all diameters; few modes suffice where those near the band are among them.
+        Wheel with all diameters; few modes suffice where those near the band are among them.
     group : str
         The cells that deviate, ``body.group``, as for :class:`~fecontact.reduction.WholeWheel`.
     spread : float
@@ -142,17 +142,17 @@ def mistuning_sweep(
     band_hz : (float, float)
         Frequencies over which the largest displacement is looked for [Hz].
     force, observe : (point, component)
-        As for :func:`fecontact.analysis.mistuned_response`.
+        See :func:`fecontact.analysis.mistuned_response`.
     samples : int
         Number of wheels, three or more.
     seed : int
-        Of the random numbers.
+        Seed of the random numbers.
     workers : int or None
         Processes, 1 for this one alone, None for one per core.
     executor : Executor, optional
         Another executor, as for sweeps.
     folder : path, optional
-        Where finished wheels are kept, also after an interruption; by default nowhere.
+        Folder that stores finished wheels, also after an interruption; by default none.
     resume, overwrite : bool
         Go on with the wheels in the folder, or remove them; otherwise they are an error.
 

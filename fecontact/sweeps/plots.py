@@ -43,7 +43,7 @@ def plot_sweep(
     Parameters
     ----------
     table : SweepTable
-        What :func:`fecontact.sweep` returned.
+        Result of :func:`fecontact.sweep`.
     name : str
         The summary.
     over : one or two parameters, optional
@@ -131,7 +131,7 @@ def plot_strobed(
     Parameters
     ----------
     table : SweepTable
-        Of a sweep that strobes.
+        Table of a sweep that strobes.
     parameter : str
         A varied parameter.
     path : str or Path, optional

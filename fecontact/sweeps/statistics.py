@@ -64,7 +64,7 @@ def statistics(
     confidence : float
         Probability with which an interval holds the true value.
     seed : int
-        Of the bootstrap.
+        Seed of the bootstrap.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def sobol_indices(
     confidence : float
         Probability with which a (bootstrap percentile) interval contains the true value.
     seed : int
-        Of the bootstrap.
+        Seed of the bootstrap.
 
     Raises
     ------

@@ -55,7 +55,7 @@ def functions_for(
     Parameters
     ----------
     names : sequence of str
-        As in ``[sweep]``.
+        Names of summaries, written as in ``[sweep]``.
     folder : Path, optional
         Folder to which files of user functions are relative.
     **known

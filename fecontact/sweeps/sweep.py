@@ -66,7 +66,7 @@ def sweep(
     executor : concurrent.futures.Executor, optional
         Threads, or that of a Dask client, mpi4py.futures or executorlib; by default processes.
     folder : path, optional
-        Where finished cases are kept; by default ``NAME-sweep`` among the results of the study.
+        Folder that stores finished cases; by default ``NAME-sweep`` among the results of the study.
     resume, overwrite : bool
         Continue the sweep in the folder, or remove it; otherwise an existing one is an error.
     retry : bool
@@ -82,7 +82,7 @@ def sweep(
     Returns
     -------
     SweepTable
-        Also written to ``folder`` as ``index.csv``.
+        Table of all cases; also written to ``folder`` as ``index.csv``.
 
     Raises
     ------

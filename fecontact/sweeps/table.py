@@ -59,7 +59,7 @@ class SweepTable(Summarised):
     strobed : (N, K) array or None
         Displacements once per period, for stroboscopic sweeps; NaN for failed cases.
     warnings : (N,) sequence of str
-        Where runs exceed the limits of the model; empty for runs within them.
+        Reasons why runs exceed the limits of the model; empty for runs within them.
     labels : mapping of dotted name to str
         Labels of parameters for axes, where the study says more of them than their names.
     """

@@ -28,7 +28,7 @@ def require_memory(name: str, count: float, each: float, remedy: str = "") -> No
     name : str
         The key, for the message.
     count : float
-        Its value.
+        Value of the count.
     each : float
         Memory per item [bytes].
     remedy : str

@@ -116,9 +116,9 @@ def mesh_from(
     Parameters
     ----------
     found : meshio.Mesh, skfem.Mesh or pyvista.DataSet
-        Of the elements that :func:`read_mesh` takes; a plane one in two coordinates or at z = 0.
+        Mesh of elements that :func:`read_mesh` takes; a plane one in two coordinates or at z = 0.
     scale, boundaries, points
-        As of :func:`read_mesh`.
+        See :func:`read_mesh`.
 
     Raises
     ------
@@ -159,12 +159,12 @@ def read_bodies(path: str | Path, *, scale: float = 1.0) -> dict[str, Mesh]:
     Parameters
     ----------
     path, scale
-        As of :func:`read_mesh`.
+        See :func:`read_mesh`.
 
     Raises
     ------
     InputError, MeshError
-        As :func:`read_mesh`.
+        As in :func:`read_mesh`.
     """
     path = as_path(path, "a mesh")
     with _located(path, scale):

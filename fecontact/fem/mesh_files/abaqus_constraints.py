@@ -29,7 +29,7 @@ class Names:
     Attributes
     ----------
     places : (N, 3) array
-        Of all nodes, in the unit of the file.
+        Places of all nodes, in the unit of the file.
     nodes : callable
         Nodes of a set, of an element set, or of a number; None for an unknown word.
     group : callable

@@ -71,7 +71,7 @@ def read_cdb(path: Path) -> RawMesh:
     Warns
     -----
     ModelWarning
-        Of loads and supports, which the study gives, and of materials that are not read.
+        For loads and supports, which the study gives, and for materials that are not read.
     """
     mapdl_archive = optional("mapdl_archive", "Reading Ansys archives")
     text = path.read_text(encoding="utf-8", errors="replace")

@@ -47,7 +47,7 @@ def constraints_of_mesh(
     middles : mapping
         Corners, in the mesh, of the edge on which a second-order node of the file lies.
     places : (N, d) array
-        Of the nodes of the file [m]; not finite for those of other parts.
+        Places of the nodes of the file [m]; not finite for those of other parts.
     scale : float
         Metres per unit of the file.
 

@@ -208,9 +208,9 @@ class SphereSegment:
     Parameters
     ----------
     radius : float
-        Of the sphere [m].
+        Radius of the sphere [m].
     base_radius : float
-        Of the body, seen from above, at most 0.9 times that of the sphere [m].
+        Radius of the body seen from above, at most 0.9 times that of the sphere [m].
     height : float
         On the axis, above the sphere's rise to the outer face [m].
     contact_radius : float or None
@@ -270,9 +270,9 @@ class LapStrip:
     Parameters
     ----------
     length, width, thickness : float
-        Of a strip [m].
+        Size of a strip [m].
     overlap : float
-        Of the strips along x [m].
+        Overlap of the strips along x [m].
     holes_along, holes_across : int
         Number of holes along x and y, evenly spaced over the overlap.
     hole_radius, washer_radius : float

@@ -370,7 +370,7 @@ class BoucWenFriction(LimitedFriction):
     yield_displacement : float or (n,) sequence
         u_s, positive: deflection at which the initial stiffness would reach mu F [m].
     beta : float or (n,) sequence
-        At least 1/2, so that loops dissipate energy; 1/2 unloads with the initial stiffness to
+        beta, at least 1/2 so that loops dissipate energy; 1/2 unloads with the initial stiffness to
         R = 0, larger values make loops wider.
     exponent : float or (n,) sequence
         n, one or above: sharpness of the transition to sliding.

@@ -67,7 +67,7 @@ class Ground:
         Rotation about the normal, below solids only, positive counter-clockwise from above
         [rad/s]; of flat and even ground.
     centre : (float, float)
-        Where the axis of rotation stands [m].
+        Place of the axis of rotation of the ground [m].
     wave_direction : (float, float)
         Direction in x and y along which waves and friction vary below solids; of any length above
         zero, stored with length one.

@@ -220,7 +220,7 @@ class BilateralPiecewise(BilateralLaw):
     Parameters
     ----------
     elongations : sequence
-        At least two, ascending [m]; the same at all nodes.
+        Elongations of the corners, at least two, ascending [m]; the same at all nodes.
     forces : sequence
         Tension at each of them [N].
     damping : float or (n,) sequence

@@ -28,7 +28,7 @@ class RigidStop(NormalLaw):
     Raises
     ------
     InputError
-        By what needs a force of the penetration: other solvers, equilibria, loading.
+        In all that needs a force of the penetration: other solvers, equilibria, loading.
 
     Examples
     --------

@@ -70,14 +70,14 @@ def write_branches(
     path : str or Path
         The file; it is replaced if it exists.
     branches : mapping of name to Branch
-        At least one.
+        Branches by name, at least one.
     system : ContactSystem, optional
-        What they are branches of; with it reports and movies can be made from the file alone, and
+        System of the branches; with it reports and movies can be made from the file alone, and
         :func:`fecontact.io.read_system` reads it.
     study : str, optional
         The study that described the system, as TOML text.
     root : str or Path, optional
-        As for :func:`fecontact.write_case`.
+        See :func:`fecontact.write_case`.
 
     Raises
     ------

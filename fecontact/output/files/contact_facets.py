@@ -26,11 +26,11 @@ class ContactFacets:
     Attributes
     ----------
     facets : (k, 3) or (k, 4) integer array
-        Their mesh nodes, counter-clockwise seen from outside.
+        Mesh nodes of the facets, counter-clockwise seen from outside.
     owner : (k,) integer array
         Contact node of each.
     own : (k,) bool array
-        Whether it belongs to the patch of its contact node, not to the other side.
+        True if the facet belongs to the patch of its contact node, not to the other side.
     """
 
     facets: Integers

@@ -93,7 +93,7 @@ class FrameFields:
     Parameters
     ----------
     trajectory : Trajectory
-        Its modal basis must hold shapes over the body.
+        Run whose modal basis holds shapes over the body.
 
     Attributes
     ----------

@@ -26,9 +26,9 @@ def to_pyvista(trajectory: Trajectory, time: float | None = None) -> "pyvista.Un
     Parameters
     ----------
     trajectory : Trajectory
-        Its modal basis must hold shapes over the body.
+        Run whose modal basis holds shapes over the body.
     time : float, optional
-        By default the end of the run [s].
+        Time of the state [s]; by default the end of the run.
 
     Raises
     ------

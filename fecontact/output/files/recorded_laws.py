@@ -136,9 +136,9 @@ def recorded_system(
     Parameters
     ----------
     basis : ModalBasis
-        That of the run.
+        Modal basis of the run.
     tables : mapping
-        As of :func:`fecontact.system.tables.system_tables`.
+        See :func:`fecontact.system.tables.system_tables`.
     where : str
         The file, for messages.
     state : mapping

@@ -38,7 +38,7 @@ def write_vtkhdf(file: Any, trajectory: Trajectory, indices: NDArray[np.intp]) -
     file : h5py.File or Group
         Parent of the new group.
     trajectory : Trajectory
-        Its modal basis must hold shapes over the body.
+        Run whose modal basis holds shapes over the body.
     indices : (F,) integer array
         Indices of the output times.
 

@@ -66,7 +66,7 @@ def plot_spectrum(
     trajectory : Trajectory
         The run, transients cut off by :meth:`fecontact.Trajectory.between`.
     quantity, point, component
-        As for :func:`fecontact.analysis.history`.
+        See :func:`fecontact.analysis.history`.
     density : bool
         Power spectral density by Welch's method in the place of amplitudes.
     highest_hz : float, optional
@@ -142,7 +142,7 @@ def plot_spectrogram(
     Parameters
     ----------
     trajectory, quantity, point, component, highest_hz, path
-        As for :func:`plot_spectrum`.
+        See :func:`plot_spectrum`.
     piece : float, optional
         Length of the pieces that are transformed [s]; by default a thirty-second of the run, or
         ten periods of the mean frequency if these are longer.
@@ -150,7 +150,7 @@ def plot_spectrogram(
     Raises
     ------
     InputError
-        As :func:`plot_spectrum`.
+        As in :func:`plot_spectrum`.
     """
     from matplotlib.colors import LogNorm
 
@@ -203,13 +203,13 @@ def plot_poincare(
     Parameters
     ----------
     trajectory, path
-        As for :func:`plot_spectrum`.
+        See :func:`plot_spectrum`.
     point : str, int or (x, y)
-        As for :meth:`Trajectory.displacement`.
+        See :meth:`Trajectory.displacement`.
     component : "x" or "y", of solids "z" too
         Direction of the motion.
     period, phase
-        As for :func:`fecontact.analysis.strobed_states`.
+        See :func:`fecontact.analysis.strobed_states`.
 
     Raises
     ------
@@ -277,7 +277,7 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
     Parameters
     ----------
     trajectory, path
-        As for :func:`plot_spectrum`.
+        See :func:`plot_spectrum`.
 
     Raises
     ------
@@ -327,7 +327,7 @@ def plot_receptance(
     Parameters
     ----------
     responses : Receptance or sequence of them
-        What :func:`fecontact.analysis.receptance` found, all of one
+        Result of :func:`fecontact.analysis.receptance`, all of one
         kind.
     labels : sequence of str
         A name for each.

@@ -21,7 +21,7 @@ def plot_modal_assurance(pairs: ModePairs, *, path: str | Path | None = None) ->
     Parameters
     ----------
     pairs : ModePairs
-        What :func:`fecontact.measured.pair_modes` found.
+        Result of :func:`fecontact.measured.pair_modes`.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 

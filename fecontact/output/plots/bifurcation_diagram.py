@@ -71,7 +71,7 @@ def plot_branches(
     branches : Branch or sequence of Branch
         Each gets its own colour, those of one name the same.
     y, x : str, int or callable
-        What to draw: 'parameter', the name of a stored number, the number of a state counted from
+        Quantities of the axes: 'parameter', the name of a stored number, the number of a state from
         0 (of orbits its largest value), or a function of a
         :class:`fecontact.bifurcation.BranchPoint`. For y also 'observed_section' of
         :func:`fecontact.bifurcation.observe`, one curve for each period of the excitation.

@@ -25,7 +25,7 @@ def plot_campbell(
     Parameters
     ----------
     diagram : CampbellDiagram
-        Of :func:`fecontact.analysis.campbell`.
+        Result of :func:`fecontact.analysis.campbell`.
     orders : sequence of float
         Engine orders: a force at rest with so many waves around the circumference.
     path : str or Path, optional

@@ -52,9 +52,9 @@ def plot_contact_map(
     trajectory : Trajectory
         The run.
     times : sequence of float, optional
-        Of solids, the times of the maps, up to eight [s]; four by default.
+        Times of the maps of solids, up to eight [s]; four by default.
     wear : EnergyWear or ArchardWear, optional
-        Of solids, adds maps of the depth worn since the start of the run.
+        Law of wear: for solids, adds maps of the depth worn since the start of the run.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 

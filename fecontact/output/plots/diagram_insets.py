@@ -59,7 +59,7 @@ def phase_inset(
     Parameters
     ----------
     field : ContactField
-        That of the branch.
+        Field of the branch.
     point : BranchPoint
         A point of a branch of orbits, by collocation or shooting. A letter joins the inset to its
         place in the diagram of :func:`fecontact.plot.plot_branches`.
@@ -67,7 +67,7 @@ def phase_inset(
         Displacement u that is drawn: 'B', 'C', a named point or the number of a contact node; 'x',
         'y' or 'phi', of solids also 'z', 'phi_x', 'phi_y', 'phi_z'.
     title : str, optional
-        By default parameter and value.
+        Title of the inset; by default parameter and value.
 
     Raises
     ------

@@ -27,7 +27,7 @@ def plot_diameters(
     Parameters
     ----------
     found : SectorModes
-        Of :func:`fecontact.reduction.sector_modes`.
+        Result of :func:`fecontact.reduction.sector_modes`.
     speed : float, optional
         Speed of rotation, positive [rad/s].
     path : str or Path, optional

@@ -37,7 +37,7 @@ def plot_stress(
     Parameters
     ----------
     fields : BodyFields
-        What :func:`fecontact.static_solution` or :meth:`fecontact.ModalBasis.fields` gives.
+        Result of :func:`fecontact.static_solution` or :meth:`fecontact.ModalBasis.fields`.
     component : 'von_mises', 'xx', 'yy', 'zz' or 'xy', of solids 'yz' and 'xz' too
         The stress that colours the body, of solids their surface.
     scale : float, optional

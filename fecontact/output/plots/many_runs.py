@@ -47,7 +47,7 @@ def plot_runs(
     runs : mapping of name to Trajectory
         Two runs or more.
     quantity, point, component
-        As for :func:`fecontact.analysis.history`; by default B, or the contact node in the middle,
+        See :func:`fecontact.analysis.history`; by default B, or the contact node in the middle,
         and the direction of the drive.
     highest_hz : float, optional
         End of the axis of the spectra [Hz].
@@ -101,7 +101,7 @@ def plot_basins(
     Parameters
     ----------
     found : Basins
-        Of :func:`fecontact.bifurcation.basins`; the first axis goes along x.
+        Result of :func:`fecontact.bifurcation.basins`; the first axis goes along x.
     x_label, y_label : str, optional
         Labels of the axes, with SI units, such as ``y [m]``; ticks are in a unit that suits the
         values.
@@ -173,7 +173,7 @@ def plot_poincare_scan(
     Parameters
     ----------
     found : PoincareScan
-        Of :func:`fecontact.bifurcation.poincare_scan`.
+        Result of :func:`fecontact.bifurcation.poincare_scan`.
     point, component, of
         The quantity; see :meth:`fecontact.bifurcation.PoincareScan.observed`.
     x_label, y_label : str, optional

@@ -38,7 +38,7 @@ def plot_modes(
     Parameters
     ----------
     basis : ModalBasis
-        With shapes over the body.
+        Modal basis with shapes over the body.
     count : int
         Largest number of modes.
     path : str or Path, optional
@@ -70,7 +70,7 @@ def plot_buckling(found: BucklingLoads, *, path: str | Path | None = None) -> "F
     Parameters
     ----------
     found : BucklingLoads
-        Of :func:`fecontact.analysis.buckling_loads`.
+        Result of :func:`fecontact.analysis.buckling_loads`.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
@@ -96,7 +96,7 @@ def plot_wheel(
     Parameters
     ----------
     found : SectorModes
-        Of :func:`fecontact.reduction.sector_modes`.
+        Result of :func:`fecontact.reduction.sector_modes`.
     shown : sequence of (int, int)
         Nodal diameter and number of each mode, from 0.
     phase : float
@@ -176,7 +176,7 @@ def plot_convergence(
     Parameters
     ----------
     result : ModeConvergence or BodiesConvergence
-        What :func:`fecontact.reduction.mode_convergence` found, or of several bodies
+        Result of :func:`fecontact.reduction.mode_convergence`, or of several bodies
         :func:`fecontact.study.study_convergence`.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.

@@ -118,7 +118,7 @@ def plot_loop(
     history : LoadHistory
         The loading.
     first, last, action
-        As for :meth:`LoadHistory.loop`: vertices, and what acts.
+        See :meth:`LoadHistory.loop`: vertices, and what acts.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 

@@ -48,7 +48,7 @@ def plot_history(
     trajectory : Trajectory
         The run.
     points : sequence of str, int or (x, y)
-        As for :meth:`Trajectory.displacement`; B and the contact node in the middle by default,
+        See :meth:`Trajectory.displacement`; B and the contact node in the middle by default,
         of several bodies that of each interface. Contact nodes between bodies show their relative
         motion along tangent and normal, those of solids along both tangents and the normal.
         Friction of solids is shown by its size and direction, or by x and y on the ground.
@@ -118,7 +118,7 @@ def plot_phase(
     trajectory : Trajectory
         The run.
     point : str, int or (x, y)
-        As for :meth:`Trajectory.displacement`.
+        See :meth:`Trajectory.displacement`.
     component : "x" or "y", of solids "z" too
         Direction of the motion.
     path : str or Path, optional

@@ -31,7 +31,7 @@ def plot_eigenvalues(
     Parameters
     ----------
     branch : Branch
-        Of equilibria.
+        Branch of equilibria.
     x_label : str, optional
         Label of the parameter, with its SI unit; ticks are in a unit that suits the values.
     range_hz : (float, float)

@@ -32,9 +32,9 @@ def plot_wear(
     Parameters
     ----------
     history : WearHistory
-        Of :func:`fecontact.integrate.wear_history`.
+        Result of :func:`fecontact.integrate.wear_history`.
     basis : ModalBasis, optional
-        That of the worn system: each of its interfaces or contact groups gets a column.
+        Modal basis of the worn system: each of its interfaces or contact groups gets a column.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 

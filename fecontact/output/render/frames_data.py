@@ -82,11 +82,11 @@ class Motion:
     Attributes
     ----------
     trajectory : Trajectory
-        Its modal basis must hold shapes over the body.
+        Run whose modal basis holds shapes over the body.
     indices : (F,) integer array
         Output times to draw.
     colour : "displacement" or "von_mises"
-        What the body is coloured by.
+        Quantity that colours the body.
     given_scale : float or None
         Factor of all displacements; None for one that makes the largest well visible.
 

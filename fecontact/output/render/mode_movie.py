@@ -132,9 +132,9 @@ def render_mode(
     Parameters
     ----------
     basis : ModalBasis
-        With shapes over the body.
+        Modal basis with shapes over the body.
     path : str or Path
-        As for :func:`fecontact.render`.
+        See :func:`fecontact.render`.
     mode : int
         Number of the mode, from 0.
     modes : ComplexModes, optional
@@ -151,9 +151,9 @@ def render_mode(
     scale : float
         Factor of the drawn motion; one makes the largest 8 % of the body's extent.
     title : str, optional
-        By default number, frequency and damping ratio of the mode.
+        Title; by default number, frequency and damping ratio of the mode.
     progress : bool or callable, optional
-        As for :func:`fecontact.render`.
+        See :func:`fecontact.render`.
 
     Returns the movie, the folder, or the first picture.
 

@@ -80,7 +80,7 @@ def render(
     t_start, t_end : float, optional
         Part of the run to draw [s].
     view, wear : "above" or "below"; EnergyWear or ArchardWear, optional
-        Where solids are seen from; adds maps of the depth that they have worn.
+        View of solids; law of wear, which adds maps of the depth worn since the start.
     progress : bool or callable, optional
         True for a progress bar; a function is called as ``progress(done, total)`` after each frame.
 
@@ -184,7 +184,7 @@ def picture(
     Parameters
     ----------
     trajectory : Trajectory
-        Its modal basis must hold shapes over the body.
+        Run whose modal basis holds shapes over the body.
     path : str or Path
         ``NAME.png``.
     time : float, optional

@@ -43,7 +43,7 @@ def rendering_problem() -> str | None:
     Returns
     -------
     str or None
-        Why it is not possible, in one sentence, or None if it is.
+        Reason why it is not possible, in one sentence, or None if it is.
     """
     return _attempt()[0]
 

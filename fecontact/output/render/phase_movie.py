@@ -40,13 +40,13 @@ def render_phase_space(
     Parameters
     ----------
     motions, coordinates, labels
-        As for :func:`fecontact.plot.plot_phase_space`; in space with three coordinates.
+        See :func:`fecontact.plot.plot_phase_space`; in space with three coordinates.
     path : str or Path
-        As for :func:`fecontact.render`.
+        See :func:`fecontact.render`.
     frames : int
         Number of frames, evenly spaced over the longest motion, at least 2.
     fps, size, progress
-        As for :func:`fecontact.render`.
+        See :func:`fecontact.render`.
     trail : float
         Length of the trail, as a part of the whole time, from 0 to 1.
     turn : float

@@ -60,9 +60,9 @@ class Camera:
     right, up, back : (3,) arrays
         Unit vectors of the picture, the last one towards the viewer.
     focus : (3,) array
-        What is in the middle of the picture [m].
+        Place in the middle of the picture [m].
     height, depth : float
-        Of what is seen [m].
+        Height and depth of the visible scene [m].
     """
 
     right: Array

@@ -28,7 +28,7 @@ class SolidMotion(Motion):
     Attributes
     ----------
     view : "above" or "below"
-        Where the bodies are seen from; from below their contact faces show.
+        View of the bodies; from below their contact faces show.
     wear : WearLaw or None
         For a map of the worn depth.
     """

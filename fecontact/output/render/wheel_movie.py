@@ -38,13 +38,14 @@ def render_wheel(
     Parameters
     ----------
     wheel : SectorModes or WheelMotion
-        Of :func:`fecontact.reduction.sector_modes` or :func:`fecontact.bifurcation.wheel_motion`.
+        Result of :func:`fecontact.reduction.sector_modes`, or of
+        :func:`fecontact.bifurcation.wheel_motion`.
     path : str or Path
-        As for :func:`fecontact.render`.
+        See :func:`fecontact.render`.
     diameter, mode : int
         Nodal diameter and number of the mode, from 0; without meaning for a response.
     frames, periods, fps, size, scale, title, progress
-        As of :func:`fecontact.plot.render_mode`; pictures of a wheel are taller.
+        See :func:`fecontact.plot.render_mode`; pictures of a wheel are taller.
 
     Returns the movie, the folder, or the first picture.
 

@@ -43,7 +43,7 @@ def report_branches(
         Branches of equilibria or orbits over the same parameter; see
         :func:`fecontact.bifurcation.observe`.
     field : ContactField
-        That of the branches.
+        Field of the branches.
     path : str or Path
         The .html file; it is replaced if it exists.
     y : str

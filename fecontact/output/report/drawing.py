@@ -100,15 +100,15 @@ class DrawnContact:
         Numbers of ``names``.
     names : tuple of str
     places : (n + f, d) array or None
-        Of contact nodes and feet [m]; None where no body is drawn.
+        Places of contact nodes and feet [m]; None where no body is drawn.
     rows : (n + f, d, m) array or None
-        Their displacements per modal coordinate.
+        Displacements of these places per modal coordinate.
     feet : (f,) integer array
         Contact nodes of the feet.
     sliding : tuple of str
-        What slides by prescription.
+        Bodies with prescribed sliding, and its direction.
     areas : (n,) array or None
-        Of the patches of solids [m^2].
+        Areas of the patches of solids [m^2].
     """
 
     faces: list[dict[str, Any]]
@@ -149,7 +149,7 @@ class DrawnGround:
     centre : (float, float)
         About which it turns [m].
     heights : (k, l) array or None
-        Of a map over x and y, which repeats itself [m].
+        Heights of a map over x and y, which repeats itself [m].
     origin, steps : (float, float)
         Place of the first of these heights, and their distances [m].
     """

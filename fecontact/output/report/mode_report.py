@@ -29,9 +29,9 @@ def report_modes(
     Parameters
     ----------
     modes : NonlinearMode or sequence of NonlinearMode
-        Of the same observed displacement.
+        Modes of the same observed displacement.
     system : ContactSystem
-        What they are modes of.
+        System whose modes they are.
     path : str or Path
         The .html file; it is replaced if it exists.
     observe : (point, component)

@@ -57,7 +57,7 @@ def report_frame(
     height : int
         Height of the frame [pixels], positive.
     title, study, points, scale, versions
-        As for :func:`fecontact.io.report`.
+        See :func:`fecontact.io.report`.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def report_widget(
     run : Trajectory
         The run.
     title, study, points, scale, versions
-        As for :func:`fecontact.io.report`.
+        See :func:`fecontact.io.report`.
 
     Returns
     -------

@@ -48,7 +48,7 @@ class Payload:
         step : float or array
             One step, or one of each of the columns ``values.reshape(N, -1)``; positive.
         later : bool
-            Whether it is read after the first picture.
+            True if the array is read after the first picture.
         near : sequence of int
             For each column an earlier one that is alike, or -1; empty if none are.
         """

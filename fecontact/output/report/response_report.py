@@ -36,9 +36,9 @@ def report_response(
     Parameters
     ----------
     response : FrequencyResponse
-        Of a contact system.
+        Frequency response of a contact system.
     system : ContactSystem
-        What vibrates.
+        System of the response.
     path : str or Path
         The .html file; it is replaced if it exists.
     observe : (point, component)

@@ -55,7 +55,7 @@ def report_runs(
     Raises
     ------
     InputError
-        As :func:`fecontact.analysis.compare_runs`, for another suffix, or a file that cannot be
+        As in :func:`fecontact.analysis.compare_runs`, for another suffix, or a file that cannot be
         written.
     """
     path = require_page(path)

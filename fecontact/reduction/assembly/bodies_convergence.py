@@ -34,7 +34,7 @@ class BodiesConvergence:
     joined_hz : (L, k) array or None
         The lowest elastic frequencies of the bodies together on each mesh [Hz].
     joined : str
-        What joins them.
+        Heading of the joined frequencies in the table.
     compliance : mapping of interface to (L, 2) array, in space (L, 3)
         Mean relative displacement under uniform traction and pressure of 1 N in all, of the
         finite-element bodies on each mesh [m/N].
@@ -102,7 +102,7 @@ def bodies_convergence(
     joined_hz : sequence of (k,) arrays, optional
         Elastic frequencies of the bodies together on each mesh, ascending [Hz].
     joined : str
-        What they are, for the table.
+        Heading of the joined frequencies in the table.
 
     Raises
     ------

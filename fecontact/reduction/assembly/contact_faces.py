@@ -28,18 +28,18 @@ class ContactFace:
     bodies : tuple of str
         Names of the bodies that meet there, and 'ground'; empty for a single body.
     nodes : slice
-        Its nodes among those of the basis.
+        Contact nodes of the face among those of the basis.
     abscissa : (k,) array
         Places of the nodes [m]: x on the ground and on faces along x, else the arc length from the
         beginning of the face, which increases along the tangents; x in space.
     axis : 'x' or 's'
-        Which of them.
+        Kind of the abscissa: x, or the length s along the face.
     tributary : (k,) array
         Lengths of the face that the nodes represent [m], in space areas [m^2].
     spring : bool
-        Whether it is no face, but a nonlinear spring between two points.
+        True for a nonlinear spring between two points, which is no face.
     nodes_on : str
-        Of one of two passes, the body with its contact nodes.
+        Body with the contact nodes, for one of two passes.
     """
 
     name: str

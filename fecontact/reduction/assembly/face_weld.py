@@ -34,7 +34,7 @@ class FaceWeld:
     Parameters
     ----------
     pairing : Pairing
-        Of the two faces, by :func:`fecontact.fem.pair_faces`.
+        Pairing of the two faces, by :func:`fecontact.fem.pair_faces`.
 
     Raises
     ------

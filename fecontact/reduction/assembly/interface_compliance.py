@@ -133,14 +133,14 @@ def interface_compliance(
     Parameters
     ----------
     basis : ModalBasis
-        That of one body with contact nodes, or of several, ``assembled_basis(bases, pairings)``.
+        Basis of one body with contact nodes, or of several, ``assembled_basis(bases, pairings)``.
     bodies : ElasticBody or mapping of name to ElasticBody
         The bodies from which it was made; those without a mesh, as point masses, are exact.
 
     Returns
     -------
     dict of str to InterfaceCompliance
-        By the names of the interfaces, of a single body the boundaries in contact.
+        Compliances by the names of the interfaces, of a single body the boundaries in contact.
 
     Raises
     ------

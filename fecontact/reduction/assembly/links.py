@@ -218,7 +218,7 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
     Parameters
     ----------
     basis : ModalBasis
-        Of one or several bodies.
+        Basis of one or several bodies.
     links : sequence of Spring, Bushing, Hinge, Weld or FaceWeld
         Between points of the basis; nonlinear springs only count in
         :func:`~fecontact.reduction.assembled_basis`.

@@ -23,7 +23,7 @@ class PointPairing:
     other : str, optional
         Name of the other body; by default the ground.
     other_points : str, int, or sequence of them, optional
-        As many points of the other body, the feet.
+        Points of the other body, the feet, as many as ``points``.
     normals : (d,) or (n, d) numbers, optional
         Normal out of the other side into ``body``, of any length; by default that of the ground,
         (0, 1) in the plane and (0, 0, 1) in space.

@@ -39,7 +39,7 @@ class TightenedBolts:
     Attributes
     ----------
     basis : ModalBasis
-        With the springs that hold the bolts, and their forces as ``constant_load``.
+        Basis with the springs that hold the bolts, and their forces as ``constant_load``.
     tension : mapping of bolt to float
         Force of each bolt when it was tightened [N].
     shortening : mapping of bolt to float
@@ -78,7 +78,7 @@ def tightened(
     Parameters
     ----------
     basis : ModalBasis
-        Whose points are the control points of sections, see
+        Basis whose points are the control points of sections, see
         :func:`fecontact.fem.with_pretension`; with residual vectors of their forces (``loads``).
     coordinates : (m,) array
         Modal coordinates of the tightened state.

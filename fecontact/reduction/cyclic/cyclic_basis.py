@@ -102,12 +102,12 @@ class CyclicBasis(Summarised):
     ----------
     symmetry : CyclicSymmetry
     bodies : mapping of name to ElasticBody
-        Those of one sector; none of
+        Bodies of one sector; none of
         :func:`~fecontact.reduction.cyclic_basis_from_bases`.
     diameters : tuple of DiameterModes
-        Of the nodal diameters, ascending from 0.
+        Modes of the nodal diameters, ascending from 0.
     basis : ModalBasis
-        That of the diameter 0, in which all sectors move alike: for preload and equilibria. Its
+        Basis of the diameter 0, in which all sectors move alike: for preload and equilibria. Its
         constant load is the centrifugal force and that of a change of temperature.
     gaps : (n,) array
         Initial gaps of the contact nodes [m].
@@ -195,29 +195,29 @@ def cyclic_basis(
     Parameters
     ----------
     bodies : mapping of name to ElasticBody
-        Those of one sector, such as a blade with its part of the disc, and a damper. Bodies that
+        Bodies of one sector, such as a blade with its part of the disc, and a damper. Bodies that
         have neither of the boundaries of the symmetry do not go on into the next sector.
     symmetry : CyclicSymmetry
         N, the axis, and the boundaries at which bodies go on into the neighbours.
     pairings : mapping of interface to Pairing
-        Where they may touch each other, or ``next_NAME``, see :meth:`CyclicSymmetry.next_sector`.
+        Faces that may touch each other, or ``next_NAME``, see :meth:`CyclicSymmetry.next_sector`.
     modes : int or mapping of body to int
         Vibration modes of each nodal diameter, rigid ones included, at most all.
     rigid : sequence of str
-        Which of the bodies without these boundaries are rigid.
+        Bodies without these boundaries that are rigid.
     points : mapping of 'body.name' to place
         Points for loads and results.
     loads : sequence of 'body.boundary'
         Boundaries on which pressures may vary in time.
     damping : float, Rayleigh, LossFactor, or mapping of body to one of them
-        Of all modes of all diameters; residual vectors are modes too.
+        Damping of all modes of all diameters; residual vectors are modes too.
     diameters : sequence of int or 'all'
         Nodal diameters up to N / 2; 0 is always there. Engine order m needs those of all h m.
     rotation : Rotation, optional
-        With the stress of each body under its supports alone; where bodies press on each other
+        Rotation, with the stress of each body under its supports alone; where bodies touch,
         switch it off and give the common state as ``prestress``.
     prestress : mapping of body to BodyFields
-        Whose stress stiffens the bodies; see :meth:`CyclicBasis.fields`.
+        Fields whose stress stiffens the bodies; see :meth:`CyclicBasis.fields`.
     temperature : mapping of body to float, (N,) array, function of the coordinates or 'mesh'
         Change [K] from the state without stress, in all sectors alike; stiffens by ``prestress``.
 

@@ -32,7 +32,7 @@ class WholeWheel:
     Parameters
     ----------
     wheel : CyclicBasis
-        With all diameters.
+        Modes of the wheel for all diameters.
     deviations : (N,) numbers, optional
         delta_s of the stiffness of a group of cells, above -1: ``K_s = (1 + delta_s) K`` in
         sector s.

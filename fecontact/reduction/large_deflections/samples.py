@@ -61,7 +61,7 @@ class LoadedStates:
     body : ElasticBody
         The body. If nothing holds it, its states have no part of rigid modes.
     system : FreeSystem
-        Its free unknowns.
+        Equations of the free unknowns.
     w, shapes : (m,) and (f, m) arrays
         Angular frequencies [rad/s] and free shapes of its modes.
     first : int

@@ -91,7 +91,7 @@ class UffModes:
         damping : float, (m,) sequence, Rayleigh or (m, m) array, optional
             Replaces the file's damping ratios.
         contact_x, tributary : (n,) arrays, optional
-            As for :meth:`basis_from_modes`; the default for contact_x is the file's.
+            See :meth:`basis_from_modes`; the default for contact_x is the file's.
 
         Raises
         ------

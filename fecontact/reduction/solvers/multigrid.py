@@ -39,7 +39,7 @@ class Level:
     largest : float
         The largest eigenvalue of D^-1 A, as found from below.
     prolongation, restriction : sparse
-        From the next level and to it.
+        Transfer from the next level and to it.
     """
 
     product: Any

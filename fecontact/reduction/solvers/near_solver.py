@@ -40,11 +40,11 @@ class NearSolver:
     spread : sparse (N, n) array
         B for each component: displacements of all nodes from those of the n that do not follow.
     solver : SolidSolver
-        Of the smaller model.
+        Solver of the smaller model.
     followers : (m,) integers
         The nodes that follow.
     coupling : BlockRows
-        Their rows of K B, of single precision.
+        Rows of K B at the nodes that follow, in single precision.
     inverse : (m, 3, 3) array
         The inverse of their blocks K_mm, too.
     """

@@ -139,7 +139,7 @@ class Answers:
     found : (s, k) array or None
         v, if they are kept.
     missing : (k,) array
-        What linear elements lack of the diagonal of the compliance at most, by estimate.
+        Estimated bound on the part of the compliance's diagonal that linear elements lack.
     converged : bool
     """
 

@@ -35,7 +35,7 @@ def plot_nonlinear_mode(
     Parameters
     ----------
     modes : NonlinearMode or sequence of NonlinearMode
-        What :func:`fecontact.bifurcation.nonlinear_mode` found, of the same observed displacement.
+        Result of :func:`fecontact.bifurcation.nonlinear_mode`, of the same observed displacement.
     names : sequence of str, optional
         For the legend, one for each mode; several modes are numbered by default.
     logarithmic : bool
@@ -87,7 +87,7 @@ def plot_resonance_curve(
     Parameters
     ----------
     curves : ResonanceCurve or sequence of ResonanceCurve
-        What :func:`fecontact.bifurcation.resonance_curve` found, over the same parameter.
+        Result of :func:`fecontact.bifurcation.resonance_curve`, over the same parameter.
     names : sequence of str, optional
         For the legend, one for each curve.
     path : str or Path, optional

@@ -39,7 +39,7 @@ def plot_response(
     Parameters
     ----------
     response : FrequencyResponse
-        What :func:`fecontact.bifurcation.frequency_response` found.
+        Result of :func:`fecontact.bifurcation.frequency_response`.
     logarithmic : bool
         Whether the amplitude has a logarithmic axis.
     y_label : str, optional
