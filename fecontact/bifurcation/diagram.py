@@ -56,9 +56,9 @@ def follow_branches(
     Parameters
     ----------
     system : ContactSystem
-        What moves.
+        System of the diagram.
     wanted : BranchSettings
-        What to follow.
+        Branches to follow.
     initial : any
         Start of the run to the first orbit; see :func:`fecontact.simulate`.
     progress : callable, optional

@@ -33,7 +33,7 @@ class BranchSettings:
     start : float, optional
         Value at which the first branch begins; the first of the bounds by default.
     kind : 'equilibria', 'orbits' or 'both'
-        What is followed first: steady sliding, the periodic orbit on which a run at ``start``
+        Solutions followed first: steady sliding, the periodic orbit on which a run at ``start``
         settles, or both.
     switch : list of 'Hopf', 'period doubling', 'branch point'
         Special points at which the branches that begin there are followed too: the orbits born at
@@ -64,7 +64,7 @@ class BranchSettings:
         For orbits from a run: time that the orbit takes at most [s]; 16 periods of the excitation
         by default.
     point : str or int, optional
-        What the diagram shows: 'B', 'C', a further named point, or a contact node by its number;
+        Observed point: 'B', 'C', a further named point, or a contact node by its number;
         B by default, or the middle of the contact where there is no B.
     component : 'x' or 'y', of solids also 'z'
         Its displacement along the ground or away from it.
@@ -158,7 +158,7 @@ class BranchSettings:
         return self.checked_bounds[0] if self.start is None else self.start
 
     def options(self) -> "ContinuationOptions":
-        """How branches are followed."""
+        """Options of the continuation."""
         from fecontact.bifurcation.continuation.problem import ContinuationOptions
 
         return ContinuationOptions(step=self.step, largest_step=self.largest_step,

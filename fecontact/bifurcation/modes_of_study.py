@@ -23,7 +23,7 @@ _STEP, _LARGEST, _PART = 0.02, 0.1, 50
 
 
 def mode_options(points: int) -> ContinuationOptions:
-    """How modes of studies are followed."""
+    """Options of the continuation for modes of studies."""
     return ContinuationOptions(points=points, step=_STEP, largest_step=_LARGEST)
 
 
@@ -46,7 +46,7 @@ def follow_mode(
     Parameters
     ----------
     system : ContactSystem
-        What vibrates.
+        System that vibrates.
     wanted : ResponseSettings
         Method, points, what is observed.
     amplitudes : (float, float)
@@ -54,9 +54,9 @@ def follow_mode(
     number : int
         Of the linear mode, from 1.
     progress : callable, optional
-        Told the number of points.
+        Called with the number of points.
     earlier : NonlinearMode, optional
-        What an interrupted computation of the same has left: it goes on at the end of the last
+        Result of an interrupted computation of the mode: it goes on at the end of the last
         whole part, so that the numbers are those of a computation without interruption. With a
         tolerance the mode is followed anew, since harmonics or samples may still grow.
     keep : callable, optional

@@ -35,7 +35,7 @@ def with_normal_form(
     Parameters
     ----------
     field : VectorField
-        That of the branch.
+        Field of the branch.
     point : PeriodDoublingPoint or NeimarkSackerPoint
         A point of a branch of orbits.
     intervals : int

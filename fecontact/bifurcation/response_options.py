@@ -75,7 +75,7 @@ class ResponseSettings:
     points : int
         Most points of a response.
     point : str or int, optional
-        What is observed: 'B', 'C', a further named point, or a contact node by its number; B by
+        Observed point: 'B', 'C', a further named point, or a contact node by its number; B by
         default, or the middle of the contact where nothing is named B.
     component : 'x', 'y', 'z', 'phi', 'phi_x', 'phi_y' or 'phi_z', optional
         Its component; by default that of the drive.
@@ -242,7 +242,7 @@ class ResponseSettings:
                                self.sampling_tolerance)
 
     def options(self) -> "ContinuationOptions":
-        """How responses are followed."""
+        """Options of the continuation."""
         from fecontact.bifurcation.continuation.problem import ContinuationOptions
 
         return ContinuationOptions(step=self.step, largest_step=self.largest_step,

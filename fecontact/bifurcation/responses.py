@@ -67,13 +67,13 @@ def follow_responses(
     Parameters
     ----------
     system : ContactSystem
-        What vibrates.
+        System that vibrates.
     wanted : ResponseSettings
         Range, levels, method.
     progress : callable, optional
         Told the level or amplitude that is being followed, and which part of its range is done.
     earlier : FrequencyResponse, optional
-        What an interrupted computation of the same has left: finished levels are taken from it, the
+        Result of an interrupted computation: finished levels are taken from it, the
         one that was interrupted is followed anew, so that the numbers are those of a computation
         without interruption.
     keep : callable, optional

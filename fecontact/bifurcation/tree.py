@@ -88,7 +88,7 @@ def branch_tree(
     Parameters
     ----------
     field : VectorField
-        That of the branches.
+        Field of the branches.
     first : Branch, sequence or mapping of name to Branch
         Branches of equilibria or orbits over one parameter, also read from a file.
     depth : int

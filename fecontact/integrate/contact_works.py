@@ -43,7 +43,7 @@ class ContactWorks(ContactQuantities):
     def friction_work(self) -> Array:
         """Energy (N, n) lost by friction at each node since the first time [J].
 
-        What bristles store and give back is not part of it. From the integrator if stored, else by
+        Energy that bristles store is not part of it. From the integrator if stored, else by
         the trapezoidal rule over the output times.
         """
         if self.node_friction_work is not None:

@@ -48,11 +48,11 @@ class Course(NamedTuple):
     what, node : int
         SLIP or GAP; number of the node.
     shift : float
-        What is added.
+        Number that is added.
     step, system : Step, SystemArrays
         The step, and what moves.
     bounds, courses : arrays
-        Those of the ground; those of :func:`set_courses`.
+        Bounds of the ground; results of :func:`set_courses`.
     row : (5,) array
         Room to work in.
     """

@@ -129,7 +129,7 @@ def _set_columns(table, out, column, near):
 
 @helper
 def _number_below(j, near):
-    """How many of the near nodes have a lower number than j."""
+    """Number of near nodes whose number is below j."""
     low, high = 0, near.used[0]
     while low < high:
         middle = (low + high) // 2

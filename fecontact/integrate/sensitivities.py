@@ -68,7 +68,7 @@ class Sensitivity:
         The transitions by differences to one side, above and below the state, where runs are
         differenced. Where a jump of their ends lies near, they are far apart.
     note : str
-        Which derivatives disagree with differences of runs, or to both sides; else empty.
+        Derivatives that disagree with differences of runs, or to both sides; else empty.
     """
 
     times: Array
@@ -292,7 +292,7 @@ def _differences(
 
 
 def _apart(above: Array, middle: Array, below: Array, moves: Array) -> float:
-    """How far derivatives to both sides are apart, in parts of the largest or of 1.
+    """Difference of derivatives to both sides, relative to the largest or to 1.
 
     By the ends of runs from both sides and between, and the changes of the states.
     """

@@ -26,7 +26,7 @@ class Solver(ABC):
     Attributes
     ----------
     abilities : frozenset of str
-        Those of ``events``, located within steps; ``fields``, runs of vector fields; and
+        Some of: ``events``, located within steps; ``fields``, runs of vector fields; and
         ``derivatives`` of the motion, that it has.
     smooth : bool
         Whether forces are functions of the state, so that energy growth without work is an error.

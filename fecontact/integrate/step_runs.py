@@ -30,7 +30,7 @@ class StepRun:
     progress, output, kept : records
         From where it goes on, and what it fills, see :mod:`fecontact.integrate.step_loop`.
     watch : Watch
-        What is watched for.
+        Events to watch for.
     found : list
         Rows and states of the events so far.
     """

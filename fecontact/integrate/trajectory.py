@@ -21,7 +21,7 @@ from fecontact.system.powers import POWERS
 
 
 class Status(Enum):
-    """How a run ended; the value is a sentence for display."""
+    """End of a run; the value is a sentence for display."""
 
     FINISHED = "The run reached its end."
     EVENT = "The run ended at an event."

@@ -136,7 +136,7 @@ def excited(
 def multilinear(names: Iterable[str], drive: Drive, load: Load) -> bool:
     """Whether the arrays are known to be affine in each of some parameters, the others fixed.
 
-    They are in the numbers of drives and loads, and of their harmonic signals, by what
+    They are affine in the numbers of drives and loads, and of their harmonic signals, by what
     :func:`drive_arrays` and :func:`load_arrays` are. ``names`` are dotted; a drive, load or signal
     of another class may do as it likes.
     """

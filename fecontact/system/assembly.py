@@ -91,13 +91,13 @@ class Assembly:
         Parameters
         ----------
         name : str
-            That of the interface, whose laws are ``interfaces.NAME.normal`` and ``.friction``.
+            Name of the interface; its laws are ``interfaces.NAME.normal`` and ``.friction``.
         face, other : str
             ``BODY.BOUNDARY`` of bodies that were added; ``other`` may be ``"ground"``.
         normal, friction, sliding, gap
-            As of :class:`fecontact.Interface`.
+            See :class:`fecontact.Interface`.
         nodes, reach, overlap
-            As of :func:`fecontact.fem.pair_faces`. Contact nodes are on the finer face, or on
+            See :func:`fecontact.fem.pair_faces`. Contact nodes are on the finer face, or on
             ``face`` if the other one slides.
         both_faces : bool
             Contact nodes on both faces, see :func:`fecontact.fem.pair_both_faces`.

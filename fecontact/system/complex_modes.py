@@ -31,7 +31,7 @@ class ComplexModes(Summarised):
     Attributes
     ----------
     eigenvalues : (r,) complex array
-        Those with imaginary part above zero, the lowest frequency first [1/s].
+        Eigenvalues with imaginary part above zero, the lowest frequency first [1/s].
     frequencies_hz : (r,) array
         Im l / (2 pi) [Hz].
     damping_ratios : (r,) array
@@ -43,7 +43,7 @@ class ComplexModes(Summarised):
         Left eigenvectors, scaled to ``left.T @ right = 1``; NaN where modes coincide so that there
         is no full set, exactly at the onset of undamped flutter.
     real_eigenvalues : array
-        Those without a frequency [1/s], the largest first.
+        Eigenvalues without a frequency [1/s], the largest first.
     """
 
     eigenvalues: ComplexArray

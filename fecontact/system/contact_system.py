@@ -107,7 +107,7 @@ class ContactSystem(Summarised):
     bodies : mapping of name to ModalBasis, optional
         Several bodies, assembled to ``basis``.
     interfaces : sequence of Interface, optional
-        Where they may touch, with the laws; these become ``normal``, ``friction``, ``gap`` and
+        Contacts of the bodies, with their laws; these become ``normal``, ``friction``, ``gap`` and
         ``sliding``.
     links : sequence, or mapping of name to link, optional
         Welds, hinges, bushings and springs between the bodies. Parameters of nonlinear springs are

@@ -204,7 +204,7 @@ def without_elements(arrays: SystemArrays) -> SystemArrays:
 def exact_arrays(arrays: SystemArrays, counts: Integers) -> SystemArrays:
     """Arrays for runs that return elements to their limits at the end of slip.
 
-    What the elements store is left out of the powers: it follows from the states.
+    The energy stored in the elements is left out of the powers: it follows from the states.
     """
     if not counts.any():
         return arrays
@@ -237,7 +237,7 @@ def booked(
     times, states, work : (N,), (N, size), (N, p) or (N, p + 2 n) arrays
         Of a run; not changed.
     start : (time, (size,) array)
-        Its start, and the state there.
+        Time and state at the start of the run.
     """
     if not counts.any() or not len(times):
         return states, work

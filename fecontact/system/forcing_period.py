@@ -85,7 +85,7 @@ def _periods(system: ContactSystem) -> list[tuple[str, float]]:
 def forcing_period(system: ContactSystem | VectorField) -> float:
     """Period of the excitation of a system, or of a vector field at its base values [s].
 
-    That of a contact system is the common period of drive, loads and ground.
+    The period of a contact system is the common period of drive, loads and ground.
 
     Raises
     ------

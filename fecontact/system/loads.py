@@ -29,11 +29,11 @@ class ActingLoad:
     Attributes
     ----------
     what : str
-        Its name for messages.
+        Name of the load for messages.
     row : (m,) array
     value : float or Signal
     still : str
-        What does not move if the row is zero, and how.
+        Motion that no mode has if the row is zero, as a clause of the error message.
     """
 
     what: str

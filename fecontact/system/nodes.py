@@ -83,7 +83,7 @@ TOLD = CONTACT_FIELDS + 1 + SPACE_ROWS * SPACE_COLUMNS
 
 
 class GroundMotion(NamedTuple):
-    """How far the ground has travelled, and its speed, or what slides in its place; two motions."""
+    """Travel and speed of both motions of the ground, or of the side that slides in its place."""
 
     travel: float
     speed: float

@@ -141,7 +141,8 @@ def add_node_powers(j, motion, moved, z, stick_speed, s, force, rates, out, node
 def set_powers(t, y, s, stick_speed, out, nodes):
     """Fill out (p,) with the powers and ``nodes`` (2 n,) with those of each node.
 
-    Its friction's losses, then those by creep, at slip velocities below ``stick_speed`` (n,).
+    ``nodes`` holds the losses in friction of all nodes, then those by creep, at slip velocities
+    below ``stick_speed`` (n,).
     """
     n = len(s.rows)
     moved = ground_motion(t, s)

@@ -48,7 +48,7 @@ class Axis:
     component : 'x', 'y' or 'phi', of solids also 'z', 'phi_x', 'phi_y', 'phi_z'
         Along the ground, away from it, counter-clockwise. None for a vector field.
     of : 'displacement' or 'velocity'
-        Which of them [m], [rad], [m/s], [rad/s]; not for a vector field.
+        Quantity of the component [m], [rad], [m/s], [rad/s]; not for a vector field.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def basins(
         Where finished blocks of runs are kept, some thousand starts each; a call that was ended
         or killed goes on from there, with the same result.
     executor : concurrent.futures.Executor, optional
-        What computes the blocks in place of this process: processes, or a cluster by
+        Executor that computes the blocks in place of this process: processes, or a cluster by
         :func:`fecontact.sweeps.dask_executor`. Needs a folder.
 
     Raises
@@ -202,7 +202,7 @@ def basins(
 
 @dataclass(frozen=True, eq=False)
 class _Settle:
-    """How runs are followed to where they settle; ``farthest`` (size,) of all starts."""
+    """Settings of runs that are followed until they settle; ``farthest`` (size,) of all starts."""
 
     moving: Moving
     solver: Solver

@@ -43,7 +43,7 @@ class Block(Protocol):
 
     @property
     def runs(self) -> int:
-        """How many."""
+        """Number of runs."""
 
     @property
     def shapes(self) -> dict[str, tuple[int, ...]]:

@@ -89,7 +89,7 @@ def lyapunov_exponents(
     Parameters
     ----------
     system : ContactSystem or VectorField
-        What moves; a field at its base values.
+        System to integrate; a field at its base values.
     duration : float
         Time over which growth is averaged [s].
     initial : 'rest', 'sliding', RigidStart, Trajectory, FieldRun or (size,) array

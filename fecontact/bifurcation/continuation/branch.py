@@ -204,11 +204,11 @@ class Branch(Summarised):
         Parameters
         ----------
         field : VectorField or ContactSystem
-            That of the branch.
+            Field or system of the branch.
         value : float or (k,) sequence
             The value; several give a tuple with the solution at each.
         which : int
-            Which of the solutions with this value, counted along the branch from 0; -1 is the last.
+            Number of the solution with this value, counted along the branch from 0; -1 is the last.
 
         Raises
         ------

@@ -36,7 +36,7 @@ def round_corner(
     Parameters
     ----------
     problem : Problem
-        What is continued.
+        Problem that is continued.
     here : Solution
         The last point.
     step : float

@@ -33,7 +33,7 @@ def round_hairpin(
     Parameters
     ----------
     problem : Problem
-        What is continued.
+        Problem that is continued.
     before, here : Solution
         The last two points; their tangents span the plane of the hairpin.
     step : float

@@ -83,7 +83,7 @@ class BranchPoint(Summarised):
     values : mapping
         Stored values of the solution, such as state and stability.
     kind : str or None
-        What is special about the point: 'fold', 'Hopf', ...; None for the others. On a branch a
+        Kind of a special point: 'fold', 'Hopf', ...; None for regular points. On a branch a
         special point has the class of its kind, such as
         :class:`fecontact.bifurcation.HopfPoint`.
     header : BranchHeader or None
@@ -161,7 +161,7 @@ class BranchPoint(Summarised):
     def parameter_values(self, field: VectorField) -> Array:
         """Values (k,) of all parameters of a field at the point.
 
-        Those that the branch does not know have the field's base values.
+        Parameters that the branch does not know have the field's base values.
 
         Raises
         ------
@@ -205,9 +205,9 @@ class BranchPoint(Summarised):
         Parameters
         ----------
         field : VectorField or ContactSystem, optional
-            That of the branch; orbits found by shooting are run again and need it. With it the
-            motion knows its parameter values and the names of its states, and can start a branch
-            over another parameter.
+            Field or system of the branch; orbits found by shooting are run again and need it.
+            With it the motion knows its parameter values and the names of its states, and can
+            start a branch over another parameter.
         samples : int
             Number of times; orbits by shooting may have some more.
 
@@ -255,7 +255,7 @@ class BranchPoint(Summarised):
         Parameters
         ----------
         field : ContactField or ContactSystem
-            That of the branch.
+            Field or system of the branch.
         outputs : int
             Number of times; orbits by shooting may have some more.
 

@@ -28,7 +28,7 @@ _LEAST_COSINE = 0.5
 
 
 class Misses(NamedTuple):
-    """How far guesses were off.
+    """Errors of earlier predictions.
 
     each are those of all guesses at the last point, a ``step`` ahead of the one before; worst is
     the largest error of late of those that were taken.
@@ -139,7 +139,7 @@ def predicted(
 
 
 def expected(step: float, misses: Misses) -> float:
-    """How far :func:`predicted` is likely to be off a step ahead."""
+    """Expected error of :func:`predicted` a step ahead."""
     return max(min(_expected(misses, step), default=math.inf), misses.worst)
 
 

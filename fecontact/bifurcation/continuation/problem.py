@@ -17,7 +17,7 @@ _SAME_DIRECTION = 0.9  # cosine between directions that count as the same
 
 
 class BranchStatus(Enum):
-    """How a branch ended; the value is a sentence to show."""
+    """End of a branch; the value is a sentence to show."""
 
     POINTS = "The branch has as many points as were asked for."
     BOUND = "The branch reached a bound of its parameter."
@@ -105,7 +105,7 @@ class Problem(Protocol):
     precision : float
         Part of a step to which special points are located.
     event_precision : float
-        The same for events.
+        Part of a step to which events are located.
     confirms : frozenset of str
         Test functions that jump a little where the mesh is renewed, and whose zeros
         :meth:`examine` confirms.
@@ -207,7 +207,7 @@ class Problem(Protocol):
         return u + step * tangent
 
     def off(self, step: float) -> float:
-        """How far the predictor is likely to be off a step ahead; infinite if unknown."""
+        """Expected error of the predictor a step ahead; infinite if unknown."""
         return np.inf
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[Problem, Array, Array] | None":

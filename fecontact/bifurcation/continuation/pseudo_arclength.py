@@ -52,7 +52,7 @@ __all__ = ["ContinuationOptions", "End", "Linearisation", "Problem", "continuati
 
 @dataclass(frozen=True)
 class End:
-    """How a continuation ended, and the error of the last failed step."""
+    """End of a continuation, and the error of the last failed step."""
 
     status: BranchStatus
     message: str = ""

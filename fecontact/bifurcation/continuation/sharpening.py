@@ -295,7 +295,7 @@ def _with_twice_the_intervals(problem: CollocationProblem, u: Array, tangent: Ar
 def _confirmed(
     located: _Located, found: BranchPoint | None, reach: float
 ) -> dict[str, Any] | None:
-    """Nothing more about a fold or branch point; None if no two successive meshes agree on it.
+    """Empty dict for a fold or branch point; None if no two successive meshes agree on it.
 
     They agree if both have the point, and the same test function a distance ``reach`` before and
     after it.

@@ -93,7 +93,7 @@ class Equilibrium:
     def eigenvalue_slopes(self, parameter: str) -> ComplexArray:
         """Derivatives (r,) of the eigenvalues of :attr:`modes` to a parameter.
 
-        Those of the equilibrium that moves with the parameter: ``s^T (dA/dp) r`` with the left and
+        The equilibrium moves with the parameter: ``s^T (dA/dp) r`` with the left and
         right eigenvectors s, r and the change of the Jacobian A along the equilibria, by
         differences of fourth order.
 
@@ -243,7 +243,7 @@ def require_autonomous(field: VectorField, values: Array) -> None:
 def default_scales(begin: Equilibrium) -> Array:
     """Sizes (d,) of the states, for arclengths and differences.
 
-    Those of the field; for contact systems the largest displacement, and for velocities that
+    The sizes of the field; for contact systems the largest displacement, and for velocities that
     times the frequency of the least damped mode.
     """
     field = begin.field

@@ -109,9 +109,9 @@ class Given(NamedTuple):
         Time at the begin [s]; -1 for a motion backwards. Times of the run are sizes of the times
         since then.
     status, closed : (k,), (n,) integer arrays
-        What sticks and slips, and what is closed.
+        Status of the clusters, and whether stops are closed.
     sizes : (d,) array
-        Those of the states.
+        Sizes of the states.
     """
 
     problem: NonsmoothProblem
@@ -129,7 +129,7 @@ class Given(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """How far a motion has come."""
+    """State that a motion has reached."""
 
     numbers: Annotated[Array, STEP + 1]
     counts: Annotated[Integers, COUNTS]

@@ -90,7 +90,7 @@ def sizes_without_contact(motion: Motion, begin: float, start: Array, period: fl
 
 
 def order_of(motion: Motion, before: Phase, phase: Phase) -> int:
-    """How often what ends a phase vanishes at its begin too; see :class:`Phase`."""
+    """Order of the zero of the phase's last event function at its begin; see :class:`Phase`."""
     cluster = before.cluster()
     if phase.event == PERIOD or phase.cluster() != cluster:
         return 0

@@ -20,7 +20,7 @@ class AffineArrays:
     ----------
     arrays : SystemArrays
     flat, base, slope : (k,) arrays
-        What varies; ``flat[:] = base + p * slope`` sets it.
+        Arrays that vary; ``flat[:] = base + p * slope`` sets it.
     low, high : float
         Range of p.
     varying : frozenset of str

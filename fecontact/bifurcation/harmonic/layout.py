@@ -1,4 +1,4 @@
-"""How states become unknowns of harmonic balance, and back."""
+"""Conversion of states to unknowns of harmonic balance, and back."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from fecontact.system.fields.vector_field import VectorField
 
 @dataclass(frozen=True)
 class Layout:
-    """How states x = [q, q', y, z] become unknowns.
+    """Conversion of states x = [q, q', y, z] to unknowns.
 
     Attributes
     ----------

@@ -180,7 +180,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         Upper limits up to which the scales of the states grow with the orbit; None keeps the
         scales constant.
     row : (d,) array, optional
-        What is observed of responses.
+        Row of the observed displacement of responses.
     """
 
     stability: str | None = "transitions"

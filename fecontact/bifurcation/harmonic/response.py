@@ -83,7 +83,7 @@ class FrequencyResponse(Summarised):
     levels : (k,) array
         Its values; one that is not a number without such a parameter.
     observed : str
-        What is observed, such as 'B x'.
+        Name of the observed displacement, such as 'B x'.
     """
 
     branches: tuple[Branch, ...]
@@ -151,7 +151,7 @@ class FrequencyResponse(Summarised):
         Parameters
         ----------
         system : ContactSystem or VectorField
-            That of the response.
+            System or field of the response.
         observe : (point, component) or (d,) sequence
             As for :func:`frequency_response`.
 

@@ -31,7 +31,7 @@ class StoredOrbits:
     periods : (K,) array
         T [s].
     forces, mean, sizes : (K, N, b), (K, b, ...) and (K, b) or (b,) arrays
-        What errors are estimated from; see :func:`estimates.neglected`.
+        Data from which errors are estimated; see :func:`estimates.neglected`.
     row : (d,) array, optional
         Displacement that is observed.
     known : dict

@@ -1,4 +1,4 @@
-"""How the period of the forcing depends on a parameter."""
+"""Dependence of the forcing's period on a parameter."""
 
 import numpy as np
 

@@ -36,7 +36,7 @@ class ShootingMode(ShootingProblem):
     Attributes
     ----------
     row : (d,) array
-        What is observed.
+        Row of the observed displacement.
     conservative : bool
         Whether xi is zero but for rounding where the mode begins.
     """

@@ -133,7 +133,7 @@ def linear_start(
 ) -> LinearStart:
     """The linear mode ``number``, from 1, of the system at rest under its constant loads.
 
-    Those of a travelling wave are the modes of its nodal diameter.
+    The modes of a travelling wave are the modes of its nodal diameter.
 
     Friction with memory sticks in it, with the deflections of the state ``preloaded`` (d,) or none.
     Modes are counted by their damped frequencies at xi = 0; xi is then the negative damping under

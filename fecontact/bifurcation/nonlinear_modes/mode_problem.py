@@ -66,7 +66,7 @@ class ModeProblem(HarmonicProblem):
     Attributes
     ----------
     row : (d,) array
-        What is observed.
+        Row of the observed displacement.
     conservative : bool
         Whether xi is zero but for rounding where the mode begins, and no friction has memory.
     loose : (r, m) array
@@ -101,7 +101,7 @@ class ModeProblem(HarmonicProblem):
         return False
 
     def note(self, points: Any) -> str:
-        """Nothing: 'trivial_error' tells how far multipliers are right."""
+        """Empty note: 'trivial_error' is the error of the multipliers."""
         return ""
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:

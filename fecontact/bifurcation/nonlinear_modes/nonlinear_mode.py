@@ -82,7 +82,7 @@ class NonlinearMode(Summarised):
     branch : Branch
         The motions, in their order along the mode.
     number : int
-        Which mode of the system at rest it begins with, from 1.
+        Number of the mode of the system at rest with which it begins, from 1.
     observed : str
         Whose amplitude it is, such as 'B x'.
     """
@@ -128,7 +128,7 @@ class NonlinearMode(Summarised):
     def loss(self) -> Array:
         """Energy (N,) lost in one period, xi times the integral of q'^T q' [J].
 
-        That of one sector for a travelling wave, as :attr:`energy`.
+        For a travelling wave, energy lost in one sector, as :attr:`energy`.
         """
         return np.asarray(self.xi * self.branch.column("period") * self._square)
 
@@ -160,8 +160,9 @@ class NonlinearMode(Summarised):
     def coordinates(self, k: int = 1) -> ComplexArray:
         """Complex harmonic (N, m) of the modal coordinates q, or of all states of a field.
 
-        Those of a travelling wave are modes of the diameter 0, for the mean, and displacements of
-        its contact nodes and points; :func:`fecontact.bifurcation.wheel_motion` has its modes.
+        The coordinates of a travelling wave are modes of the diameter 0, for the mean, and
+        displacements of its contact nodes and points;
+        :func:`fecontact.bifurcation.wheel_motion` has its modes.
 
         Raises
         ------
@@ -198,7 +199,7 @@ class NonlinearMode(Summarised):
         frequency_hz : float, optional
             Frequency [Hz], in place of the amplitude.
         wave : EngineOrder, optional
-            That of the mode, if it is a travelling wave.
+            Wave of the mode, if it is a travelling wave.
 
         Raises
         ------

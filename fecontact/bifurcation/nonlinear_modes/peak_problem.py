@@ -61,7 +61,7 @@ class PeakProblem(Problem):
     width : float
         Its scale in the step length.
     row : (d,) array
-        What is observed.
+        Row of the observed displacement.
     condition : str
         'amplitude', 'phase' or 'held'.
     border : (n + 1,) array

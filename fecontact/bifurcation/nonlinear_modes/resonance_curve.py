@@ -59,7 +59,7 @@ class ResonanceCurve(Summarised):
     branch : Branch
         The resonances, in their order.
     observed : str
-        What is observed, such as 'B x'.
+        Name of the observed displacement, such as 'B x'.
     condition : str
         'amplitude' or 'phase'.
     """

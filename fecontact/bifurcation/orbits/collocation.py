@@ -47,7 +47,7 @@ _NONE = np.empty((0, 0))
 
 @dataclass(frozen=True)
 class Intervals:
-    """How many intervals orbits get along a branch.
+    """Rule for the number of intervals of orbits along a branch.
 
     Attributes
     ----------

@@ -44,7 +44,7 @@ def periodic_motion(
     longest_period : float, optional
         Longest period considered [s]; 16 excitation periods by default.
     solver : Auto, SetValued, Scipy, CVODE and others
-        What runs it; see :func:`fecontact.simulate`.
+        Solver of the run; see :func:`fecontact.simulate`.
     rtol : float
         Relative tolerance.
 

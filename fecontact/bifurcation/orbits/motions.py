@@ -118,7 +118,7 @@ class PeriodicMotion(Summarised):
         count : int
             Highest harmonic, below half the number of samples in the period.
         field : VectorField, optional
-            That of the motion; needed for displacements of points.
+            Field of the motion; needed for displacements of points.
         observe : (point, component) or (d,) sequence, optional
             A displacement of a contact system, such as ('B', 'x'), by its field, or a row of the
             states; by default all states.

@@ -72,7 +72,7 @@ class ShootingProblem(FloquetTests, Problem):
     derivative_rtol : float or None
         Relative tolerance of the derivatives; see :func:`fecontact.sensitivity`.
     solver : Auto, Rodas5P, Radau or SetValued
-        What runs the segments.
+        Solver that runs the segments.
     precision : float
         Tolerance of the location of special points, relative to the step: that of the runs.
     before, bend

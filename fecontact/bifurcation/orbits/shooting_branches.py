@@ -153,7 +153,7 @@ def _from_event_to_event(
 ) -> tuple[Branch | None, str]:
     """The branch of a set-valued orbit whose events are known; None for others, and why.
 
-    Those are orbits of time-stepping and of Poisson's impacts, without events though nothing
+    The others are orbits of time-stepping and of Poisson's impacts, without events though nothing
     excites them, with chatter, or with compliant contacts that open.
 
     Raises

@@ -93,8 +93,9 @@ def state_error(
     begins or errors decay as in stick: the linear equations of e are then solved on both halves,
     on the intervals with the largest errors. It is infinite where the field is not finite there.
 
-    What the intervals before add is e at their ends, see :func:`_carried`. It needs the equations
-    about the orbit, and ``beside``, their solution for a right-hand side; the larger error counts.
+    The contribution of the intervals before is e at their ends, see :func:`_carried`. It needs the
+    equations about the orbit, and ``beside``, their solution for a right-hand side; the larger
+    error counts.
     Where modes turn by a good part of a turn in an interval, both are combined after the former is
     computed as they really turn, see :func:`_turned`.
     """

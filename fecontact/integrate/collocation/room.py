@@ -54,9 +54,9 @@ class Collocation(NamedTuple):
     matrix, right, pivots : (s m, s m), (s m,), (s m,) arrays
         The linear system of Newton's method.
     small, small_right, small_pivots : (m, m), (m,), (m,) arrays
-        That of a defect.
+        Linear system of a defect.
     given, load, speeds : (s, 10), (s, m), (s + 1,) arrays
-        What is given in time at the stages, and the speed of the ground at the begin too.
+        Prescribed motions and loads at the stages, and the speed of the ground at the begin too.
     y, after, rate : (2 m,) arrays
         States of a stage and at the end, and a rate.
     places, rates : (s + 3, m), (s + 2, m) arrays

@@ -19,7 +19,7 @@ class PythonFunction:
         Of the function, see :data:`fecontact.system.fields.one_place.PYTHON`; valid as long as
         this object lives.
     error : BaseException or None
-        What the field raised; rates are NaN from then on, which ends the run.
+        Exception that the field raised; rates are NaN from then on, which ends the run.
     """
 
     def __init__(self, field: VectorField) -> None:

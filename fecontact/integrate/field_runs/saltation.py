@@ -120,7 +120,7 @@ def passages(
 def _passage(
     system: ContactSystem, levels: Array, time: float, node: int, y: Array, beside: Above | None,
 ) -> Passage | None:
-    """How derivatives jump as a node passes a level; None for one that it does not reach."""
+    """Jump of the derivatives as a node passes a level; None for a level that it does not reach."""
     def penetrations(states: Array, of: ContactSystem = system) -> Array:
         return of.contact_history(np.full(len(states), time), states)[
             :, node, kernels.PENETRATION]

@@ -39,11 +39,11 @@ class FieldSteps(StepRun):
     moving : VectorField
         At its base values.
     kernel : FieldKernel
-        The same for the integrator, with room of its own.
+        Kernels of the field for the integrator, with a workspace of their own.
     function : PythonFunction or None
         Where Python evaluates it.
     progress, room, output, varied, watch
-        What the integrator goes on from, works with and fills; it keeps nothing between outputs.
+        State, workspace and results of the integrator; it keeps nothing between outputs.
     """
 
     moving: VectorField
@@ -68,7 +68,7 @@ class FieldSteps(StepRun):
         Raises
         ------
         Exception
-            What a field of Python raised.
+            The exception that a field of Python raised.
         AnalysisError
             If a complex step that was asked for turned out wrong.
         """
@@ -96,7 +96,7 @@ def start_field(
     Parameters
     ----------
     field : VectorField
-        What moves.
+        Field to integrate.
     state : (d,) array
         At the start.
     times : (N,) array
@@ -110,7 +110,7 @@ def start_field(
     vary : bool
         Whether to carry derivatives to the state at the output time before along.
     events : sequence of Crossing and Event
-        What to watch for.
+        Events to watch for.
 
     Raises
     ------

@@ -113,7 +113,7 @@ class SideBySide:
     Parameters
     ----------
     numbers : list of int
-        Those of the runs in their ensemble.
+        Numbers of the runs in their ensemble.
     members, times : sequences
         System and output times of each run.
     state_of : callable
@@ -173,7 +173,7 @@ class SideBySide:
 
     @property
     def status(self) -> list[Status]:
-        """How each run ended."""
+        """Status of each run at its end."""
         return [ENDS.get(int(ended), Status.INTERRUPTED)
                 for ended in self.runs.ends[:, arrays.STATUS]]
 
@@ -238,7 +238,7 @@ def side_by_side(
 ) -> list[SideBySide]:
     """The runs of an ensemble that go through lanes, kind by kind; chains as a whole.
 
-    Those whose motion is expanded in power series, which takes less time, are not among them.
+    Runs whose motion is expanded in power series, which takes less time, are left out.
     """
     kinds: dict[Kind, list[int]] = {}
     known: dict[tuple[int, float, float], Kind | None] = {}

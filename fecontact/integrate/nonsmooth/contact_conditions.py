@@ -245,7 +245,7 @@ def _sweep(c, case):
 
 @helper
 def count_cases(c):
-    """How many cases there are; MOST_CASES + 1 for more."""
+    """Number of cases; MOST_CASES + 1 if there are more."""
     cases = 1
     for j in range(len(c.cluster)):
         if c.touching[j] and cases <= MOST_CASES:

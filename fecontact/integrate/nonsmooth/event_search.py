@@ -79,9 +79,9 @@ class Room(NamedTuple):
     halves : (DEPTH, PARTS + 3) array
         Parts of the step that are left to look at.
     left, scale : (QUARTERS + 2, 2 k + n), (2 k + n,) arrays
-        What forces have left at some places, and their sizes.
+        Margins of the forces at some places, and their sizes.
     ends : (2, 2 k + n) array
-        What they have left at both ends of the step.
+        Margins of the forces at both ends of the step.
     waiting : (DEPTH, 2) array
         Begins and widths of parts whose forces are left to look at.
     past, fresh : (k + n,) boolean arrays
@@ -95,7 +95,7 @@ class Room(NamedTuple):
     touched, parting : (n,) boolean arrays
         Stops that are struck and nodes that touch down, and stops that open.
     given, loads, pushes : (GIVEN,), (m,), (m,) arrays
-        What is given in time, see :mod:`fecontact.integrate.nonsmooth.steps.rates`.
+        Prescribed motions and loads, see :mod:`fecontact.integrate.nonsmooth.steps.rates`.
     flights, pull, heights : (n, FLIGHT_FIELDS), (SLOPES,), (PARTS + 2,) arrays
         Flights that have just begun, see :mod:`fecontact.integrate.nonsmooth.steps.flights`, and
         the acceleration and the height of one of them over the step.

@@ -256,7 +256,7 @@ def _error(struck, limits, room):
 
 @routine
 def _too_deep(t, Y, closed, limits, p, room):
-    """How deep nodes that are open have come into the ground, in units of what is allowed."""
+    """Largest penetration of open nodes, in units of the penetration that is allowed."""
     s, worst = p.system, 0.0
     moved = ground_motion(t, s)
     for j in range(len(closed)):

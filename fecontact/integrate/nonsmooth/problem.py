@@ -106,7 +106,7 @@ class Limits(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """How far a run has come.
+    """Present state of a run.
 
     ``state`` is Y; ``status`` (k,) is that of the clusters, ``closed`` (n,) tells the closed
     stops; ``largest`` (3,) are the largest sizes so far, and ``carried`` (n,) the friction forces
@@ -212,12 +212,12 @@ class Workspace(NamedTuple):
 
 
 def tangents(problem: NonsmoothProblem) -> int:
-    """How many tangents a node has."""
+    """Number of tangents of a node."""
     return 2 if problem.system.rows.shape[1] > 2 else 1
 
 
 def node_columns(problem: NonsmoothProblem) -> int:
-    """How many columns `Workspace.nodes` has."""
+    """Number of columns of `Workspace.nodes`."""
     return SPACE_NODE_COLUMNS if problem.system.rows.shape[1] > 2 else NODE_COLUMNS
 
 

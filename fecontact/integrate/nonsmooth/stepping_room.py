@@ -51,9 +51,9 @@ class Room(NamedTuple):
     Attributes
     ----------
     newton, hold : NewtonRoom, Hold
-        Those of the stages.
+        Workspace and stick variables of the stages.
     space : InSpace
-        What is different in space.
+        Addresses of functions that are different in space.
     states, accelerations, forces, rates : (3, 2 m), (3, m), (3, n), (3, p + n) arrays
         Of the stages: Y, q'', friction forces, in space (3, 2 n), and powers.
     start, known : (m,) arrays
@@ -61,13 +61,13 @@ class Room(NamedTuple):
     new, before, after : (size,), (m + p + n,), (m + p + n,) arrays
         Y at the end of the step; accelerations and powers at both ends.
     old : (n, columns) array
-        What `observe` says of the begin.
+        Results of `observe` at the begin of the step.
     sides : (n,) array, in space (2 n,)
         ``hold.side`` at the begin of the step.
     inertia : (n,) array
         Tx Tx^T of each node, or in space T2 T2^T if that is larger.
     tries : (3,) array
-        What attempts at a step leave to the next one.
+        Results of an attempt at a step for the next attempt.
     cubic, speed, halves : (4,), (4,), (DEPTH, 5) arrays
         Polynomials over the step, and parts of it.
     """

@@ -34,13 +34,13 @@ class Blocks(NamedTuple):
     parts : (p, 4) integer array
         First and last mode, first and last node of each block of the rows.
     tiles : (t, 4) integer array
-        The same as first and last row, first and last column of ``shapes``.
+        First and last row, first and last column of ``shapes`` of these blocks.
     spans : (n, r, 2) integer array
         First and last modes that move each node of all; empty spans fill the array.
     own : (b, 4) integer array
         Rows and columns of the blocks of stiffness and damping.
     coupled : (c, 6) integer array
-        Those of the blocks of the Jacobian, and where each starts in the order of elimination.
+        Rows and columns of the Jacobian's blocks, and their starts in the order of elimination.
     pairs : (k, 6) integer array
         Rows of ``shapes``, columns of the Jacobian [Jq, Jv], columns of ``shapes`` of the products
         that the Jacobian is the sum of.
@@ -71,7 +71,7 @@ FEW = 16
 def block_at(table, k):
     """First and last row, first and last column of block k of a table.
 
-    Those of columns are unsigned: loops over indices that might be negative are not vectorised.
+    Column numbers are unsigned: loops over indices that might be negative are not vectorised.
     """
     return table[k, 0], table[k, 1], np.uint64(table[k, 2]), np.uint64(table[k, 3])
 

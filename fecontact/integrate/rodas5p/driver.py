@@ -85,7 +85,7 @@ def start(
     Parameters
     ----------
     system : ContactSystem
-        What moves.
+        Contact system to integrate.
     state : (2 m + n s,) array
         y = [q, q', z] at the start.
     times : (N,) array
@@ -110,7 +110,7 @@ def start(
         ten times ``rtol`` of their size, or of a tenth of the largest, by collocation too; 200
         times ``rtol`` where they go over a step in parts, which :func:`in_parts` says.
     events : sequence of ContactEvents, Crossing and Event
-        What to watch for.
+        Events to watch for.
     method : 'auto', 'rodas5p', 'radau' or 'power-series'
         How to go on; 'auto' as :class:`fecontact.integrate.Auto` says.
     keep_steps : bool
@@ -189,7 +189,7 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
 def _progress(system: ContactSystem, control: Control, times: Array, state: Array) -> Progress:
     """Before the first step, whose length the acceleration at the start limits.
 
-    What jumps at the start, but for rounding, has jumped.
+    Signals that jump at the start, within rounding, have jumped.
     """
     basis, m = system.basis, system.basis.modes
     time = breaks(system, times)[0]

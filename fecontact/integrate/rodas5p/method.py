@@ -78,7 +78,7 @@ class Data(NamedTuple):
 
     If the columns of ``vary.variation`` are not empty, those that belong to each output time are
     put into ``vary.transitions`` and restarted there; the output times must then be breaks.
-    What is watched for is noted in ``watch``.
+    Events are noted in ``watch``.
     """
 
     problem: state.Problem

@@ -24,19 +24,19 @@ class Run(StepRun):
     Attributes
     ----------
     problem : Problem
-        What is integrated, and how finely.
+        Equations to integrate, and limits of the steps.
     output : Output
         Output times and what belongs to them; rows from ``outputs`` on are not filled yet. Work
         of the powers :data:`fecontact.system.powers.POWERS`, then friction work of each node and
         its part in stick [J].
     kept : Output
-        The same at times between the outputs; without room if none are kept.
+        Output at times between the outputs; without rows if none are kept.
     variation : Vary
         Derivatives that go with the run.
     progress : Progress
-        All that is needed to go on.
+        Complete state of the run.
     watch : Watch
-        What is watched for; what was found is in ``events``.
+        Events to watch for; those found are in ``events``.
     series : Series or None
         Tables of a system whose motion is expanded in power series; else None.
     collocation : Collocation or None

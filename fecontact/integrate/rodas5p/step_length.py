@@ -54,8 +54,8 @@ def next_length(h, root, longest, numbers):
 def next_stop(t, breaks, end):
     """The next break or the end, the last time before it, and whether it is a break.
 
-    What is given in time may jump at all times from the first to the last of a break: it is
-    approached from below the first, and the step ends at the last.
+    Signals may jump at all times from the first to the last of a break: it is approached from
+    below the first, and the step ends at the last.
     """
     for k in range(len(breaks)):
         if t < breaks[k, 1]:

@@ -55,13 +55,13 @@ class Series(NamedTuple):
     q, v : (m, n + 1) arrays
         Coefficients of modal displacements and velocities over the step.
     forcing : (m, n + 1) array
-        Those of the modal forces that are given in time.
+        Coefficients of the modal forces that are prescribed in time.
     signal : (g, n + 1) array
-        Those of the signals; (0, n + 1) where no powers are integrated.
+        Coefficients of the signals; (0, n + 1) where no powers are integrated.
     u, F, square, cube : (n, n + 1) arrays
-        Those of the penetrations, forces, and of u^2 and u^3.
+        Coefficients of the penetrations, forces, and of u^2 and u^3.
     powers : (5, n + 1) array
-        Those of the powers, then of their integrals.
+        Coefficients of the powers, then of their integrals.
     line, room : (3, l), (d, n + 1) arrays
         Room to work in; l is n + 1, or the number of nodes where that is more.
     """

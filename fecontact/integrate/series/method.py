@@ -94,7 +94,7 @@ class Step(NamedTuple):
     part : float
         Its length in these.
     node, meets : int
-        Which node leaves its piece at its end, -1 if none does, and what it meets.
+        Node that leaves its piece of the law at the end, -1 if none does, and what it meets.
     error : float
         0; 2 if the motion cannot be expanded over a step that the time tells from none; infinite
         if it is not finite.

@@ -110,7 +110,7 @@ def travelling(system: ContactSystem) -> SystemArrays:
 
 
 def travelled(system: ContactSystem, travel: Array) -> Array:
-    """How far (n,), in space (n, 2), the other side of each node has travelled [m]."""
+    """Distance (n,), in space (n, 2), that the other side of each node has travelled [m]."""
     arrays = travelling(system)
     along = travel[0] * arrays.sliding
     if len(travel) == 1:

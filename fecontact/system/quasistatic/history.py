@@ -42,7 +42,7 @@ class Loop(Summarised):
         Force that the action exerts on the body [N]; for the load, its scale [-]; for a travel
         that is an angle, a moment [N m].
     loss : float
-        What friction loses from the first of these points to the last [J].
+        Energy lost in friction from the first of these points to the last [J].
     """
 
     action: str
@@ -110,7 +110,7 @@ class LoadHistory(Summarised):
         Work done so far by loads, drive, travel of the ground, and stiffness that is not symmetric
         [J].
     node_loss : (N, n) array
-        What friction has lost so far at each node, the sum of R dz [J].
+        Energy lost in friction so far at each node, the sum of R dz [J].
     sliders : Sliders
         Springs and limits of the nodes.
     status : 'finished' or 'no-equilibrium'
@@ -234,7 +234,7 @@ class LoadHistory(Summarised):
 
     @property
     def imbalance(self) -> Array:
-        """Work minus loss minus change of the stored energy (N,) [J], zero but for errors."""
+        """Work minus loss minus change of the stored energy (N,) [J], zero within errors."""
         return self.work - self.loss - (self.stored - self.stored[0])
 
     def row(self, vertex: int) -> int:

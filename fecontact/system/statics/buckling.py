@@ -75,11 +75,11 @@ def buckling_loads(
     body : ElasticBody
         With supports against all rigid motions.
     load : Load
-        As of :func:`~fecontact.static_solution`.
+        See :func:`~fecontact.static_solution`.
     count : int
         Number k of load factors, if there are so many.
     points, time, temperature : mapping, float, float or array or function
-        As of :func:`~fecontact.static_solution`. The factors multiply loads and temperature.
+        See :func:`~fecontact.static_solution`. The factors multiply loads and temperature.
 
     Raises
     ------

@@ -68,7 +68,7 @@ class ActingForces:
     slope : sparse (d N, d N) array
         Their derivative [N/m].
     status : bytes
-        Which points are closed, and which sliders slide.
+        Closed points, and sliders that slide.
     rounding : float
         Error of the forces by rounding of places [N].
     """

@@ -183,7 +183,7 @@ def deflection_path(
     body : ElasticBody, or mapping of name to ElasticBody
         Supported against all rigid motions. Places of several bodies are 'BODY.PLACE'.
     load, points, time : Load or sequence of Load, mapping, float
-        As of :func:`~fecontact.static_solution`; several loads act one after the other.
+        See :func:`~fecontact.static_solution`; several loads act one after the other.
     follower : bool
         True if pressures on boundaries act normal to the deformed outline, on its deformed size.
     steps : DeflectionSteps, optional

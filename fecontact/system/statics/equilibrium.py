@@ -112,7 +112,7 @@ def equilibrium(
     Parameters
     ----------
     system : ContactSystem
-        Its ground is flat for steady sliding.
+        Contact system; its ground is flat for steady sliding.
     kind : 'rest' or 'sliding'
         Rest on the ground as it is at ``time``, without friction; or steady sliding on flat ground,
         x' = 0 and slip velocity -V at every node, with the friction and the internal variables that

@@ -54,7 +54,7 @@ class CompiledBalance:
 
     @classmethod
     def of(cls, problem: Any) -> "CompiledBalance | None":
-        """None where the period is unknown, or changes with the parameter in an unknown way."""
+        """Data of a problem; None if its period, or its change with the parameter, is unknown."""
         found = problem.field
         if (not isinstance(found, ContactField) or problem.autonomous
                 or (problem.turn is None and problem.fixed is None)):

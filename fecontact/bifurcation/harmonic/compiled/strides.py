@@ -56,7 +56,7 @@ class Strides:
 
     @classmethod
     def of(cls, problem: Any, options: ContinuationOptions) -> "Strides | None":
-        """None where the steps of this problem are not made by compiled code."""
+        """Plain steps of a problem; None if they are not made by compiled code."""
         if (problem.compiled is None or options.events
                 or problem.stability not in (None, "transitions")):
             return None

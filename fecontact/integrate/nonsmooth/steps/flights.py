@@ -60,7 +60,7 @@ def _acceleration_size(j, p, progress, room):
 def _rise(j, step, p, progress, room):
     """Put the height of a young flight over the step into ``room.heights``, Bernstein coefficients.
 
-    Those of its rate are put into ``room.along``. Returns the rounding of the height at the end.
+    Coefficients of its rate go into ``room.along``. Returns the rounding of the height at the end.
     """
     row, pull, c, h = p.system.rows[j, 1], room.pull, room.nested, step.h
     rate, heights, m = room.along, room.heights, p.rows.shape[1]
