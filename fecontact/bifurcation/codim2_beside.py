@@ -1,4 +1,4 @@
-"""Curves of orbits that begin at points of codimension two; a point of each is looked for."""
+"""Curves of orbits that begin at points of codimension two; a point of each is sought."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -46,7 +46,7 @@ from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
 
 # Distances from the Bautin point along the second parameter, in the width of the diagram, at which
-# the fold is looked for, and the range of the first parameter about the Hopf point there.
+# the fold is sought, and the range of the first parameter about the Hopf point there.
 _AWAY, _ABOUT = (0.02, 0.05, 0.005), 0.1
 _TOLERANCE = 1e-12
 _SEARCH = ContinuationOptions(step=2e-3, largest_step=0.02, points=150, stop_at=("fold",))

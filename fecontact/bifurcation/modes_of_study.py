@@ -58,7 +58,7 @@ def follow_mode(
     earlier : NonlinearMode, optional
         Result of an interrupted computation of the mode: it goes on at the end of the last
         whole part, so that the numbers are those of a computation without interruption. With a
-        tolerance the mode is followed anew, since harmonics or samples may still grow.
+        tolerance the mode is followed again, since harmonics or samples may still grow.
     keep : callable, optional
         Given what there is after each part, as interrupted.
     preload : LoadHistory, optional

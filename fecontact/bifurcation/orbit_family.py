@@ -101,7 +101,7 @@ class _ByShooting(_FamilyTests, ShootingProblem):
 
 
 def _others(multipliers: ComplexArray) -> ComplexArray:
-    """The multipliers but for the two that are one."""
+    """The multipliers except the two that are one."""
     return multipliers[np.argsort(np.abs(multipliers - 1.0))[2:]]
 
 

@@ -74,7 +74,7 @@ def follow_responses(
         Told the level or amplitude that is being followed, and which part of its range is done.
     earlier : FrequencyResponse, optional
         Result of an interrupted computation: finished levels are taken from it, the
-        one that was interrupted is followed anew, so that the numbers are those of a computation
+        one that was interrupted is followed again, so that the numbers are those of a computation
         without interruption.
     keep : callable, optional
         Given what there is after each level.

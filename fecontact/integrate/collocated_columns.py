@@ -92,7 +92,7 @@ def _solve(system, out):
     """Fill out (4 m, k) with the solution of the linear system [K, b] (4 m, 4 m + k).
 
     By blocks of the size of the modes, for products of matrices are several times faster than
-    elimination row by row; pivots are looked for within the blocks of the diagonal, which are
+    elimination row by row; pivots are sought within the blocks of the diagonal, which are
     near the unit matrix for all but strong dampers.
     """
     m = len(system) // STAGES

@@ -1,9 +1,9 @@
-r"""Gaps and slip velocities of the contact nodes in the course of a step.
+r"""Polynomials of gaps and slip velocities of the contact nodes over a step.
 
-On the interpolant of a step they are polynomials of degree four in the normalised time s, minus the
-contribution of the ground, its height under the node or its speed. Their Bernstein coefficients
-bound the polynomials. On flat ground at constant speed that contribution is constant, and sign
-changes are found exactly. Otherwise its bounds are used,
+On the interpolant of a step gaps and slip velocities are polynomials of degree four in the
+normalised time s, minus the contribution of the ground, its height under the node or its speed.
+Their Bernstein coefficients bound the polynomials. On flat ground at constant speed that
+contribution is constant, and sign changes are found exactly. Otherwise its bounds are used,
 
 .. math:: |y_R(\xi) - y_R(\xi_0)| \le \max|y_R'|\,|\xi - \xi_0|, \qquad
     |V(t) - V(t_0)| \le \max|V'|\,|t - t_0|
@@ -41,7 +41,7 @@ MOST = 8
 
 
 class Course(NamedTuple):
-    """The slip velocity (SLIP) or the gap (GAP) of a node in the course of a step.
+    """Polynomial of the slip velocity (SLIP) or the gap (GAP) of a node over a step.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Course(NamedTuple):
     bounds, courses : arrays
         Bounds of the ground; results of :func:`set_courses`.
     row : (5,) array
-        Room to work in.
+        Work arrays.
     """
 
     what: int
@@ -209,7 +209,7 @@ def _displaced(part, column, course, row):
 
 @helper
 def at(part, b, course):
-    """Value of a course at a part of the step; b (5,) are the coefficients of the node's own."""
+    """Value of a polynomial at a part of the step; b (5,) are coefficients of the node's part."""
     return bernstein.value(b, part, course.row) + course.shift - ground_part(part, course)
 
 
@@ -243,7 +243,7 @@ def _ground_bound(course):
 
 @helper
 def changes(b, course, halves, places):
-    """Fill ``places`` with the parts of the step at which a course changes its sign.
+    """Fill ``places`` with the parts of the step at which a step polynomial changes its sign.
 
     Returns how many there are. Sets b (5,) to the coefficients of the node's own motion;
     ``halves`` (bernstein.DEPTH, 6) is room.

@@ -34,7 +34,7 @@ _CURVE = np.logspace(-9.0, 2.0, 441)
 def watch_for(
     system: ContactSystem | VectorField, events: Sequence[AnyEvent], kinks: bool
 ) -> Watch:
-    """Room for what is watched for, and nothing found yet.
+    """Arrays of the events to watch for, none found yet.
 
     Raises
     ------

@@ -35,17 +35,17 @@ Parameter = str | tuple[Callable[[ContactSystem, float], ContactSystem], float]
 
 # Largest change of ground velocity, relative to the velocity scale of friction.
 _SLIP = 0.05
-# Largest change of penetrations, relative to their scale, and at how many times it is looked at.
+# Largest change of penetrations, relative to their scale, and at how many times it is examined.
 _DEPTH, _SOMETIMES = 1e-4, 9
 # Change of the state for a difference of runs, in parts of its largest value.
 _DIFFERENCE = 1e-5
 # Derivatives by differences to both sides may be so far apart, in parts of the largest or of 1, and
-# so many times the tolerance. Others are formed anew with changes that are smaller by a factor;
+# so many times the tolerance. Others are formed again with changes that are smaller by a factor;
 # where the ends of runs are smooth, they come at least so much closer.
 _APART, _COARSE, _FINER, _CLOSER = 1e-3, 1e3, 30.0, 0.5
 # Part of the change of a parameter with elastic Coulomb elements, whose forces have kinks.
 _SLIDERS = 1e-4
-# Steps between two output times at which states are looked at for their largest values.
+# Steps between two output times at which states are examined for their largest values.
 _BETWEEN = 16
 
 

@@ -220,7 +220,7 @@ def body_rates(load, y, s, out):
 
 @helper
 def rates_under(load, moved, y, s, force, rates, out):
-    """Fill out (2 m + n s,) with y'; ``force`` and ``rates`` are room for laws of friction."""
+    """Fill out (2 m + n s,) with y'; ``force`` and ``rates`` are work arrays of friction."""
     n, _, m = s.rows.shape
     states = len(rates)
     body_rates(load, y, s, out)

@@ -129,7 +129,7 @@ def basins(
     transient : float, optional
         Time before passages of the ``section`` count [s]; needed with one.
     keep : int
-        States on the section that are looked at, at least 4.
+        States on the section that are examined, at least 4.
     section : Crossing, optional
         Poincare section of a system that is not excited; motions that do not meet it in the last
         half of the run, or keep one place there, are equilibria.

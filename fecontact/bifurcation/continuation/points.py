@@ -60,7 +60,7 @@ class HopfPoint(BranchPoint):
 
     @property
     def frequency_hz(self) -> float:
-        """Its frequency, w / (2 pi) [Hz]."""
+        """Frequency of the critical pair, w / (2 pi) [Hz]."""
         return float(self._detail("frequency_hz"))
 
     @property
@@ -151,7 +151,7 @@ class DiscontinuityPoint(BranchPoint):
 
     @property
     def time(self) -> float:
-        """When the orbit meets it, from its first event on [s]."""
+        """Time from the first event to the border [s]."""
         return float(self._detail("time"))
 
     @property

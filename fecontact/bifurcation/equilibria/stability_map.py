@@ -83,7 +83,7 @@ def stability_map(
     """Stability of an equilibrium over a grid of two parameters, such as speed and friction.
 
     The equilibrium is followed from point to point by Newton's method; where that fails it is
-    searched anew (for contact systems), and where there is none the map has NaN.
+    searched again (for contact systems), and where there is none the map has NaN.
 
     Parameters
     ----------

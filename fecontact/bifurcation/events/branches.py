@@ -223,7 +223,7 @@ def _following(
 ) -> tuple[EventOrbit, Array, Array] | None:
     """Problem, unknowns and tangent of the orbits beyond a border; None if there are none.
 
-    On symmetric orbits several conditions have nothing left at once: all are looked at, one after
+    On symmetric orbits several conditions have nothing left at once: all are examined, one after
     the other.
     """
     ahead, known = [(problem, last.u, 0)], {problem.phases}

@@ -18,7 +18,7 @@ from fecontact.integrate.nonsmooth.problem import STICK
 
 # Kinds of conditions.
 DURATION, RATE, WITHIN, BEGIN, CROSSING, STRIKE = range(6)
-# Parts of a phase at which conditions are looked at, closer together at its ends, and places of the
+# Parts of a phase at which conditions are examined, closer together at its ends, and places of the
 # polynomial about a minimum.
 _NEAR = np.array([1e-4, 3e-4, 1e-3, 3e-3, 1e-2])
 _PARTS = np.concatenate([[0.0], _NEAR, np.linspace(0.02, 0.98, 49), 1.0 - _NEAR[::-1], [1.0]])
@@ -29,7 +29,7 @@ _SHORT, _FLAT = 1e-2, 0.02
 # Parts of the period below which a phase has no rate at its end, by order: those of orders one and
 # two are known at durations that are too short for the slopes of the equations.
 _NO_RATE = (0.0, 1e-6, 1e-6, BRIEF[3])
-# Minima below this part of the scale are looked at closely.
+# Minima below this part of the scale are examined closely.
 _CLOSE = 0.3
 
 

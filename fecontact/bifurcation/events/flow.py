@@ -144,7 +144,7 @@ class Rows(NamedTuple):
 
 
 class FlowRoom(NamedTuple):
-    """Room for a step: ``full`` and ``rate`` for a state with its work; stages and derivatives."""
+    """Workspace of a step: ``full`` and ``rate`` for a state with work; stages and derivatives."""
 
     workspace: Workspace
     full: Vector

@@ -18,7 +18,7 @@ from fecontact.integrate.nonsmooth.problem import (
 )
 from fecontact.integrate.nonsmooth.rigid_stops import NO_ACCELERATION, NO_IMPULSES
 
-# Samples of a period in which events are looked for, and most events of one.
+# Samples of a period in which events are sought, and most events of one.
 _SAMPLES, _MOST = 1000, 60
 # Part of a period below which phases are chatter.
 _SHORTEST = 1e-5

@@ -11,7 +11,7 @@ from fecontact.integrate.field_runs.saltation import jumping_nodes, touch_down_o
 from fecontact.system.elastic_sliders import slider_counts
 from fecontact.system.fields.vector_field import VectorField
 
-# Samples of an orbit among which a touch-down is looked for.
+# Samples of an orbit among which a touch-down is sought.
 _SAMPLES = 400
 
 

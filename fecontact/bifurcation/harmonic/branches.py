@@ -210,7 +210,7 @@ def _refined(
             break
         finer, error = _with_more_harmonics(method, branch), 0.0
         if finer is None and (explicit or (problem.kinked and not problem.autonomous)):
-            # By default a part of the points is looked at.
+            # By default a part of the points is examined.
             error = _largest_error(problem, branch.points if explicit else _some(branch.points))
             if sampling is not None:
                 branch = replace(branch, attributes={**branch.attributes, "sampling_error": error})

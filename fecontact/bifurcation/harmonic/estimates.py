@@ -5,7 +5,7 @@ import numpy as np
 from fecontact.bifurcation.harmonic.series import basis_at, uniform_basis
 from fecontact.core.types import Array
 
-# Points per harmonic, and at least, among which extremes are looked for.
+# Points per harmonic, and at least, among which extremes are sought.
 _FINE, _LEAST_FINE = 12, 96
 
 

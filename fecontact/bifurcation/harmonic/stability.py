@@ -149,7 +149,7 @@ def _of_transitions(problem: Balance, T: float, M: Array, J: Array) -> Floquet:
 def _room(
     intervals: int, points: int, states: int
 ) -> tuple[condensation.CondensedFactors, Array, Array, Array]:
-    """Room for factors, and what they are made with: no rates, no parameters, and widths."""
+    """Workspace for factors, and what they are made with: no rates, no parameters, and widths."""
     return (condensation.factors_for(intervals, points, states, 1),
             np.zeros((intervals * points, states)), np.zeros((intervals * points, states, 1)),
             np.full(intervals, 1.0 / intervals))

@@ -265,7 +265,7 @@ def crossing(problem: HarmonicProblem, u: Array, incoming: Array) -> Start:
     row = problem.weights() * incoming
     equations = problem.linearise(u).condensed
     sizes = np.abs(equations).max(axis=1)
-    # One of the equations may be zero but for rounding.
+    # One of the equations may be zero within rounding.
     sizes = np.maximum(sizes, _ZERO_ROW * sizes.max())
     _, _, vectors = np.linalg.svd(equations / sizes[:, None])
     first, second = vectors[-2:]

@@ -12,7 +12,7 @@ _BESIDE = (0.97, 1.043)
 # Relative difference of numbers that count as the same.
 _SAME = 1e-13
 # Values at which the period is asked for are apart by this part at least: of values that are the
-# same but for rounding both the periods and the products are.
+# same within rounding both the periods and the products are.
 _APART = 0.01
 
 

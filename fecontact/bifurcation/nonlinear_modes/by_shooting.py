@@ -38,7 +38,7 @@ class ShootingMode(ShootingProblem):
     row : (d,) array
         Row of the observed displacement.
     conservative : bool
-        Whether xi is zero but for rounding where the mode begins.
+        Whether xi is zero within rounding where the mode begins.
     """
 
     row: Array = field(default_factory=lambda: np.zeros(0))

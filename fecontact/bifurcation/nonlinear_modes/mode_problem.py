@@ -68,7 +68,7 @@ class ModeProblem(HarmonicProblem):
     row : (d,) array
         Row of the observed displacement.
     conservative : bool
-        Whether xi is zero but for rounding where the mode begins, and no friction has memory.
+        Whether xi is zero within rounding where the mode begins, and no friction has memory.
     loose : (r, m) array
         Orthonormal directions of displacements without any stiffness: rigid motions.
     home : (m,) array
@@ -192,7 +192,7 @@ def with_frequency(scales: Array, period: float) -> Array:
 
 
 def none_grows(multipliers: ComplexArray, pairs: int) -> bool:
-    """Whether no multiplier (d,) lies outside the unit circle, but for double ones at one.
+    """Whether no multiplier (d,) lies outside the unit circle, except double ones at one.
 
     They belong to phase and amplitude, and to rigid motions; rounding parts them.
     """

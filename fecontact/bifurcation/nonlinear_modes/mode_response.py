@@ -166,7 +166,7 @@ class _Along:
     Rows of ``known`` (9, N): frequency, damping ratio, logarithm of the amplitude a; X_1^H X_1 and
     the sums of the equation with C and with xi (see :func:`mode_response`), all over a^2; X_1^H P
     over a by magnitude and phase; phase of the observed displacement. Of a linear mode they are
-    constant but for a.
+    constant except for a.
     """
 
     chord: Array

@@ -121,7 +121,7 @@ class NonlinearMode(Summarised):
 
     @property
     def conservative(self) -> bool:
-        """Whether nothing is lost: xi is zero but for rounding throughout."""
+        """Whether no energy is lost: xi is zero within rounding throughout."""
         return bool((np.abs(self.xi) <= _CONSERVATIVE * self.angular_frequency).all())
 
     @property

@@ -78,7 +78,7 @@ class ResonanceCurve(Summarised):
 
     @property
     def parameter(self) -> Array:
-        """Its values (N,)."""
+        """Values (N,) of the parameter."""
         return self.branch.parameter
 
     @property

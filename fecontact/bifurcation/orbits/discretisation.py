@@ -319,7 +319,7 @@ class CollocationLinearisation:
         return Border(self.factors, self.problem.phase_border)
 
     def forget_borders(self) -> None:
-        """Reduce borders anew, after other factors were given."""
+        """Reduce borders again, after other factors were given."""
         self._last = None
         self.__dict__.pop("_phase", None)
 

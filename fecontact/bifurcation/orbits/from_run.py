@@ -163,5 +163,5 @@ def _at_rest(run: Trajectory | FieldRun) -> bool:
 
 
 def _displacements(run: Trajectory | FieldRun) -> int:
-    """Number of the first states that are looked at: modal displacements, or all of a field."""
+    """Number of the first states that are examined: modal displacements, or all of a field."""
     return run.states.shape[1] if isinstance(run, FieldRun) else run.system.basis.modes

@@ -18,7 +18,7 @@ import numpy as np
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
 from fecontact.core.types import Array, Integers
 
-# Samples of an interval in which the largest bend is looked for, bisections about it, those before
+# Samples of an interval in which the largest bend is sought, bisections about it, those before
 # the first judgement, and the least part of the bend that two bisections leave: of a smooth
 # Jacobian they leave a quarter or less, of a kink half or more.
 _SAMPLES, _BISECTIONS, _FIRST, _LEFT = 16, 14, 3, 0.35

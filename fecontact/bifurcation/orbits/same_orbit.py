@@ -34,7 +34,7 @@ VANISHING = "vanishing orbit"
 # Amplitude at which a branch ends, in that of the orbit before; along curves over two parameters,
 # whose equations are singular at rest, more.
 _VANISHED, VANISHED_ON_CURVES = 1e-3, 0.1
-# Slowest motion on an orbit, in the fastest, from which an equilibrium is looked for.
+# Slowest motion on an orbit, in the fastest, from which an equilibrium is sought.
 _SLOW = 0.02
 # Distance of an orbit from a saddle, in amplitudes, at which it counts as homoclinic, the part of
 # the period within ``_BESIDE`` amplitudes of it, and the change of the parameter in that of the

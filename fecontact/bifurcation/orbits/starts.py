@@ -318,7 +318,7 @@ def crossing(problem: CollocationProblem, u: Array, incoming: Array) -> Start:
     row = problem.weights() * incoming
     bordered = problem.linearise(u).bordered(row)
     d = problem.field.dimension
-    # In the scales of the states, as one of these equations may be zero but for rounding.
+    # In the scales of the states, as one of these equations may be zero within rounding.
     sizes = np.concatenate([problem.scales[:d], problem.scales[-problem.common :]])
     equations = bordered.matrix[:-1] * sizes
     equations[:d] /= sizes[:d, None]

@@ -1,4 +1,4 @@
-"""The course of a step by collocation: its error, its work, and where forces switch."""
+"""Polynomials of a step by collocation: error, work, and places where forces switch."""
 
 import numpy as np
 
@@ -98,7 +98,7 @@ def look(place, c):
 
 @routine
 def step_error(step, problem, progress, room, c):
-    """Error of a step in units of what is allowed, by how far its course is from the equations.
+    """Error of a step in units of what is allowed, by the residual of the equations within it.
 
     The acceleration that is missing at a place in the step is a velocity over the time in which it
     decays, or over the step where that is shorter.
@@ -209,7 +209,7 @@ def work_error(step, before, problem, progress, room, c):
 
 @routine
 def _first_change(after, noise, c):
-    """First part of the step beyond ``after`` at which a course changes its sign, 2 if none.
+    """First part of the step beyond ``after`` at which a polynomial changes its sign, 2 if none.
 
     Its coefficients are in ``c.line[0]``, by powers of x. One below ``noise`` has no sign.
     """

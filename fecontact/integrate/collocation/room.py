@@ -34,7 +34,7 @@ AGAIN, WHOLE, PAST = range(3)
 
 
 class Collocation(NamedTuple):
-    """A step by collocation: what it hands on to the next one, and room to work in.
+    """A step by collocation: what it hands on to the next one, and workspace.
 
     P is the number of powers of the system and its nodes, s that of the stages.
 
@@ -66,7 +66,7 @@ class Collocation(NamedTuple):
     looked : (P,) array
         Powers within the step.
     line, halves, found : (3, s + 3), (d, s + 4), (s + 3,) arrays
-        Room to look for changes of sign.
+        Work arrays of the search for changes of sign.
     """
 
     tolerance: float
@@ -97,7 +97,7 @@ class Collocation(NamedTuple):
 
 
 def collocation_for(modes: int, nodes: int, rtol: float) -> Collocation:
-    """Room for a system of so many modes and nodes, before its first step."""
+    """Workspace for a system of so many modes and nodes, before its first step."""
     return allocate(Collocation, {MODES: modes, NODES: nodes},
                     tolerance=max(_PART * rtol, _ROUNDING), flags=np.array([1, 0, 0]))
 
@@ -105,7 +105,7 @@ def collocation_for(modes: int, nodes: int, rtol: float) -> Collocation:
 def chosen_collocation(
     system: ContactSystem, rtol: float, events: Sequence[AnyEvent], asked: bool,
 ) -> Collocation | None:
-    """Room for a run by collocation; InputError where it is asked for in vain."""
+    """Workspace for a run by collocation; InputError where it is asked for in vain."""
     if not asked and rtol > ACCURATE:
         return None
     found = obstacle(system, events)

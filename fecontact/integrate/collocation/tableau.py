@@ -27,7 +27,7 @@ ORDER = 2 * STAGES - 1
 RATE_TERMS, SPEED_TERMS, PLACE_TERMS = STAGES + 1, STAGES + 2, STAGES + 3
 # The error of a velocity over a step is proportional to this power of its length.
 ERROR_POWER = STAGES + 2
-# Places within a step at which the equations are looked at.
+# Places within a step at which the equations are examined.
 LOOKS = 2
 
 

@@ -79,7 +79,7 @@ class Progress(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Room for a step: its end, stages, factors, and what events are sought with."""
+    """Workspace for a step: its end, stages, factors, and what events are sought with."""
 
     after: Vector
     rate_after: Vector
@@ -107,7 +107,7 @@ class Output(NamedTuple):
 
 
 class _View(NamedTuple):
-    """A step that is looked into, with its interpolant; y (d,) is the state that is looked at."""
+    """A step that is looked into, with its interpolant; y (d,) is the state that is examined."""
 
     step: Step
     before: Array

@@ -26,7 +26,7 @@ from fecontact.system import kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import slider_counts
 
-# Parts of the penetration scale: how far from a level forces are looked at, within what an event is
+# Parts of the penetration scale: how far from a level forces are examined, within what an event is
 # at a level, and by what nodes are moved for derivatives of their penetration.
 _ASIDE, _AT_LEVEL, _MOVE = 1e-6, 1e-4, 1e-2
 # So much closer to a level a force that does not jump has changed much less across it.

@@ -120,7 +120,7 @@ class LaneProgress(NamedTuple):
 
 
 class LaneRoom(NamedTuple):
-    """Room for one step of all lanes.
+    """Workspace for one step of all lanes.
 
     Attributes
     ----------

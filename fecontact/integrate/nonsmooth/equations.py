@@ -118,7 +118,7 @@ def stick_limit(j, pressing, p):
 
 @helper
 def observe_forces(moved, Y, p, nodes):
-    """Fill ``nodes`` but for limits of stick; rigid stops have no force yet."""
+    """Fill ``nodes`` except for limits of stick; rigid stops have no force yet."""
     s = p.system
     for j in range(len(nodes)):
         contact = node_contact(j, node_motion(j, Y, s), moved, s)

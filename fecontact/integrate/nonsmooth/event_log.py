@@ -1,7 +1,7 @@
 """Noting events of runs that go from event to event: contact nodes, and users' functions.
 
 Clusters and stops change at moments at which a step ends anyway. Normal laws that come and go
-while a cluster slips, and functions of users, are looked at some times a step, and what has
+while a cluster slips, and functions of users, are examined some times a step, and what has
 changed is narrowed down by bisection; what `Crossing` watches is a polynomial within the step,
 whose changes of sign are found however close.
 """

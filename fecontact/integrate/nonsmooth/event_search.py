@@ -5,7 +5,7 @@ bound them: what stays clear of its margin needs no further look, and a crossing
 halving, however short. Waves under a node and the speed of the ground go in as polynomials of the
 same degree, through places so close that nothing is lost between them.
 
-Flights that have just begun, and forces of what holds, are looked at in
+Flights that have just begun, and forces of what holds, are examined in
 :mod:`fecontact.integrate.nonsmooth.steps.flights` and
 :mod:`fecontact.integrate.nonsmooth.steps.releases`.
 """
@@ -64,7 +64,7 @@ ROUGHLY = 2.0**-12
 
 
 class Room(NamedTuple):
-    """Room to work in for steps from event to event, and for the search in them.
+    """Workspace of steps from event to event, and of the search in them.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ class Room(NamedTuple):
 
 
 def room_for(problem: NonsmoothProblem) -> Room:
-    """Room for a problem."""
+    """Workspace for a problem."""
     return allocate(Room, sizes_of(problem), given=nothing_given())
 
 

@@ -87,7 +87,7 @@ from fecontact.system.powers import (
 _STILL = 1e-9
 # Energy gained by impacts that is rounding.
 _GAIN = 1e-10
-# How often the impulses of a step are found anew with coefficients of its middle.
+# How often the impulses of a step are computed again with coefficients of its middle.
 _PASSES = 4
 
 

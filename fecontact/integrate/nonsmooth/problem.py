@@ -39,7 +39,7 @@ CLOSED, HELD = 1, 2
 
 # Entries of Progress.numbers after those of the step loop: the error of the last step, whether the
 # next one repeats one that failed, the length of that which an event cuts short, and a time from
-# which the pace of the run is looked at.
+# which the pace of the run is examined.
 NUMBERS = 6
 LAST_ERROR, REPEATED, UNCUT, MARK = range(STEP + 1, NUMBERS)
 # Entries of Progress.counts after those of the step loop: changes of contact, impacts and those
@@ -197,7 +197,7 @@ def pass_break(step, p, progress, output):
 
 
 class Workspace(NamedTuple):
-    """Results per node and per cluster of the last evaluation, and room for small systems."""
+    """Results per node and per cluster of the last evaluation, and workspace for small systems."""
 
     nodes: Annotated[Array, NODES, NODE_ENTRIES]
     friction: Annotated[Array, NODES]
@@ -222,7 +222,7 @@ def node_columns(problem: NonsmoothProblem) -> int:
 
 
 def workspace_for(problem: NonsmoothProblem) -> Workspace:
-    """Room for a problem."""
+    """Workspace for a problem."""
     return allocate(Workspace, sizes_of(problem))
 
 

@@ -42,7 +42,7 @@ _MARGIN = 1e-12
 
 
 class ImpactRoom(NamedTuple):
-    """Room for steps of impulses, for n nodes and m modes.
+    """Workspace for steps of impulses, for n nodes and m modes.
 
     Entries of the nodes are normal ones (n,), then those along the first and the second tangents.
 
@@ -103,7 +103,7 @@ class ImpactRoom(NamedTuple):
 
 
 def impact_room_for(problem: NonsmoothProblem) -> ImpactRoom:
-    """Room for a problem."""
+    """Workspace for a problem."""
     n, _, m = problem.system.rows.shape
     flags = np.zeros((3, n), dtype=np.int64)
     given, before, after, impulses, rest = np.zeros((5, 3 * n))

@@ -72,7 +72,7 @@ class Hold(NamedTuple):
 
 
 class NewtonRoom(NamedTuple):
-    """Room for Newton's method.
+    """Workspace of Newton's method.
 
     Rows ``active`` (n, d, m) of the nodes under force, and their ``gradients`` (n, d, m), minus
     the derivatives of the forces along the axes to V;
@@ -97,7 +97,7 @@ _linearise_at = function_at(LINEARISE)
 
 
 def newton_room_for(nodes: int, modes: int, tangents: int = 1) -> NewtonRoom:
-    """Room for so many nodes and modes."""
+    """Workspace for so many nodes and modes."""
     linear, whole = np.zeros((2, modes, modes))
     balance, residual = np.zeros((2, modes))
     gradients, active = np.zeros((2, nodes, 1 + tangents, modes))

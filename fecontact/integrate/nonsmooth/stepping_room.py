@@ -1,4 +1,4 @@
-"""Room for implicit steps with set-valued friction, and what is called by its address in space."""
+"""Workspace of implicit steps with set-valued friction; addresses of functions in space."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -46,7 +46,7 @@ POWERS = Callable[[GroundMotion, NonsmoothProblem, Matrix, Vector, Vector], None
 
 
 class Room(NamedTuple):
-    """Room for implicit steps.
+    """Workspace of implicit steps.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ SLIPS_BACK = Callable[[int, Step, NonsmoothProblem, Workspace, float, Room], flo
 
 
 def room_for(problem: NonsmoothProblem, space: InSpace = IN_PLANE) -> Room:
-    """Room for a problem."""
+    """Workspace for a problem."""
     n, _, m = problem.system.rows.shape
     size, k = m + POWER_COUNT + n, tangents(problem)
     start, known = np.zeros((2, m))

@@ -149,7 +149,7 @@ def _within(
     return lambda t, y: rate(min(max(t, after), latest), y)
 
 
-# Parts of a step at which excesses of elastic Coulomb elements are looked at, and a part of it
+# Parts of a step at which excesses of elastic Coulomb elements are examined, and a part of it
 # within which slip of several elements ends at once.
 _LOOKS, _ONE_PLACE = 4, 1e-6
 

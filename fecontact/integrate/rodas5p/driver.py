@@ -165,11 +165,11 @@ def start(
 
 
 def again(run: Run, system: ContactSystem, state: Array) -> Run:
-    """The run anew from another state of its system, without powers, derivatives and events.
+    """New run of a system from another state, without powers, derivatives and events.
 
-    It shares the room to work in, and its tables, with the run before, which must have ended.
+    It shares the workspace and the tables of ``run``, which must have ended.
     """
-    # Columns, and what is watched for, would go on from where that run has left them; the scale of
+    # Columns and watched events would go on from where that run has left them; the scale of
     # energies is that of its start.
     control = run.problem.control
     assert not len(run.variation.variation.columns)

@@ -207,7 +207,7 @@ def set_forces(y, s, blocks, moved, w, scratch, rate):
 def set_rate(y, s, blocks, given, load, w, scratch, rate):
     """Fill ``rate`` (size,) with y', by forces of the nodes of ``blocks``.
 
-    ``w`` (3, d n) and ``scratch`` are room to work in.
+    ``w`` (3, d n) and ``scratch`` are work arrays.
     """
     project(blocks, y, w[0], w[1])
     set_forces(y, s, blocks, motion_given(given), w, scratch, rate)

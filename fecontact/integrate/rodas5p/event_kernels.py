@@ -1,6 +1,6 @@
 """Finding events within a step: contact nodes that change their state, and users' functions.
 
-The dense output of a step is looked at a few times, and what has changed since the time before is
+The dense output of a step is examined a few times, and what has changed since the time before is
 narrowed down by bisection. Gaps, slip velocities and what `Crossing` watches are polynomials
 whose changes of sign are known (:mod:`fecontact.integrate.courses`); between two of them they are
 looked at too, so that none escapes. Functions of users and the stick of friction with memory are
@@ -60,7 +60,7 @@ class Watch(NamedTuple):
     places, known : (n + l, PLACES), (n + l,) arrays
         Parts of the step between changes of sign, and how many there are.
     changed : (64,) array
-        Room for these changes.
+        Work array of these changes.
     note : int
         Address of :data:`note_events`.
     stops : (4 + l,) array
@@ -101,7 +101,7 @@ class _View(NamedTuple):
     """A step that is looked into: the nodes' depths, its interpolant, and room.
 
     ``before``, ``after`` (size,) and ``dense`` (3, size) are the interpolant; y (size,) is the
-    state that is looked at, ``force`` and ``rates`` are room for laws with memory.
+    state that is examined, ``force`` and ``rates`` are work arrays for laws with memory.
     """
 
     step: Any

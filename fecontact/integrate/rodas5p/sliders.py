@@ -3,7 +3,7 @@
 The deflections of the elements follow the slip velocity all the time; see
 :mod:`fecontact.system.elastic_sliders`. Slip of an element ends where its excess over the limit is
 largest. A step with such a place inside is shortened to end there. The next step finds that the
-excess falls from its start: the deflection is returned to the limit, and the step is taken anew.
+excess falls from its start: the deflection is returned to the limit, and the step is repeated.
 A step ends just past the touch of a contact that closes, or whose normal force passes through zero,
 and the next one begins with the deflections since then, ``z = v (t - t_touch)``.
 Forces are continuous at both ends of slip, and the derivatives of a deflection that is returned to
@@ -50,7 +50,7 @@ attend_at = function_at(_ATTEND)
 # touch.
 SWITCH, OUTPUT, END, BEGIN = range(4)
 
-# Parts of a step at which excesses are looked at, and a part by which their slopes are taken.
+# Parts of a step at which excesses are examined, and a part by which their slopes are taken.
 _LOOKS, _ASIDE = 8, 1e-5
 # Steps end where slip begins too if there are at most so many elements, or with derivatives.
 _FEW = 32

@@ -315,7 +315,7 @@ def set_solver(G, blocks, w, out):
 
 @helper
 def solve_stage(G, s, blocks, g, w, r, motion, out):
-    """Fill ``out`` (size,) with u for the right side r; ``motion`` (3, d n) is room to work in."""
+    """Fill ``out`` (size,) with u for the right side r; ``motion`` (3, d n) is a work array."""
     shapes = blocks.shapes
     m, n, d = len(shapes), len(g.partial), g.partial.shape[2] // 2
     states = w.inverse.shape[1]

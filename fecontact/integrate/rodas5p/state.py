@@ -174,7 +174,7 @@ class Output(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Room to work in.
+    """Workspace of a run.
 
     ``near`` are the blocks of the nodes that may touch, ``clearance`` (n + 1,) how far all nodes
     are from that. Vectors of the size of the state: the ``stages``, coefficients of the ``dense``
@@ -234,7 +234,7 @@ def gradients_for(
 def room_for(
     modes: int, nodes: int, states: int, dimension: int, blocks: Blocks,
 ) -> Room:
-    """Room for a system of so many modes, contact nodes and internal variables per node."""
+    """Workspace for a system of so many modes, contact nodes and internal variables per node."""
     return allocate(
         Room, {MODES: modes, NODES: nodes, MEMORY: states, AXES: dimension},
         near=near_blocks(blocks),

@@ -35,7 +35,7 @@ first_unfelt_at = function_at(_UNFELT)
 _PART = 0.1
 # Steps end after this part of a stretch.
 _JUST_PAST = 0.01
-# Places at which the largest value of a stretch is looked for.
+# Places at which the largest value of a stretch is sought.
 _LOOKS = 8
 
 
@@ -87,7 +87,7 @@ def _unfelt_rub(j, inside, F, slip, ends, s):
 
 @helper
 def _largest(begin, end, b, course):
-    """Largest value of a course between two parts of the step, its place, and that at the ends.
+    """Largest value of a polynomial between two parts of the step, its place, and that at ends.
 
     Only ends of the step itself count; zero where neither lies between the parts.
     """

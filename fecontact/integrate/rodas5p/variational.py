@@ -51,7 +51,7 @@ COLUMNS, DIRECTIONS = Size("columns"), Size("directions")
 
 
 class Variation(NamedTuple):
-    """Columns of derivatives, and room for a step of them.
+    """Columns of derivatives, and workspace of a step of them.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Variation(NamedTuple):
     given, load : (2, GIVEN), (2, m) arrays
         Motions and loads that are prescribed at a stage in the systems above and below.
     forces : (d n,) array
-        Room for node forces.
+        Work array of node forces.
     paths : (STAGES, D, n) array
         Displacements of the nodes by the stages along each of their directions.
     inside, ahead, behind, usual, between, bends : Gradients
@@ -138,7 +138,7 @@ def variation_for(
     columns: int, modes: int, nodes: int, states: int, dimension: int, width: float,
     tolerance: float, faded: float,
 ) -> Variation:
-    """Room for so many columns; the first ``size`` of them are the unit matrix.
+    """Workspace for so many columns; the first ``size`` of them are the unit matrix.
 
     ``width`` is that of the parameter whose column comes last: 2e-5 of its value; zero without.
     """

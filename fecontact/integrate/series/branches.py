@@ -63,7 +63,7 @@ class Series(NamedTuple):
     powers : (5, n + 1) array
         Coefficients of the powers, then of their integrals.
     line, room : (3, l), (d, n + 1) arrays
-        Room to work in; l is n + 1, or the number of nodes where that is more.
+        Work arrays; l is n + 1, or the number of nodes where that is more.
     """
 
     pieces: Annotated[Array, NODES, ANY, PIECE]

@@ -190,7 +190,7 @@ def _first_switch(limit, h, series):
                         line[k] += sign * r2 * (k + 1) / h * u[k + 1]
                 line[0] += sign * r0
             if what == met:
-                # Zero but for rounding: it has just been passed.
+                # Zero within rounding: it has just been passed.
                 line[0] = 0.0
             part = first_zero(line, min(first, limit), series.room)
             if part <= limit and part < first:

@@ -80,7 +80,7 @@ class Place(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Room for the work on one place; ``best`` and ``error`` (d,) are results of differences."""
+    """Workspace for one place; ``best`` and ``error`` (d,) are results of differences."""
 
     y: Vector
     q: Vector
@@ -240,7 +240,7 @@ def _correct(function, place, moved, at, size, room):
     wrong = False
     for i in range(len(f)):
         off = abs(column[i] - best[i])
-        # A derivative that is zero but for rounding is another one in complex arithmetic.
+        # A derivative that is zero within rounding is another one in complex arithmetic.
         rough = 4.0 * error[i] + 16.0 * orders[0, i] / orders[3, i] + 1e-12 * largest
         if error[i] < np.inf and not off <= rough + _RIGHT * abs(best[i]):
             column[i] = best[i]
@@ -430,11 +430,11 @@ def unchecked_complex_steps(
 
 
 def room_for(states: int, parameters: int) -> Room:
-    """Room for a function of so many states and parameters."""
+    """Workspace for a function of so many states and parameters."""
     y, above, below, best, error, column = np.empty((6, states))
     return Room(y, np.empty(parameters), above, below, np.empty((6, states)), best, error, column)
 
 
 def complex_room_for(states: int, parameters: int) -> NDArray[np.complex128]:
-    """Room (3, max(d, k)) for the complex step of such a function."""
+    """Workspace (3, max(d, k)) for the complex step of such a function."""
     return np.empty((3, max(states, parameters)), dtype=complex)

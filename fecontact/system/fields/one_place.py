@@ -39,7 +39,7 @@ class FieldKernel(NamedTuple):
     p, scales : (k,), (d,) arrays
         Parameters, and typical sizes of the states.
     room, complex_room : Room, (3, max(d, k)) array
-        Room for derivatives.
+        Workspace for derivatives.
     wrong : (d,) array
         Columns of Jacobians that the complex step got wrong, counted.
     """

@@ -67,7 +67,7 @@ class Kept(NamedTuple):
 
 
 def kept_for(rows: int, m: int, n: int, sliders: int, tangents: int) -> Kept:
-    """Room for the results."""
+    """Arrays for the results."""
     force, left = np.zeros((2, rows, n, sliders * tangents))
     return Kept(np.zeros((rows, m)), np.zeros((rows, n, node_columns(tangents))), force, left,
                 np.zeros((rows, len(WORKS) + n)), np.zeros(COUNTS, dtype=np.int64))

@@ -38,7 +38,7 @@ class Pose(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Room for Newton's method; ``scale`` (m,) are typical stiffnesses of the modes.
+    """Workspace of Newton's method; ``scale`` (m,) are typical stiffnesses of the modes.
 
     ``acting`` (m,) sums the magnitudes of the forces on each mode; ``answers`` (n, d, m) are minus
     the forces on the nodes along their axes by the modes, ``partial`` (4, 3) the derivatives of T,
@@ -70,7 +70,7 @@ def pose_for(m: int, n: int, sliders: int, tangents: int) -> Pose:
 
 
 def room_for(m: int, n: int, sliders: int, tangents: int, scale: Array) -> Room:
-    """Room for a body of m modes and n contact nodes."""
+    """Workspace for a body of m modes and n contact nodes."""
     start, acting, residual, step, before = np.zeros((5, m))
     return Room(np.ascontiguousarray(scale, dtype=float), start, acting, residual, step, before,
                 np.zeros((n, sliders * tangents)), np.zeros((n, 1 + tangents, m)), np.zeros((m, m)),

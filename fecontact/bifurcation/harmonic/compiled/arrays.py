@@ -1,4 +1,4 @@
-"""Arrays of compiled harmonic balance: equations, room for the work, what steps reach."""
+"""Arrays of compiled harmonic balance: equations, workspace, results of steps."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from fecontact.system.nodes import SystemArrays
 
 
 class Room(NamedTuple):
-    """Room for the work at one orbit; n unknown coefficients of m modes, N samples, d states.
+    """Workspace of one orbit; n unknown coefficients of m modes, N samples, d states.
 
     Modes in ``order`` (m,), of which the first ``coupled`` (1,) are solved for together, k
     coefficients, the others each for itself with the mean stiffness and damping ``alone`` (2, m);
@@ -138,7 +138,7 @@ def room_for(
     harmonics: int, samples: int, modes: int, memory: int, nodes: int, coupled: int,
     exact: bool, axes: int,
 ) -> Room:
-    """Room for a system of so many modes and internal variables, on so many nodes.
+    """Workspace for a system of so many modes and internal variables, on so many nodes.
 
     At most ``coupled`` modes are solved for together. Internal variables that are ``exact`` are
     those of elements that are followed one by one; nodes move along so many ``axes``.

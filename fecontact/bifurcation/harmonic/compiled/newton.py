@@ -34,7 +34,7 @@ _TANGENT, _INEXACT = 1e-7, 1e-3
 # Relative size of the last Newton step at special points and bounds, and most such steps.
 _EXACT, _EXACT_STEPS = 1e-10, 12
 # Part of a step to which folds are located, the one that rounding may leave, factor by which the
-# test falls at the end, and most solutions that are looked at.
+# test falls at the end, and most solutions that are examined.
 _LOCATED, _ROUNDED, _FALLS, _TRIES = 1e-12, 1e-10, 0.1, 30
 # Steps to an orbit, and the shortest part of one.
 _CORRECTIONS, _LEAST = 40, 1e-4

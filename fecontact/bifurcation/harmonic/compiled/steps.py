@@ -130,7 +130,7 @@ def steps(
     u: Vector, tangent: Vector, bend: Vector, scales: Vector, e: Equations, out: Reached,
     why: Vector,
 ) -> int:
-    """Make steps from u along a tangent until ``out`` is full or something is to be looked at.
+    """Make steps from u along a tangent until ``out`` is full or something is to be examined.
 
     u, tangent and bend (n + 1,), the derivative of the tangent, and scales (m + 1,) are
     overwritten; ``out.step`` holds the length of the first step, and then of the next one. why (1,)

@@ -1,6 +1,6 @@
 """Plain steps of a branch of forced orbits, made by compiled code, with all that points store.
 
-What a call of :func:`~fecontact.bifurcation.harmonic.compiled.steps.steps` returns is looked at as
+What a call of :func:`~fecontact.bifurcation.harmonic.compiled.steps.steps` returns is examined as
 a whole; it ends before the first step that needs more: a special point but a fold, a start met
 again. Folds and the bound at the end are among its points.
 """

@@ -182,7 +182,7 @@ class OrbitCurve(Problem):
                         "double Neimark-Sacker": pair}
 
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """Turns of the first parameter where it does not change but for rounding."""
+        """Turns of the first parameter where it does not change beyond rounding."""
         return resting(tangents, self.orbit.scales[-1])
 
     def examine(

@@ -26,7 +26,7 @@ WHEN, TRAVEL, SPEED, MOTION = range(4)
 
 
 def nothing_given() -> np.ndarray:
-    """Room for what is given, before the first time."""
+    """Arrays of prescribed motions and loads, before the first time."""
     return np.full(GIVEN, np.nan)
 
 
@@ -58,7 +58,7 @@ def _moved(given):
 
 @routine
 def set_rates(t, Y, p, progress, w, room, out):
-    """Fill out (2 m,) with q' and q'' at Y, and w with what acts, but for limits of stick."""
+    """Fill out (2 m,) with q' and q'' at Y, and w with what acts, except for limits of stick."""
     s = p.system
     m = s.rows.shape[2]
     set_prescribed(t, s, room)

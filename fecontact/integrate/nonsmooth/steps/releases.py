@@ -16,7 +16,7 @@ from fecontact.integrate.nonsmooth.steps.rates import set_rates
 
 # Rounding of forces that come from a system of equations, relative to their size.
 _FORCE_ROUNDING = 1e-13
-# Forces are looked at in quarters of a part of the step.
+# Forces are examined in quarters of a part of the step.
 QUARTERS = 4
 _FIT_QUARTERS = fit(np.arange(QUARTERS + 1) / QUARTERS)
 # Size of the part of degree four over its fourth difference, 1 / (128 * 4! / 4^4).
