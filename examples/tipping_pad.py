@@ -4,7 +4,7 @@ Where a pad presses on a belt, and when it tips
 
 Friction below a pad and the springs that hold its top make a moment: the pressure moves to the
 leading edge by friction coefficient times height, until the trailing edge lifts off. On a belt that
-runs askew one corner carries most.
+runs obliquely one corner carries most.
 """
 
 import numpy as np

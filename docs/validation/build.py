@@ -26,7 +26,7 @@ from fecontact.core.files.atomic_write import write_text
 DOCS = Path(__file__).resolve().parents[1]
 HEAD = """# Validation
 
-What the package computes, beside closed forms, published numbers and the figures of W. Sextro,
+Results of the package, beside closed forms, published numbers and the figures of W. Sextro,
 *Dynamical Contact Problems with Friction*, chapter 4. `make validation` computes everything here
 again, in about ten minutes on two cores, and writes this page. Scripts named here are in
 `docs/validation/cases`; each runs by itself and draws its pictures.

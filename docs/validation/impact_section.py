@@ -157,7 +157,7 @@ TEXT = """## Section 4.2: impact oscillator
 A pendulum hinged at one end strikes a stop, moved through a spring: `impact_oscillator.py`
 and its study file, pictures by `impact_figures.py` and `impact_map.py`.
 
-What the source does not give, and what is taken here:
+Data that the source does not give, and the values taken here:
 
 - The bending mode. The source estimates it by beam theory and prints no value. Taken: 230.0 Hz, at
   the contact 0.600 times the amplitude of the rotation (both mass-normalised), D = 0.03. This is a

@@ -52,7 +52,7 @@ on a coarse one, where all are within 3 % of the published ones.
 
 The published values are those of Mindlin's plate whose edges do not move along themselves (modes 4
 to 7 to 6e-5). Lines along the bottom hold z alone: the twist of the plate near its edges is free,
-which costs mode 7, two half waves each way, most. What each support costs, Q2, 8 x 8 x 2; with
+which costs mode 7, two half waves each way, most. Frequencies of each support, Q2, 8 x 8 x 2; with
 sides that neither move up nor along themselves the solid has standing waves of Rayleigh and Lamb,
 to which its frequencies converge like h^3.9:
 
@@ -68,7 +68,7 @@ centre of pressure runs ahead by mu h / 2.
 
 {comparisons(_throw(block))}
 
-What smoothing adds to the way over the belt is the integral of v (1 / s(v) - 1) / (mu g) over the
+The way that smoothing adds over the belt is the integral of v (1 / s(v) - 1) / (mu g) over the
 speeds v, with the smoothed sign s: of first order in 1 / k_s with the arctan, of second with the
 others.
 
