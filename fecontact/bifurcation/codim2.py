@@ -91,9 +91,9 @@ def codim2_curve(
     both : bool
         Go to both sides; the points then run from one end of the curve to the other.
     keep : 'kind' or 'period'
-        What the points have in common; 'period' takes any orbit of a system without excitation.
+        Common property of the points; 'period' takes any orbit of a system without excitation.
     to : str, optional
-        Which curve, where several begin, such as 'homoclinic', also from orbits of long period.
+        Kind of curve, where several begin, such as 'homoclinic', also from orbits of long period.
 
     Returns
     -------

@@ -44,7 +44,7 @@ def with_normal_form(
     Returns
     -------
     PeriodDoublingPoint or NeimarkSackerPoint
-        The same point with ``coefficient``, ``coefficient_error`` and ``criticality``; unchanged if
+        Point with ``coefficient``, ``coefficient_error`` and ``criticality``; unchanged if
         it has them.
 
     Raises

@@ -209,7 +209,10 @@ def _displaced(part, column, course, row):
 
 @helper
 def at(part, b, course):
-    """Value of a polynomial at a part of the step; b (5,) are coefficients of the node's part."""
+    """Value of a polynomial at a part of the step.
+
+    b (5,) are the coefficients of the node's own motion.
+    """
     return bernstein.value(b, part, course.row) + course.shift - ground_part(part, course)
 
 

@@ -112,7 +112,7 @@ class PointStart:
 def _point_motion(given: Any, where: str) -> PointMotion:
     """A motion of a point; a table of components where some of a list are None.
 
-    Which component the third of three is depends on the body: such lists stay as they are.
+    The meaning of the third of three components depends on the body: such lists stay as they are.
     """
     if isinstance(given, Mapping):
         if unknown := [name for name in given if name not in _NAMES]:

@@ -243,7 +243,7 @@ def _row_size(system: ContactSystem | VectorField) -> float:
 def _warn_of_depth(system: ContactSystem, state: Array, time: float) -> None:
     """Warn of an initial penetration so deep that a wrong unit is likely.
 
-    What loads and bolts press together may be far beyond the scale of its law.
+    Faces that loads and bolts press together may be far beyond the scale of its law.
     """
     depth, scale = _depth(system, state, time), system.penetration_scale
     if depth > _DEEP * scale and depth > 10.0 * _depth_at_rest(system, time):

@@ -1,4 +1,4 @@
-"""Contact nodes against the other side: what moves there, where they are, what presses them.
+"""Contact nodes against the other side: motions there, kinematics, and forces.
 
 Arrays of a contact system as its compiled functions see them; the equations are those of
 :mod:`fecontact.system.kernels`.

@@ -1,7 +1,7 @@
 """Points of branches.
 
 A point knows the parameter and the attributes of its branch, so that other branches can start from
-it alone. What a method finds at a special point is kept by name in private; each class of
+it alone. Results at a special point are kept by name in private; each class of
 :mod:`fecontact.bifurcation.continuation.points` reads its own names as attributes, and files store
 them all.
 """

@@ -28,7 +28,7 @@ _SOON = 1e-4
 
 
 def border_of(problem: EventOrbit, u: Array, condition: Condition) -> str:
-    """The kind of border at which a condition has nothing left."""
+    """Kind of the border at which the margin of a condition is zero."""
     phases, i = problem.phases, condition.phase
     phase, before, behind = phases[i], phases[i - 1], phases[(i + 1) % len(phases)]
     k = len(phase.status)
@@ -225,7 +225,7 @@ def _with(phase: Phase, cluster: int, status: int, event: int) -> Phase:
 
 
 def beyond(problem: EventOrbit, u: Array, condition: Condition) -> Iterator[Successor]:
-    """Orbits that may go on where a condition has nothing left."""
+    """Orbits that may go on where the margin of a condition is zero."""
     i, event = condition.phase, condition.event
     phase, before = problem.phases[i], problem.phases[i - 1]
     k = len(phase.status)

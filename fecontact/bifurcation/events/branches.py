@@ -223,7 +223,7 @@ def _following(
 ) -> tuple[EventOrbit, Array, Array] | None:
     """Problem, unknowns and tangent of the orbits beyond a border; None if there are none.
 
-    On symmetric orbits several conditions have nothing left at once: all are examined, one after
+    On symmetric orbits several margins are zero at once: all are examined, one after
     the other.
     """
     ahead, known = [(problem, last.u, 0)], {problem.phases}
@@ -253,7 +253,7 @@ def _following(
 
 
 def nothing_left(problem: EventOrbit, u: Array) -> list[Condition]:
-    """The conditions that have nothing left at a border, those of impacts and durations first."""
+    """Conditions whose margins are zero at a border, those of impacts and durations first."""
     found = problem.linearise(u).conditions
     least = min(abs(condition.left) for condition in found)
     return sorted((condition for condition in found

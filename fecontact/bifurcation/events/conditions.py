@@ -70,7 +70,7 @@ class Course:
 
 
 def conditions(course: Course, rates: list[float]) -> Iterator[Condition]:
-    """All conditions of the phases; ``rates`` are those of what vanishes at their ends."""
+    """All conditions of the phases; ``rates`` are those of the event functions at their ends."""
     for i, rate in enumerate(rates):
         yield from of_phase(course, i, rate)
 
@@ -78,7 +78,7 @@ def conditions(course: Course, rates: list[float]) -> Iterator[Condition]:
 def of_phase(
     course: Course, i: int, rate: float, what: int | None = None, event: int | None = None
 ) -> Iterator[Condition]:
-    """The conditions of one phase; ``rate`` is that of what vanishes at its end.
+    """Conditions of one phase; ``rate`` is that of the event function at its end.
 
     With ``what`` and ``event`` those that can be of this kind; what others need is not computed.
     """
@@ -195,6 +195,6 @@ def crossing_event(cluster: int, phase: Phase) -> int:
 
 
 def friction_scale(course: Course, i: int, cluster: int, held: Phase) -> float:
-    """Limit of stick at the begin of a phase: half the sum of what is left to both sides."""
+    """Limit of stick at the begin of a phase: half the sum of the margins to both sides."""
     margins = course.motion.observed(course.begins[i : i + 1], course.starts[i][None], held)[0][0]
     return float(0.5 * (margins[2 * cluster] + margins[2 * cluster + 1])) or 1.0

@@ -36,10 +36,10 @@ _SAME = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class BorderCurve(Problem):
-    """Orbits at which one condition of their phases has nothing left, with two free parameters.
+    """Orbits at which the margin of one condition is zero, with two free parameters.
 
     The unknowns are those of the orbit, with the second parameter before the first one. The curve
-    ends where another condition has nothing left.
+    ends where the margin of another condition is zero.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class BorderCurve(Problem):
     what, phase, event : int
         The condition; see :class:`fecontact.bifurcation.events.conditions.Condition`.
     beside : frozenset
-        Other conditions, (what, phase, event), that have nothing left either at the border.
+        Other conditions, (what, phase, event), whose margins are zero at the border too.
     """
 
     orbit: EventOrbit

@@ -356,10 +356,10 @@ def observe(
     status: IntegerVector, closed: IntegerVector, full: Vector, rate: Vector, margins: Matrix,
     rates: Matrix,
 ) -> None:
-    """Fill what clusters and stops have left, (N, 2 k + n), and the rates (N, d), at states (N, d).
+    """Fill the margins of clusters and stops, (N, 2 k + n), and the rates (N, d), at states (N, d).
 
     Of a cluster c that slips the speed in its sense at 2 c and, on compliant contact, its normal
-    force at 2 c + 1; of one that sticks what its force has left to either side; of a closed stop j
+    force at 2 c + 1; of one that sticks the margins of its force to either side; of a closed stop j
     and of a node on compliant contact its force at 2 k + j, of an open stop its height. The rest is
     infinite. The force of an open node is what its law would pull.
     """

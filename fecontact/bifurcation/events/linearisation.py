@@ -34,11 +34,11 @@ def _weights(places: Array, at: float) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class End:
-    """The end of a phase: the state before and behind the impact, and what vanishes there.
+    """The end of a phase: the state before and behind the impact, and the event function there.
 
     ``moved`` (d, d + 2) and ``jumped`` (d, d + 2) are the slopes of the flow by start, begin and
     parameter, and of the impact by state, time and parameter; ``margin`` and ``margin_slopes``
-    (d + 2,) are those of what vanishes.
+    (d + 2,) are those of the event function.
     """
 
     state: Array
@@ -240,7 +240,7 @@ class EventLinearisation:
 
             S = R_x + (f^+ - R_x f^- - R_t) \frac{h_x^T}{h_x^T f^- + h_t}
 
-        R is the impact or the identity, h what vanishes, f the rates before and behind.
+        R is the impact or the identity, h the event function, f the rates before and behind.
         """
         problem, found = self.problem, []
         d, K = problem.dimension, problem.count

@@ -39,13 +39,13 @@ class EventOrbit(FloquetTests, Problem):
         R_i(\varphi_i(x_i, \tau_i)) - x_{i+1} = 0, \qquad
         h_i(\varphi_i(x_i, \tau_i)) / \tau_i^{o_i} = 0
 
-    with the flow of the phase, the impact R_i at its end, and what vanishes there, h_i. With an
-    excitation the time of the first event is unknown too, and the durations add up to the period;
-    an orbit without any event begins at t = 0.
+    with the flow of the phase, the impact R_i at its end, and the event function h_i there. With
+    an excitation the time of the first event is unknown too, and the durations add up to the
+    period; an orbit without any event begins at t = 0.
 
     The unknowns are ``u = [x_0 .. x_(K-1), tau_0 .. tau_(K-1), t_0 if excited, parameter]``. The
-    test function 'admissible' is the least of what the conditions of the phases have left; it ends
-    the branch.
+    test function 'admissible' is the smallest margin of the conditions of the phases. Its
+    zero ends the branch.
 
     Attributes
     ----------

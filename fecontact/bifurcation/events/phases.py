@@ -71,12 +71,12 @@ class Phase:
     closed : (n,) tuple
         Whether stops are closed.
     event : int
-        Place of what vanishes at the end among those of
+        Place of the event function that vanishes at the end among those of
         :func:`fecontact.bifurcation.events.flow.observe`, or PERIOD.
     strike : Strike, optional
         The impact at the end.
     order : int
-        How often what vanishes at the end vanishes at the begin too: the equation of the end is
+        Order of the zero that this event function has at the begin too: the equation of the end is
         divided by that power of the duration.
     """
 
@@ -326,11 +326,11 @@ class Motion:
         self, t: float, state: Array, phase: Phase, strike: Strike,
         problem: NonsmoothProblem | None = None,
     ) -> tuple[Array, list[tuple[int, float]]]:
-        """The state after an impact of a given kind, and what its conditions have left.
+        """The state after an impact of a given kind, and the margins of its conditions.
 
-        The events of clusters whose slip it stops tell how far their impulse is from either edge of
-        the cone, those of others by what they slip in their sense, those of stops by what presses
-        or parts them; in parts of the largest impulse or speed.
+        Margins are relative to the largest impulse or speed. For a cluster whose slip the impact
+        stops they are the distances of its impulse from both edges of the cone, for others the slip
+        velocity in their sense, for stops the impulse that presses or the speed that parts them.
         """
         k, n, m = self.clusters, self.nodes, self.modes
         chosen = self.problem if problem is None else problem
@@ -357,7 +357,7 @@ class Motion:
         moved = held @ (after[m:] - state[m:])
         most = np.abs(found).max() or 1.0
         fastest = np.abs(np.concatenate([speeds, moved])).max() or 1.0
-        # Stops and clusters that nothing reaches meet their conditions with nothing left.
+        # Stops and clusters that nothing reaches meet their conditions with a margin of zero.
         sizes = np.linalg.norm(held, axis=1), np.linalg.norm(pushing, axis=1)
         near = np.abs(held @ pushing.T) > _ROUNDING * np.outer(*sizes)
         np.fill_diagonal(near, False)

@@ -164,7 +164,7 @@ def _require_known(motion: Motion, phase: Phase) -> None:
 
 
 def _first_state(motion: Motion, progress: Progress, room: Room, t: float) -> None:
-    """Decide what sticks and which stops are closed at the start."""
+    """Decide which clusters stick and which stops are closed at the start."""
     phase = Phase(tuple(progress.status.tolist()), tuple(progress.closed.tolist()), PERIOD)
     d = 2 * motion.modes
     heights = motion.observed(np.array([t]), progress.state[None, :d], phase)[0][0]
@@ -216,7 +216,7 @@ def released_sense(event: int) -> int:
 def _first_event(
     motion: Motion, phase: Phase, t: float, state: Array, left: float, period: float
 ) -> tuple[float, int, Array] | None:
-    """Time to the first event within what is left, what vanishes there, and the state."""
+    """Time to the first event within the time that is left, its event function, and the state."""
     from scipy.optimize import brentq
 
     if left <= 0.0:

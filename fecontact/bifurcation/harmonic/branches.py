@@ -303,7 +303,7 @@ def sampling_error(
     """Estimate of the error of an orbit u relative to its size; infinite where there is none.
 
     A step of Newton's method leads to the orbits of twice the samples, at right angles to the
-    tangent, so that at folds it is as long as elsewhere. What is left of the residual with as many
+    tangent, so that at folds it is as long as elsewhere. The remaining residual with as many
     samples as the problem has is no error of theirs, and taken off. Kinks of laws make errors of
     order 1 / N^2, of which a fourth is left there: the error is four thirds of that step. Forces
     whose second half of a period mirrors the first are the same at an odd number of samples and at

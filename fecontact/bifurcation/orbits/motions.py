@@ -263,7 +263,7 @@ def of_runs(runs: list[Trajectory], period: float) -> PeriodicMotion:
 def sampled_run(system: ContactSystem, motion: PeriodicMotion) -> Trajectory:
     """A motion in samples as a trajectory; work by the trapezoidal rule.
 
-    What bristles store follows from their deflections, as their rates jump where they begin to
+    The energy in bristles follows from their deflections, as their rates jump where they begin to
     slide.
     """
     m, states = system.basis.modes, np.ascontiguousarray(motion.states)

@@ -1,6 +1,6 @@
 """Errors of a step, kinks ahead and forces that it may have missed, eight systems at once.
 
-What is checked, and by how much, is as in :mod:`fecontact.integrate.rodas5p.error_control`,
+Checks and their limits are as in :mod:`fecontact.integrate.rodas5p.error_control`,
 :func:`fecontact.integrate.rodas5p.dynamics.next_kink` and
 :mod:`fecontact.integrate.course_bounds`.
 """

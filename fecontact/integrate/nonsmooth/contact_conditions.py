@@ -12,9 +12,9 @@ normal velocities and the negative slip velocities after them,
 where lambda_c is the sum of mu_j L_j over the nodes of a cluster. A coefficient that is larger in
 stick than in slip makes two of it. A cluster may also slip in a known sense, or not touch.
 
-Each case of what is pressed and what sticks is a linear system. Projected Gauss-Seidel sweeps find
-the right case in most problems; if they do not, or if it has to be known whether there is another
-one, all cases are tried.
+Each case of pressed nodes and sticking clusters is a linear system. Projected Gauss-Seidel sweeps
+find the right case in most problems. If they do not, or if the solution must be known to be unique,
+all cases are tried.
 
 References
 ----------

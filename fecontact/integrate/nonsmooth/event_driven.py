@@ -323,7 +323,7 @@ def _change_clusters(t, again, p, progress, w, room):
 
 @routine
 def _begin(t, data):
-    """Decide what sticks and what is closed at the start of a run."""
+    """Decide which clusters stick and which stops are closed at the start of a run."""
     p, progress, w, room, watch = (data.problem, data.progress, data.workspace, data.room,
                                    data.watch)
     room.fresh[:] = False

@@ -333,7 +333,7 @@ def _search_nodes(first, forces, step, p, limits, progress, room):
 def first_changes(step, p, limits, progress, w, room):
     """Fill ``room.place`` with the part of a step at which each cluster and stop first changes.
 
-    ``room.parts`` is the interpolation of the step, ``room.ends`` what is left at its ends where
+    ``room.parts`` is the interpolation of the step, ``room.ends`` the margins at its ends where
     anything holds. NOWHERE for those that do not change; of what comes later nothing is promised.
     Returns the part to which the step has to be shortened because it passes a contact that its
     stages have not felt, or waves too short for it; 1 if it has not.

@@ -1,4 +1,4 @@
-"""Compiled transitions at rigid stops with friction: impacts, what stays closed, what sticks.
+"""Compiled transitions at rigid stops with friction: impacts, closed stops, sticking clusters.
 
 Impacts follow Newton's law in the form of Moreau or Poisson's law, with normal impulses L_j of the
 touching nodes, tangential ones P_c of the clusters, penetration rates u' and slip velocities s:
@@ -96,7 +96,7 @@ change_contacts_at = function_at(CHANGE)
 
 @routine
 def _push(count, first, p, w, Y):
-    """Change Y[first:] by contact forces so that what w.right says is left of it vanishes.
+    """Change Y[first:] by contact forces so that the residuals ``w.right`` of constraints vanish.
 
     The constraints are the first of ``w.indices``, clusters behind the nodes.
     """
@@ -391,7 +391,7 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
 
 
 def _change_contacts(t, p, progress, room, w, slow, height, brief, out):
-    """Impact of the ``room.touched`` nodes, then which stops stay closed and what sticks.
+    """Impact of the ``room.touched`` nodes, then which stops stay closed and which clusters stick.
 
     An approach at a penetration rate within rounding is stopped, but is no impact;
     ``room.touched`` tells afterwards which nodes had one.

@@ -173,7 +173,7 @@ def _stiffest(j, n, room):
 
 @routine
 def _add_impulse(a, change, n, room):
-    """Change an impulse, and with it what is left of the conditions."""
+    """Change an impulse, and with it the residual of the conditions."""
     room.impulses[a] += change
     for b in range(3 * n):
         if room.touching[b % n]:

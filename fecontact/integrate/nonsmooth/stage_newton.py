@@ -33,7 +33,7 @@ from fecontact.laws.signatures import friction_at
 from fecontact.system.kernels import normal_gradients
 from fecontact.system.nodes import GroundMotion, in_space, node_contact, node_motion, tangent_force
 
-# Stiffness of what holds a sticking node during Newton's iteration, relative to its inertia.
+# Stiffness that holds a sticking node during Newton's iteration, relative to its inertia.
 GRIP = 1e6
 ROUNDING = 2e-8
 _ITERATIONS = 60

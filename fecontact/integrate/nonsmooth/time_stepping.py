@@ -74,7 +74,7 @@ B2 = 0.25 * (6.0 * GAMMA**2 - 20.0 * GAMMA + 5.0)
 ERROR_1 = B1 - GAMMA / (1.0 - GAMMA)
 ERROR_2 = B2 - (1.0 - 2.0 * GAMMA) / (1.0 - GAMMA)
 NODES = (GAMMA, GAMMA + A21, 1.0)
-# A step is cut so often at most before what is left counts as error.
+# A step is cut so often at most before the rest counts as error.
 MOST_CUTS = 3
 # Stages may fail in a range of lengths that short steps, of less than this part of the longest one,
 # do not get past as they grow: after so many failures a longest step is tried.
@@ -244,7 +244,7 @@ def _set_inertia(p, limits, room):
 
 @helper
 def _prepare(step, quick, p, progress, w, room):
-    """Set the linear matrix of a step, and what holds the sticking nodes."""
+    """Set the linear matrix of a step, and the parameters r of the nodes in stick."""
     s, hold, inertia, linear = p.system, room.hold, room.inertia, room.newton.linear
     g = GAMMA * step.h
     n, _, m = s.rows.shape

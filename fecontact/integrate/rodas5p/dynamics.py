@@ -291,7 +291,7 @@ def ground_acceleration(t, later, moved, s):
 def set_load_rate(t, later, after_t, s, out):
     """Fill ``out`` (m,) with the rates of the modal loads, but that of the springs of the drive.
 
-    Those of its dashpots by their pull ``later``; ``after_t`` is just after t.
+    Rates of its dashpots follow from their pull ``later``; ``after_t`` is just after t.
     """
     for i in range(len(out)):
         out[i] = 0.0

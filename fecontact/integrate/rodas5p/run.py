@@ -40,7 +40,7 @@ class Run(StepRun):
     series : Series or None
         Tables of a system whose motion is expanded in power series; else None.
     collocation : Collocation or None
-        What steps by collocation hand on, and their room; None for steps of Rodas5P.
+        State and workspace of steps by collocation; None for steps of Rodas5P.
     """
 
     problem: Problem

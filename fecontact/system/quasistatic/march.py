@@ -1,6 +1,6 @@
 """Compiled quasi-static motion along a path of loads, in increments that are cut where needed.
 
-Work is taken by the trapezoidal rule, which is exact for the elastic body. What friction loses is
+Work is taken by the trapezoidal rule, which is exact for the elastic body. The loss in friction is
 exact where displacement and normal force of a node change in proportion within an increment. The
 two disagree where sliders begin to slide, in space turn while they slide, or nodes close and open
 within it; an increment is cut until they agree. Turned by the angle b within an increment, the

@@ -44,7 +44,7 @@ def prestressed_modes(
     state : LoadHistory or RestState
         State at rest, the last one of a history.
     at_limit : 'stick' or 'slip'
-        What sliders that are at rest at their limit do: small vibrations take them back as often as
+        Behaviour of sliders at rest at their limit: small vibrations take them back as often as
         they move them on, so by default they stick.
 
     Raises

@@ -1,8 +1,8 @@
 """Compiled rates within steps from event to event: what a stage needs, and no more.
 
-They are those of :mod:`fecontact.integrate.nonsmooth.equations`. What is given in time is evaluated
-once for each time, limits of stick where something is compared with them, and powers at the stages
-that enter the end of a step or its interpolation.
+The rates are those of :mod:`fecontact.integrate.nonsmooth.equations`. Prescribed motions and loads
+are evaluated once for each time, limits of stick where forces are compared with them, and powers at
+the stages that enter the end of a step or its interpolation.
 """
 
 import numpy as np

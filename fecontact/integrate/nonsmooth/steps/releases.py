@@ -1,8 +1,8 @@
 """Compiled search of a step for the moment at which clusters that stick or stops that hold let go.
 
-Forces are evaluated at a few places; the polynomial through these, less its last part, which tells
-how far it can be trusted, bounds them. A part of the step that this leaves open is halved and
-looked at again, and at last where least is left.
+Forces are evaluated at a few places; the polynomial through these, less its last part, which
+estimates its error, bounds them. A part of the step that this leaves undecided is halved and
+searched again, and finally examined where the margin is smallest.
 """
 
 import numpy as np
@@ -39,7 +39,7 @@ def holding(progress):
 
 @routine
 def set_left(p, progress, w, out):
-    """Fill out (2 k + n,) with what sticking clusters and closed stops have left, both ways.
+    """Fill out (2 k + n,) with the margins of sticking clusters and closed stops, both ways.
 
     Forces are those in w.
     """
@@ -60,7 +60,7 @@ def set_left(p, progress, w, out):
 
 @routine
 def _forces(part, step, p, progress, w, room, out):
-    """Fill out (2 k + n,) with what is left at a part of the step."""
+    """Fill out (2 k + n,) with the margins at a part of the step."""
     interpolate(part, progress.state, room.parts, room.state[: 2 * p.rows.shape[1]])
     set_rates(min(step.t + part * step.h, step.latest), room.state, p, progress, w, room,
               room.rate)
@@ -77,7 +77,7 @@ def _past(out, size):
 
 @helper
 def _narrow(low, high, step, p, progress, w, room):
-    """Note what lets go first between two parts of the step, at the earliest moment."""
+    """Note the contacts that let go first between two parts of the step."""
     clusters, left, size = len(p.rows), room.left, room.scale
     for _ in range(60):
         middle = 0.5 * (low + high)
@@ -96,7 +96,7 @@ def _narrow(low, high, step, p, progress, w, room):
 
 @helper
 def _bound(r, left):
-    """Lower bound of what r has left between the quarters of a part, as far as they tell."""
+    """Lower bound of the margin of r between the quarters of a part, estimated from them."""
     last = _LAST * abs(left[0, r] - 4.0 * left[1, r] + 6.0 * left[2, r]
                        - 4.0 * left[3, r] + left[4, r])
     least = np.inf
@@ -110,7 +110,7 @@ def _bound(r, left):
 
 @helper
 def _clear(left, size):
-    """Whether nothing lets go between the quarters of a part, as far as they tell."""
+    """True if no contact lets go between the quarters of a part, estimated from them."""
     clear = True
     for r in range(len(size)):
         clear = clear and _bound(r, left) >= -_FORCE_ROUNDING * size[r]
