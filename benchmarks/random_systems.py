@@ -670,7 +670,7 @@ class Result:
 
 
 def growth_of(case: Case, times: Array, wanted: Array) -> float:
-    """By how much a small change of the start grows."""
+    """Growth of a small change of the start."""
     m = case.system.basis.modes
     rng = np.random.default_rng([8, case.number])
     size = np.concatenate([np.ptp(wanted[:, :m], axis=0), np.ptp(wanted[:, m : 2 * m], axis=0)])

@@ -54,6 +54,6 @@ with new_figure(10.0, 3.6, "friction_oscillator.png") as figure:
     panels[0].set(ylabel="velocity of B [mm/s]")
 
 # %%
-# Which frequencies ring when, over the last ten seconds.
+# Frequencies that ring over time, during the last ten seconds.
 plot_spectrogram(runs["elastic mode"].between(30.0), piece=1.0, highest_hz=60.0,
                  path="spectrogram.png")

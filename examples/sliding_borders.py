@@ -47,7 +47,7 @@ print(f"stick-slip ends at V = {end.parameter:.7f}, {end.kind}")
 plot_branches(stick_slip, x_label="speed of the belt", y_label="x", path="stick_slip.png")
 
 # %%
-# Its end over speed and dashpot.
+# The end of stick-slip over speed and dashpot.
 border = codim2_curve(field, end, "dashpot",
                       bounds={"ground.speed": (0.15, 1.4), "dashpot": (0.02, 0.5)},
                       options=ContinuationOptions(largest_step=0.1))

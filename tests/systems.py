@@ -127,7 +127,7 @@ def friction_slope(v):
 
 
 def two_mass_jacobian(B, v0, D=0.1):
-    """Of x1, x2, x3, x4, straight from the equations of section 4.4."""
+    """Jacobian of x1, x2, x3, x4, straight from the equations of section 4.4."""
     s = B * friction_slope(v0)
     return np.array([[0.0, 1.0, 0.0, 0.0],
                      [-3.0 / 2.5, (-4.0 * D - s) / 2.5, 1.0 / 2.5, 2.0 * D / 2.5],

@@ -16,7 +16,7 @@ RENDERED = ("sliding_beam", "disc_brake", "platform_damper")
 EXAMPLES = {
     "squeal": ([(r"coefficient of (\S+) on", 0.3108, 2e-4), (r"at (\S+) Hz,", 646.0, 0.1)],
                {"squeal_map.png", "squeal_modes.png"}),
-    # Where the squealing disc's frequency is by complex modes; growth is the squeal's own.
+    # Frequency of the squealing disc by complex modes; growth is the squeal's own.
     "disc_brake": ([(r"mode of (\S+) Hz", 8277.82, 0.01), (r"grows by (\S+) 1/s", 148.487, 0.01),
                     (r"^it squeals at (\S+) Hz", 8000.0, 80.0)],
                    {"disc_brake.png", "disc_brake_modes.png"}),

@@ -145,7 +145,7 @@ def classes_in(hint):
 
 
 def test_what_public_names_take_and_give_has_a_public_name():
-    """Also their fields, properties and methods: users import it for checks and annotations."""
+    """Types of fields, properties and methods too: users import them for annotations."""
     pytest.importorskip("xarray")
     things = public_things()
     known = {thing for thing in things.values() if inspect.isclass(thing)}

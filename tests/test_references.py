@@ -72,7 +72,7 @@ def strings(node, inside=()):
 
 
 def trouble_with(reference, module, inside):
-    """Why a reference leads nowhere, or not by the public name; empty if all is well."""
+    """Reason why a reference leads nowhere, or not by the public name; empty if all is well."""
     if reference.startswith(FOREIGN):
         return ""
     if reference.startswith("fecontact."):

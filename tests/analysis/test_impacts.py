@@ -81,7 +81,7 @@ def test_duration_and_peak_of_elastic_impacts(law, product, deepest, peak):
 @pytest.mark.parametrize(("product", "restitution"), [
     (0.1, 0.9374755799), (0.5, 0.7484349316), (2.0, 0.4107196861)])
 def test_restitution_of_hunt_crossley_contact(product, restitution):
-    """Its damping ends with the penetration, from where the node flies on."""
+    """Damping ends with the penetration, from where the node flies on."""
     system = ball(PowerContact(1e9, 1.5, damping_factor=product / V0))
     run = simulate(system, 0.002, initial=state(1e-5, -V0), outputs=401, rtol=1e-8)
     found = find_impacts(run)

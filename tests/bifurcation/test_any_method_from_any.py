@@ -87,7 +87,7 @@ def extremes(branch, parameter):
 @pytest.mark.parametrize("to", METHODS)
 @pytest.mark.parametrize("by", METHODS)
 def test_orbits_without_symmetry_begin_at_a_branch_point(by, to):
-    """By shooting too, whose own equations say nothing of other orbits."""
+    """Shooting finds them too, although its equations contain no other orbits."""
     point, = symmetric(by).of_kind("branch point")
     assert point.parameter == pytest.approx(2.4029, abs=2e-4)
     found = orbit_branch(field(), point, method=METHODS[to], bounds=(2.0, 2.45),

@@ -133,7 +133,7 @@ def bautin(t, x, p, out):
 
 @pytest.mark.parametrize("largest", [0.02, 0.05, 0.1])
 def test_a_curve_of_folds_ends_at_a_bautin_point(largest):
-    """And does not run through the same orbits again."""
+    """The curve does not run through the same orbits again."""
     field = vector_field(bautin, {"b": -1.0, "c": 1.0}, 2)
     hopf, = equilibrium_branch(field, parameter="b", bounds=(-2.0, 2.0)).of_kind("Hopf")
     orbits = orbit_branch(field, hopf, method=Collocation(intervals=16), bounds=(-2.0, 2.0))
@@ -152,7 +152,7 @@ def test_a_curve_of_folds_ends_at_a_bautin_point(largest):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_curve_of_folds_begins_at_a_bautin_point(sign, tmp_path):
-    """Found from the curve of Hopf points b = 0, also from a file and on either side."""
+    """The start is found from the curve of Hopf points b = 0, also from a file, on either side."""
     def turned(t, x, p, out):
         square = x[0] * x[0] + x[1] * x[1]
         growth = p[0] + sign * p[1] * square - square * square

@@ -45,7 +45,7 @@ def test_explosions_have_no_false_folds(slowness, intervals):
     steep = (amplitude > 1.6) & (amplitude < 3.6)
     assert steep.sum() > 15
     assert amplitude[-1] == pytest.approx(4.0, abs=0.05)
-    # Where it is steep: 1 - e / 8 - 3 e^2 / 32 - 173 e^3 / 1024, and something of order e^4.
+    # Steep part: 1 - e / 8 - 3 e^2 / 32 - 173 e^3 / 1024, and something of order e^4.
     e = slowness
     series = 1.0 - e / 8.0 - 3.0 * e**2 / 32.0 - 173.0 * e**3 / 1024.0
     at = np.median(orbits.parameter[steep])

@@ -103,7 +103,7 @@ def zero_hopf(t, x, p, out):
 
 @pytest.mark.parametrize("kind", ["fold", "Hopf"])
 def test_zero_hopf(kind):
-    """Of an orbitally equivalent field: e + d alpha with the speed 1 + alpha u is e again."""
+    """Orbitally equivalent fields: e + d alpha with the speed 1 + alpha u is e again."""
     _, point = at(zero_hopf, [0.6, 0.0, 0.0], 3, kind, "zero-Hopf", a=-0.5, b=-0.3)
     # r^2 = 2 |z|^2.
     close(point, b=1.3, c=-1.8, d=0.6, e=0.5)

@@ -119,7 +119,7 @@ def test_the_tangent_of_a_compiled_step_is_that_of_all_equations(strides):
 
 
 def test_contact_as_stiff_as_the_modes_is_left_to_plain_code(strides):
-    """Then modes cannot be solved for apart."""
+    """Modes cannot be solved for separately with such a contact."""
     options = ContinuationOptions(points=4, largest_step=0.05)
     method = HarmonicBalance(9, stability=None)
     found = frequency_response(block(1e11), (2e4 / TURN, 3e4 / TURN), method=method,

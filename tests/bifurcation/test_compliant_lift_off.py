@@ -70,7 +70,7 @@ def test_orbits_that_open_are_differenced(friction):
 
 
 def test_a_contact_that_opens_for_a_short_moment_is_seen():
-    """Its force is never below zero, and events between samples of the orbit may be brief."""
+    """The force is never below zero, and events between samples of the orbit may be brief."""
     value = (1.0 + 2e-4) * opening(1.3, 0.4)
     _, branch = followed(pressed(value, 0.3, 0.4), FILIPPOV, AMPLITUDE, (2.2, 3.0), points=1)
     assert "A compliant contact opens." in branch.message

@@ -69,7 +69,7 @@ def test_bordered_solutions(intervals, degree, states, with_period, parameters):
 @pytest.mark.parametrize("intervals", [1, 2, 5, 8, 9, 23, 57])
 @pytest.mark.parametrize(("degree", "states", "parameters"), [(4, 4, 2), (3, 1, 1), (2, 3, 0)])
 def test_equations_of_the_ends(intervals, degree, states, parameters):
-    """They are sums of the collocation rows, and hold between the ends of an open solution."""
+    """Equations are sums of the collocation rows, and hold between the ends of an open solution."""
     J, f, P, widths = random_system(intervals, degree, states, parameters)
     factors = factors_for(intervals, degree, states, parameters)
     basis, nodal, d = rule(degree), f.size, states

@@ -107,7 +107,7 @@ def test_derivatives_are_those_of_another_function_with_the_same_zeros(case):
 
 
 def test_derivative_for_two_real_multipliers():
-    """Of a neutral saddle, whose multipliers exp(+- pi sqrt(0.1)) have the product one."""
+    """A neutral saddle, whose multipliers exp(+- pi sqrt(0.1)) have the product one."""
     field, branch = on_circle(sheared, "growth", (-0.3, 0.3), growth=-0.2, shear=0.1)
     point, = branch.of_kind("Neimark-Sacker")
     problem, u, _ = orbit_curve(field, point, "shear", {}, None, "Neimark-Sacker")
@@ -120,7 +120,7 @@ def test_derivative_for_two_real_multipliers():
 
 
 def test_folds_of_a_driven_oscillator_over_frequency_and_force():
-    """They meet in a cusp, close to that of one harmonic.
+    """The folds meet in a cusp, close to that of one harmonic.
 
     Its amplitude a satisfies a^2 ((3 a^2 / 4 - s)^2 + d^2) = F^2 with s = w^2 - 1, d = w / 10: a
     triple root in a^2 at s = sqrt(3) d, F^2 = 32 sqrt(3) d^3 / 27.

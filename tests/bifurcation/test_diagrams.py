@@ -57,7 +57,7 @@ def test_quantities_and_numbers_of_points():
 
 
 def test_orbits_are_drawn_by_the_largest_value_of_a_state():
-    """So that equilibria and the orbits born of them stand in one diagram."""
+    """Equilibria and the orbits born of them stand in one diagram."""
     orbits = Branch("p", tuple(
         BranchPoint(np.array([0.0, p]), np.array([0.0, 1.0]),
                     {"maximum": np.array([3.0 + p, 7.0]), "minimum": np.zeros(2), "stable": True})
@@ -81,7 +81,7 @@ def test_branches_of_one_name_share_colour_and_entry():
         "a", "b", "stable"]
 
 
-# How colours are seen by those without red and green cones: matrices for linear RGB of G. M.
+# Colours as people without red or green cones see them: matrices for linear RGB of G. M.
 # Machado, M. M. Oliveira and L. A. F. Fernandes (2009), doi 10.1109/TVCG.2009.113.
 SEEN = [np.eye(3),
         np.array([[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],

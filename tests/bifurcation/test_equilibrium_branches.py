@@ -331,7 +331,7 @@ def chained(t, x, p, out):
 
 
 def test_steps_along_straight_branches_grow():
-    """Their length counts by the parameter: 20 steps of a twentieth, and some to get there."""
+    """Steps are measured by the parameter: 20 steps of a twentieth, and some to get there."""
     field = vector_field(chained, {"p": 0.0}, 2)
     for high in (1.0, 30.0):
         branch = equilibrium_branch(field, np.zeros(2), bounds=(0.0, high))

@@ -89,7 +89,7 @@ def test_time_stepping_is_differenced():
 @pytest.mark.parametrize(("nodes", "instead"), [
     (1, r"EventDriven\(\)"), (2, r"smoothing_slope and Auto\(\)")])
 def test_time_stepping_of_stick_slip_names_what_to_take(nodes, instead):
-    """Its runs know transitions to first order: Newton's method finds no orbit."""
+    """Time stepping has transitions of first order: Newton's method finds no orbit."""
     system = forced(speed=0.45)
     motion = periodic_motion(system, solver=FILIPPOV, rtol=1e-8)
     if nodes > 1:  # with slip velocities that depend on each other

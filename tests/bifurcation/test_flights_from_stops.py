@@ -76,7 +76,7 @@ def free(w, lift, amplitude, begin):
 
 
 def test_a_mass_that_rests_all_the_time():
-    """Of a system that does not move at all the sizes are those of what acts on it."""
+    """A system that does not move takes its scales from the loads on it."""
     field, branch = followed(impacting(2.5, 0.8, -0.5), INELASTIC, AMPLITUDE, (0.7, 1.2),
                              [AMPLITUDE, FREQUENCY], largest_step=0.1)
     border, = branch.special

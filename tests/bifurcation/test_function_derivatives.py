@@ -194,7 +194,7 @@ def test_what_goes_wrong_on_the_way_is_said():
 
 @pytest.mark.parametrize(("way", "error"), [("complex", 1e-14), ("differences", 2e-9)])
 def test_rough_derivatives(way, error):
-    """By the complex step exact, else of second order in the step: x^2 h^2 / 6 of the third one."""
+    """Complex steps are exact, others of second order: x^2 h^2 / 6 of the third derivative."""
     field = vector_field(moved, {"p": 0.1}, 1, differentiation=way)
     x, none = PLACES[:, None].copy(), np.zeros(len(PLACES))
     exact = 1.0 / np.cosh(PLACES - 0.1) ** 2

@@ -107,7 +107,7 @@ def torus(t, x, p, out):
 
 
 def test_a_point_of_a_curve_takes_one_step_where_the_guess_is_near(monkeypatch):
-    """And is as accurate: lam = a^2."""
+    """The point is as accurate: lam = a^2."""
     calls = {"linearise": [], "evaluate": []}
     for name, told in calls.items():
         made = getattr(OrbitCurve, name)

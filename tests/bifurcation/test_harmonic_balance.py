@@ -327,7 +327,7 @@ def test_branch_is_stored_and_continued(two_masses, tmp_path):
 @pytest.mark.parametrize("orders", [5, [1, 3, 5]])
 @pytest.mark.parametrize("make", [duffing, unilateral])
 def test_signs_of_determinants(make, orders):
-    """By the factors of a solution, also with another last row, against NumPy."""
+    """Signs by the factors of a solution, also with another last row, against NumPy."""
     field = make()
     problem = problem_for(field, field.values, 0, HarmonicBalance(orders, 32),
                           np.ones(field.dimension + 2))

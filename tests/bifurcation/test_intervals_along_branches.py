@@ -252,7 +252,7 @@ FINE = Collocation(400, state_tolerance=None, tolerance=1e-11)
 
 @pytest.mark.parametrize("followed", [driven_branch, chaos_branch])
 def test_doublings_beside_those_of_a_fine_mesh(followed):
-    """Of a driven oscillator with two wells and of Roessler's orbit, on 400 intervals exact."""
+    """A driven oscillator with two wells and Roessler's orbit, on 400 intervals exact."""
     _, exact = followed(FINE)
     reference, = exact.of_kind("period doubling")
     width = np.ptp(exact.parameter)
@@ -329,7 +329,7 @@ def test_a_branch_says_where_newtons_method_fails_on_finer_meshes(monkeypatch):
 
 
 def test_a_branch_tells_of_special_points_as_they_are_in_the_end(monkeypatch):
-    """Their own meshes decide, not those on which they were met."""
+    """The points' own meshes decide, not those on which they were met."""
     monkeypatch.setattr(
         branches, "_sharpened", lambda field, branch, index, accuracy: replace(
             branch.points[index],
@@ -393,7 +393,7 @@ def test_limits_below_the_intervals_are_raised_to_them():
 
 
 def test_curves_say_where_their_intervals_do_not_suffice():
-    """They have the limit of the branch from which they start."""
+    """Curves have the limit of the branch from which they start."""
     field, t, circle = circle_field(twisted, lam=0.7, nu=0.8)
     messages = []
     for intervals in (4, 16):
@@ -413,7 +413,7 @@ def test_curves_say_where_their_intervals_do_not_suffice():
 
 
 def test_numbers_of_intervals():
-    """They go with the root of order m + 1 of the error, in eights, with a wide dead band."""
+    """Intervals go with the root of order m + 1 of the error, in eights, with a wide dead band."""
     sizes = Intervals(50, 800, 1e-5)
     assert sizes.after(100, 9.9e-6, 4) == sizes.after(100, 2e-7, 4) == 100
     # (1.1e-5 / 1e-6)^(1/5) = 1.615, (1e-9 / 1e-6)^(1/5) = 0.251, (1e-7 / 1e-6)^(1/5) = 0.631.

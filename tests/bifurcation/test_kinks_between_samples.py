@@ -132,7 +132,7 @@ def sliding(**parts):
 @pytest.mark.parametrize("parameter", ["drive.frequency_hz", "normal.stiffness"])
 @pytest.mark.parametrize("law", [LinearContact(30.0, 0.8), BilateralPlay(20.0, 0.3)])
 def test_derivatives_are_those_of_the_equations(law, parameter):
-    """By compiled code and one by one, against central differences of the residual."""
+    """Derivatives by compiled code and one by one, against central differences of the residual."""
     field = contact_field(sliding(normal=law), [parameter])
     problem = problem_for(field, field.values, 0, HarmonicBalance(3, 40), np.ones(6))
     assert len(problem.onsets) > 0

@@ -97,7 +97,7 @@ def test_harmonics_that_are_left_out_are_zero(orders):
 
 @pytest.mark.parametrize("force", [1e-3, 1e-2])
 def test_truncation_error_counts_what_is_left_out(force):
-    """Of a weakly nonlinear spring: the estimate is the mean that one harmonic more has."""
+    """A weakly nonlinear spring: the estimate is the mean that one harmonic more has."""
     # Its force is -.3 y^2 + .1 y^3.
     spring = BilateralPolynomial(-0.3, 0.1, preload=0.2, shortening=1.0)
     system = hardening(force=force).with_(normal=spring)

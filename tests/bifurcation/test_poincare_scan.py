@@ -36,7 +36,7 @@ def test_exponents_of_a_linear_oscillator():
 @pytest.mark.parametrize(("w", "low", "high"), [
     (64.32, -7.3, -5.2), (30.84, -4.1, -3.0), (23.63, 4.5, 8.0)])
 def test_exponents_of_the_impact_oscillator(w, low, high):
-    """By multipliers of the orbits -6.254 and -3.574 1/s; at 23.63 rad/s chaos, about +6 1/s."""
+    """Multipliers of the orbits give -6.254 and -3.574 1/s; chaos at 23.63 rad/s, about +6 1/s."""
     period = 2.0 * np.pi / w
     found = lyapunov_exponents(impact_oscillator(2, w), 200 * period, transient=50 * period,
                                initial=np.zeros(4))

@@ -173,7 +173,7 @@ def test_equilibria_at_a_value_which_are_several():
 
 
 def test_equilibria_go_on_and_cross(tmp_path):
-    """Of Lorenz' equations: x = y = sqrt(b (rho - 1)) beyond the pitchfork at 1."""
+    """Equilibria of Lorenz' equations: x = y = sqrt(b (rho - 1)) beyond the pitchfork at 1."""
     field = lorenz_field()
     zero = equilibrium_branch(field, np.zeros(3), "rho", bounds=(0.5, 5.0), both=True)
     path = write_branch(tmp_path / "zero.h5", zero)

@@ -87,7 +87,7 @@ def test_command_line_overrides_the_section(cli, file):
 
 
 def test_a_list_of_harmonics(cli, file):
-    """By option, by the section, and of modes; the file holds the list."""
+    """The list is given by option, by the section, and for modes; the file holds the list."""
     for how in (["--harmonics", "0,1,3"], ["--set", "response.harmonics=[0,1,3]"]):
         assert cli("response", file, "--bounds", 9, 9.5, "--samples", 64, *how)[0] == 0
         found = read_response(file.parent / "results" / "block-response.h5")

@@ -53,7 +53,7 @@ def last_period(system, period, count, rtol=1e-8):
     JenkinsFriction(4e4, 0.3),
     IwanFriction(8e4, 0.3, elements=2)])
 def test_block_that_slips_in_two_directions(friction):
-    """Its path is an ellipse; a run comes to the same motion to some 1e-4."""
+    """The path of the block is an ellipse; a run comes to the same motion to some 1e-4."""
     system = block(friction)
     found = frequency_response(
         system, (125.0 / TURN, 140.0 / TURN), method=HarmonicBalance(

@@ -53,7 +53,7 @@ def test_errors_of_a_coefficient_cover_the_truth(steep):
 
 @pytest.mark.slow
 def test_tori_from_a_resonance_1_1_go_to_their_side():
-    """They lie at c < 0, whatever direction rounding makes of the double one."""
+    """The tori lie at c < 0, for any direction that rounding makes of the double one."""
     box = {"b": (-0.3, 0.3), "c": (-0.8, 0.8)}
     for run in range(FEW):
         rng = np.random.default_rng(run)

@@ -202,7 +202,7 @@ def test_what_was_killed_goes_on_to_the_same_result(tmp_path):
 
 
 def test_a_diagram_does_not_depend_on_the_machine(monkeypatch, tmp_path, pool):
-    """Not on cores, threads or processes: chains are cut by the number of values alone."""
+    """Chains are cut by the number of values alone, not by cores, threads or processes."""
     found = []
     for cores in (1, 7):
         monkeypatch.setattr(os, "cpu_count", lambda cores=cores: cores)

@@ -143,7 +143,7 @@ def test_folds_have_errors_like_the_points_beside_them():
 
 
 def test_branches_that_cross_have_an_error_too():
-    """Of a pitchfork, where no last row makes the equations regular."""
+    """A pitchfork, where no last row makes the equations regular."""
     branch = frequency_response(duffing(0.5, 10.0), (0.5, 1.8), "W", method=HarmonicBalance(
         9, 40, sampling_tolerance=1e-9)).branches[0]
     assert branch.of_kind("branch point")

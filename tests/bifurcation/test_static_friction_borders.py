@@ -41,7 +41,7 @@ class Reference:
         return STATIC - abs(self.force(t, place + SPEED * (t - begin)))
 
     def release(self, begin, place):
-        """When stick ends, and the least that it has left before, at a minimum between."""
+        """Time at which stick ends, and its least margin before, at a minimum between."""
         times = np.linspace(begin, begin + 1.5 * PERIOD, 3001)
         values = np.array([self.left(t, begin, place) for t in times])
         first = np.flatnonzero((values[:-1] > 0.0) & (values[1:] <= 0.0))[0]

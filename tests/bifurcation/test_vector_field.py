@@ -206,7 +206,7 @@ def test_many_nodes_waves_memory_and_drive(friction):
 
 
 def test_derivative_to_a_normal_force_that_begins_at_zero():
-    """There friction is still zero, but grows with the force."""
+    """Friction at zero force is still zero, but grows with the force."""
     field = contact_field(two_mass_system(1.0), {"B": (1.0, with_force)})
     x = np.random.default_rng(1).normal(size=(20, 4))
     T = field.system().basis.contact_T[:, 0]

@@ -349,7 +349,7 @@ def test_derivatives_of_a_wave_are_differences_of_its_equations(sector, name):
 
 
 def eigenvalues(stiffness, damping):
-    """Of q'' + C q' + K q = 0."""
+    """Eigenvalues of q'' + C q' + K q = 0."""
     n = len(stiffness)
     return np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
 

@@ -150,7 +150,7 @@ def test_pieces_of_one_body(place):
 
 
 def test_the_force_of_a_bolt(place):
-    """That on the control node of its section, which the deck names by its number."""
+    """Force on the control node of the bolt's section, which the deck names by its number."""
     (place / "a.inp").write_text(clamp_deck(clamp_mesh(), {})
                                  + "*BOUNDARY\nHELD, 1, 3\n*STEP\n*STATIC\n*CLOAD\n9001, 1, 2e4\n")
     study = Study.from_toml(imported("a.inp").toml(place), place / "study.toml")

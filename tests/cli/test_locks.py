@@ -68,7 +68,7 @@ def test_the_lock_of_a_killed_run_keeps_nobody_out(tmp_path, monkeypatch, holder
 
 
 def test_locks_are_held_by_one_at_a_time(tmp_path):
-    """Also while the file comes and goes: many processes, of which each counts one up."""
+    """A lock holds while the file comes and goes: each of many processes counts one up."""
     count = tmp_path / "count"
     count.write_text("0")
     script = ("import sys, time\n"

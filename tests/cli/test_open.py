@@ -72,7 +72,7 @@ def test_set_is_for_studies_alone(cli, study):
 
 
 def test_runs_of_files_that_have_changed_since(cli, study, tmp_path, opened):
-    """Of a law's data, by the run itself and by its study, which is run again for a report."""
+    """Data of a law, read by the run itself and by its study, which is run again for a report."""
     data, run = tmp_path / "ground.csv", tmp_path / "results" / "tiny.vtkhdf"
     data.write_text("0.0, 0.0\n0.1, 1e-6\n0.2, 0.0\n")
     study.write_text(TINY.replace("ground = { speed = 0.1 }", (

@@ -37,7 +37,7 @@ def test_solutions_are_those_of_lapack(size):
 
 
 def test_elimination_of_the_first_columns():
-    """Of five rows in eight unknowns three are eliminated; the known solution solves what is left.
+    """Three of five rows in eight unknowns are eliminated; the known solution solves what is left.
 
     A further row loses the multiples ``weights`` of the reduced right sides.
     """

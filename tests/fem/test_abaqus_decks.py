@@ -136,7 +136,7 @@ def test_undisplaced_instances_of_one_part_each_have_the_names_of_parts(tmp_path
 
 
 def test_a_displaced_solid_is_turned_about_its_axis(tmp_path):
-    """By 120 degrees about the diagonal of space: (x, y, z) -> (z, x, y)."""
+    """The solid turns by 120 degrees about the diagonal of space: (x, y, z) -> (z, x, y)."""
     box = block_mesh((2, 1, 1))
     path = deck(tmp_path, f"*PART, NAME=P\n{solid(box, box.nodes)}*END PART\n*ASSEMBLY\n"
                           "*INSTANCE, NAME=I, PART=P\n1, 2, 3\n0, 0, 0, 5, 5, 5, 120\n"

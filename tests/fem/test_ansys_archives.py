@@ -223,7 +223,7 @@ def test_without_the_library_its_extra_is_named(tmp_path, monkeypatch):
 
 
 def test_archives_that_ansys_wrote():
-    """Of a beam of 1 x 1 x 5, one of tetrahedra of 1 x 1 x 10, and a blade's sector."""
+    """Archives of a beam of 1 x 1 x 5, one of tetrahedra of 1 x 1 x 10, and a blade's sector."""
     import mapdl_archive
 
     folder = Path(mapdl_archive.__file__).parent / "examples"

@@ -213,7 +213,7 @@ def test_a_kinematic_coupling_makes_the_end_of_a_bar_rigid():
 
 
 def test_a_distributing_coupling_has_the_mean_motion_of_its_face():
-    """Its reference point is where the mean motion of the face takes it; nothing is stiffer."""
+    """The reference point is where the mean motion of the face takes it; nothing is stiffer."""
     place = (L + 0.1, 0.03, -0.01)
     link = LinearEquation((Term("probe", (0, 0, 1)), Term("hub", (0, 0, -1))))
     free, coupled = bar(), bar(

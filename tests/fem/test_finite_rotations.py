@@ -43,7 +43,7 @@ BODIES = {
 
 @pytest.mark.parametrize("name", BODIES)
 def test_forces_and_tangents_are_derivatives(name):
-    """Of the energy and the forces, by central differences at rotations of half a radian."""
+    """Derivatives of energy and forces, by central differences at rotations of half a radian."""
     body = BODIES[name]()
     model, rng = FiniteStrainModel(body), np.random.default_rng(2)
     q, v = rng.normal(size=(2, model.expansion.shape[1]))

@@ -47,7 +47,7 @@ def spring(component, stiffness, damping=0.0, at="hub"):
 
 @pytest.mark.parametrize("kind", ["kinematic", "distributing"])
 def test_rows_of_a_reference_point_are_its_motion(kind):
-    """Of rigid motions exactly, and with the work of forces and moments there."""
+    """Rigid motions are exact, also with the work of forces and moments there."""
     body = bar(fixed={}, place=(L + 0.1, 0.03, -0.01), kind=kind)
     rows = body.motion_rows("hub")
     rng = np.random.default_rng(1)

@@ -118,7 +118,7 @@ FOLDED[6] = [0.2, 0.2, 0.1]
 
 
 def test_hanging_nodes_are_refused():
-    """Of a square beside two, and of cubes where one is cut into eight."""
+    """Nodes of a square beside two, and of cubes where one is cut into eight."""
     square = [(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (2, 0.5), (2, 1), (1, 0.5)]
     cells = [[0, 1, 2, 3], [1, 4, 5, 7], [7, 5, 6, 2]]
     with pytest.raises(MeshError, match="node 7 lies inside the edge between mesh nodes 1 and 2"):

@@ -180,7 +180,7 @@ def test_runs_beyond_all_numbers(stiffness, start, work):
 
 
 def test_the_node_that_shortens_steps():
-    """Of two nodes only the second is pressed."""
+    """Only the second of two nodes is pressed."""
     T = np.zeros((4, 3, 2))
     T[:, 0, 0] = T[:, 1, 1] = 0.4
     basis = fc.ModalBasis(np.zeros(2), np.zeros((2, 2)), T, np.zeros((4, 2)), np.full(2, 0.5))

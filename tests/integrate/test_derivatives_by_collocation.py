@@ -292,7 +292,7 @@ def test_runs_go_on_bit_for_bit():
 
 
 def test_outputs_do_not_change_the_product():
-    """Of a system whose force jumps too, with outputs at any times."""
+    """A system whose force jumps too, with outputs at any times."""
     for system, begin, end in (
             (friction_oscillator(2, **{"friction.smoothing_slope": 1e4}), np.zeros(4), 0.5),
             (dashpot_stop(), np.array([0.05, -0.1]), 0.3)):
@@ -306,7 +306,7 @@ def test_outputs_do_not_change_the_product():
 
 
 def test_still_derivatives():
-    """Of a mass with neither ground nor drive: straight lines, and a parabola by a load."""
+    """A mass with neither ground nor drive: straight lines, and a parabola by a load."""
     rows = np.array([[1.0], [0.0], [0.0]])
     system = ContactSystem(
         fc.basis_from_matrices([[2.0]], [[0.0]], {"contact": rows[None], "C": rows}),

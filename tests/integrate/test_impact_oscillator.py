@@ -140,7 +140,7 @@ def test_exponent_of_chaos_is_the_growth_between_neighbours():
 
 
 def test_exponent_of_an_orbit_is_that_of_its_floquet_multiplier():
-    """By differences of neighbouring motions; at 30.84 rad/s the orbit has two periods."""
+    """Exponent by differences of neighbouring motions; at 30.84 rad/s the orbit has two periods."""
     for frequency, wanted in ((64.32, -6.254192), (30.84, -3.573516)):
         system = driven(impact.two_mode_system(), frequency)
         found, run = settled_regime(system)

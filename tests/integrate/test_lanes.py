@@ -332,7 +332,7 @@ def test_initial_states_that_are_not_finite():
         PointLoad("C", "y", signal=Pulse("half-sine", -3.0, 0.01, 0.05)),))),
 ])
 def test_other_systems_are_run_one_by_one(other):
-    """Their results are those of single runs bit for bit."""
+    """Results of other systems are those of single runs bit for bit."""
     assert kind_of(other, 0.0, 0.1) is None
     times, start = np.linspace(0.0, 0.1, 3), np.zeros((2, other.size))
     found = ensemble([other, other], times, initial=start)

@@ -121,7 +121,7 @@ def _pump(u, v, p):
 
 
 class Motor(NormalLaw):
-    """Its work is not that of the damping it claims to have."""
+    """A law whose work is not that of the damping it claims to have."""
 
     kernel = _pump
 
@@ -147,7 +147,7 @@ def test_energy_from_nowhere_has_a_status():
 
 @pytest.mark.filterwarnings("ignore::fecontact.core.errors.ModelWarning")
 def test_energies_beyond_all_numbers_have_a_status():
-    """Of 1e200 kg (9e59)^2 overflows, the motion does not."""
+    """The energy of 1e200 kg overflows with (9e59)^2; the motion does not."""
     rows = np.zeros((3, 2))
     rows[0, 0] = rows[1, 1] = 1.0
     basis = basis_from_matrices(1e200 * np.eye(2), np.zeros((2, 2)),

@@ -97,7 +97,7 @@ def assert_as_by_steps(seed):
 
 
 def assert_no_contact_missed(seed):
-    """By the law itself there are forces between touch-down and lift-off, and only then."""
+    """By the law itself, forces occur between touch-down and lift-off, and only then."""
     system, state, end = random_system(np.random.default_rng(seed))
     run = simulate(system, end, initial=state, outputs=2001, events=ContactEvents(),
                    solver=SERIES, rtol=1e-8)

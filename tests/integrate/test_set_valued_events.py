@@ -109,7 +109,7 @@ def test_strobed_states_of_den_hartogs_oscillator():
 
 
 def test_derivatives_through_the_end_of_slip():
-    """Of a circle about x = 1/2 from (x, v) only x is left: dx = cos(t) dx + sin(t) dv."""
+    """A circle about x = 1/2 from (x, v) keeps only x: dx = cos(t) dx + sin(t) dv."""
     start, end = np.array([1.0, -0.1]), 7.0
     run = fc.simulate(belt(), end, initial=start, solver=STATIC, rtol=1e-11,
                       events=ContactEvents())

@@ -38,7 +38,7 @@ def run_of(system, **options):
 
 
 def assert_as_said(values, said):
-    """That all that is said of a record is so, and of those within."""
+    """Check that constants of a record, and of records within, hold."""
     found = 0
     for field, expected in said.get(type(values), {}).items():
         value = getattr(values, field)

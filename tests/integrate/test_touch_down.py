@@ -109,7 +109,7 @@ def test_motion_along_the_ground_by_rounding_alone_does_not_stop_runs():
 
 @pytest.mark.parametrize("nodes", [3, 4])
 def test_a_free_beam_falls_on_the_ground(nodes):
-    """By symmetry its middle node moves along x in half of the modes, in the others by rounding."""
+    """By symmetry the middle node moves along x in half of the modes, in the others by rounding."""
     body = fc.ElasticBody(fc.generate(fc.Beam(0.2, 0.01)), fc.Material.named("steel"), 0.02)
     basis = fc.modal_basis(body, 8, contact_nodes=nodes, C=fc.Patch("C", 0.01), damping=0.02)
     system = fc.ContactSystem(basis, normal=LinearContact(1e7, damping=300.0), gap=2e-4,
@@ -163,7 +163,7 @@ def pair(nodes, mu, load, gap, spring):
 @pytest.mark.parametrize(("e", "mu", "load"), [
     *product([0.0, 0.5], [0.0, 0.3], [0.0, 10.0, 100.0]), (1.0, 0.0, 0.0), (1.0, 0.3, 100.0)])
 def test_masses_that_start_at_their_stops(e, mu, load):
-    """Their motion along the ground is that of the springs where there is no friction.
+    """The masses' motion along the ground is that of the springs where there is no friction.
 
     The friction of point masses has no effect on their normal accelerations: no start is a paradox.
     """

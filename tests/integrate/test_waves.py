@@ -220,7 +220,7 @@ def test_work_of_the_belt_is_that_of_the_drag(solver):
 
 
 def test_orbit_over_waves_followed_in_their_amplitude():
-    """By collocation, with derivatives to amplitude and wavelength, against a run by scipy."""
+    """Collocation, with derivatives to amplitude and wavelength, against a run by scipy."""
     system = held(friction=ConstantFriction(0.2), load=Load(60.0)).with_(
         **{"ground.amplitude": 0.2 * A})
     field = contact_field(system, ["ground.amplitude", "ground.wavelength"])

@@ -237,6 +237,6 @@ def check_derivatives(law, slip, F, z, p, size, fastest):
 
 
 def assert_near(found, expected, size, name="", part=64.0 * EPS):
-    """Found is expected to round-off of a size."""
+    """Check that two values agree to round-off of a size."""
     error = np.abs(np.asarray(found) - expected)
     assert (error <= part * np.asarray(size)).all(), (name, found, expected)

@@ -197,7 +197,7 @@ def test_default_elements_keep_the_stated_error():
 
 
 def test_cycle_of_four_parameter_iwan_loses_what_its_elements_do():
-    """By the rates of the law, over a harmonic cycle; the elements relax within tau."""
+    """Loss by the rates of the law, over a harmonic cycle; the elements relax within tau."""
     law = joint(12, 1.5)
     x, R, _ = to_and_fro(law, 0.5 * PHI_MAX, 5.0, points=1001)
     assert loss(x, R) == pytest.approx(loss_of_elements(law, 0.5 * PHI_MAX), rel=1e-3)

@@ -190,7 +190,7 @@ def _per_axis(law, v1, v2, F, z, p, force, rates):
 
 @dataclass(frozen=True)
 class PerAxis(OwnSpring):
-    """Not isotropic."""
+    """A law that is not isotropic."""
 
     planar_kernel: ClassVar = _per_axis
 

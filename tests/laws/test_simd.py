@@ -82,7 +82,7 @@ NORMAL = [
     BilateralPolynomial(varied(1e6), varied(1e16), varied(3.0), quadratic_stiffness=1e11,
                         quintic_stiffness=1e26, quadratic_damping=2.0,
                         cubic_damping=varied(0.1)),
-    # Those with branches.
+    # Functions with branches.
     CosineSurface(varied(1e6), varied(1e-5), varied(30.0)),
     GaussianSurface(varied(1e6), varied(1e-5), varied(30.0)),
     BilateralPiecewise((-1e-5, 0.0, 1e-5), (-2.0, 0.0, 1.0), varied(30.0)),

@@ -20,7 +20,7 @@ def phases(count):
 
 
 def test_largest_displacement_is_one_and_drawn_visibly():
-    """Of an ellipse too: x = 3 cos t + 4 sin t and y = sin t, the longer half-axis."""
+    """An ellipse too: x = 3 cos t + 4 sin t and y = sin t, the longer half-axis."""
     field = basis().mode_shapes
     shape = np.zeros((len(field.nodes), 2), dtype=complex)
     shape[3] = 3.0 - 4.0j, -1.0j

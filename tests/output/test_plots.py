@@ -86,7 +86,7 @@ def test_colours_of_a_stress_end_below_a_sharp_peak():
 
 
 def test_words_of_a_stress_stay_within_the_figure():
-    """Of a slender body, whose picture is low."""
+    """A slender body, whose picture is low."""
     nodes, cells, _ = rectangle(1.0, 0.05, 20, 2)
     stress = np.zeros((len(nodes), 4))
     stress[:, 0] = np.linspace(0.0, 1e6, len(nodes)) + 1e7 * (np.arange(len(nodes)) == 3)

@@ -224,7 +224,7 @@ def test_ground_that_turns_and_waves_across(browser, tmp_path):
 
 
 def test_maps_of_heights_lie_below_the_bodies(browser, tmp_path):
-    """Its heights travel with the ground and repeat themselves; the net is bent by them."""
+    """Heights of the map travel with the ground and repeat themselves; the net is bent by them."""
     x, y = np.meshgrid(0.01 * np.arange(8), 0.0075 * np.arange(6), indexing="ij")
     along, across = 2.0 * np.pi * x / 0.08, 2.0 * np.pi * y / 0.045
     heights = 4e-5 * np.cos(along) * np.sin(across) + 2e-5 * np.sin(2.0 * along)

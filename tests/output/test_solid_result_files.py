@@ -225,7 +225,7 @@ def test_frames_for_other_programs_hold_the_same_arrays(tmp_path):
 
 
 def test_fields_of_a_static_solid_go_to_paraview(tmp_path):
-    """Its own weight: the stress zz at the support is -rho g h, by linear interpolation."""
+    """Load by its own weight: the stress zz at the support is -rho g h, by linear interpolation."""
     body = block_body((2, 2, 2), (0.1, 0.1, 0.1), fixed={"top": "z", "left": "x", "front": "y"},
                       material=fc.Material(youngs_modulus=2e11, poisson_ratio=0.0, density=8000.0))
     found = fc.static_solution(body, fc.Load(gravity=(0.0, 0.0, -10.0)))

@@ -306,7 +306,7 @@ def test_sliding_of_interfaces_is_read_without_the_laws(tmp_path):
 
 
 def test_sliding_that_is_damaged_in_a_file_is_told(tmp_path):
-    """Of a run whose laws are not read, too."""
+    """Also for a run whose laws are not read."""
     (tmp_path / "own.py").write_text(LAW)
     own = user_module(tmp_path / "own.py")
     system = fc.ContactSystem(

@@ -112,7 +112,7 @@ def test_other_files_are_no_matrices(tmp_path, suffix):
 
 
 def test_equations_of_ansys():
-    """Of the example of the reader's package, whose frequencies Ansys gives as these [Hz]."""
+    """Matrices of an example of the reader's package; Ansys gives these frequencies [Hz]."""
     examples = pytest.importorskip("ansys.mapdl.reader.examples")
     K, M = (read_matrix(examples.fullfile, name) for name in ("STIFFNESS", "mass"))
     basis = basis_from_matrices(M, K, {}, modes=4, dimension=3)
@@ -128,7 +128,7 @@ def test_equations_of_ansys():
 
 @pytest.mark.filterwarnings("ignore")  # of the reader
 def test_modes_of_ansys():
-    """Of the reader's example, a free bar, beside this package's on the mesh of its archive."""
+    """Modes of the reader's example, a free bar, beside this package's on its mesh."""
     examples = pytest.importorskip("ansys.mapdl.reader.examples")
     modes, hertz, places = (read_matrix(examples.rstfile, name)
                             for name in ("MODES", "frequencies", "PLACES"))

@@ -45,7 +45,7 @@ def residual_compliance(body, rows, modes):
 @pytest.mark.parametrize(("fixed", "hexahedra"), [
     ({}, False), ({"top": "xyz"}, False), ({"left": "x"}, False), ({}, True)])
 def test_what_linear_elements_lack_is_estimated(fixed, hexahedra):
-    """They lack something, less with each layer, and no more than the estimate, mostly less."""
+    """Linear elements lack less with each layer, and no more than the estimate, mostly less."""
     body = column(fixed, hexahedra)
     system, rows = FreeSystem.of(body, "iterative"), loaded_rows(body)
     modes = free_modes(FreeSystem.of(body, "direct"), 12)
@@ -75,7 +75,7 @@ def high_column(held):
 
 @cache
 def reduced(held, tolerance, eigensolver="direct"):
-    """Its basis with residual vectors."""
+    """Modal basis with residual vectors."""
     options = {"contact": "contact", "contact_nodes": 25, "points": {"side": (0.8, 0.4, 0.9)},
                "loads": ["gravity", "left"], "reduction": "residual"}
     if not held:
@@ -87,7 +87,7 @@ def reduced(held, tolerance, eigensolver="direct"):
 @pytest.mark.parametrize(("room", "layers"), [(3e9, (2, 4, 6)), (0.0, (2, 4, 6)), (3e9, ())])
 @pytest.mark.parametrize("held", ["", "top"])
 def test_no_row_lacks_more_than_the_tolerance(room, layers, held, monkeypatch):
-    """By the compliance by factors, with few vectors more; among few displacements or all."""
+    """Compliance against that by factors, with few vectors more; with few displacements or all."""
     monkeypatch.setattr(residual_vectors, "_LARGE", 0)
     monkeypatch.setattr(iterated, "_ROOM", room)
     monkeypatch.setattr(iterated, "_LAYERS", layers)

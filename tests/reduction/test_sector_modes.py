@@ -135,7 +135,7 @@ def uneven_sector(sectors, radial=4):
 
 @pytest.mark.parametrize("fixed", [{}, {"left": "xy"}])
 def test_tied_faces_of_other_meshes(fixed):
-    """They agree with matching ones, the better the finer; without tied they are refused."""
+    """Tied faces agree with matching ones, the better the finer; without tied they are refused."""
     N = 6
     matching = ElasticBody(ring_sector(N, 4, 6, wavy=0.0), STEEL, fixed=fixed)
     expected = sector_modes(matching, ring_symmetry(N), 4)

@@ -79,7 +79,7 @@ def test_waves_of_a_disc_differ_by_its_turns(disc):
 
 
 def test_a_spring_that_stands_on_a_disc(disc):
-    """Its two waves with w = a cos + b sin: (w^2 - n^2 W^2) +- 2 n W between them, c at a place.
+    """Two waves with w = a cos + b sin: (w^2 - n^2 W^2) +- 2 n W between them, c at a place.
 
     Beyond w / n a wave that runs backwards stands still or is carried forwards.
     """
@@ -149,7 +149,7 @@ def test_orbits_of_a_disc_that_turns(disc):
 
 
 def test_a_disc_that_turns_under_a_pad_that_stands(disc, tmp_path):
-    """Its coordinates alone have Coriolis terms; the pad rests on it with its load."""
+    """Only the disc's coordinates have Coriolis terms; the pad rests on it with its load."""
     rim = {"rim": (0.2, 0.0, 0.01)}
     turning = modal_basis(disc, 12, contact=(), points=rim, rotation=standing(W))
     pad = basis_from_matrices(0.5 * np.eye(3), np.diag([1e6, 1e6, 0.0]), {"P": np.vstack([

@@ -104,7 +104,7 @@ def test_members_of_lists_and_kept_bodies(study):
 
 
 def test_cases_are_known_by_what_they_are(study, tmp_path):
-    """Not by how they were asked for: the same speeds are not computed again."""
+    """The way of asking does not matter: the same speeds are not computed again."""
     folder = tmp_path / "f"
     first = sweep(study, {"ground.speed": [1e-3, 2e-3]}, Serial(), folder=folder)
     second = sweep(study.with_(**{"ground.speed": 0.5}),

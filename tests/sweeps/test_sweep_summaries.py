@@ -154,7 +154,7 @@ def test_every_summary_has_a_sentence_a_unit_and_a_finite_value(run):
 
 
 def test_number_of_periods(run):
-    """Of a motion with half the frequency of the drive in it, and of one that drifts."""
+    """A motion with half the frequency of the drive in it, and one that drifts."""
     t = np.linspace(0.0, 60.0, 60 * 16 + 1)
     q, rate = np.zeros((len(t), 5)), np.zeros((len(t), 5))
     for k, size in ((1.0, 1.0), (0.5, 0.3)):

@@ -98,7 +98,7 @@ class Model:
         return np.concatenate([rate, total])
 
     def jacobian(self, t, y):
-        """By complex steps: exact to round-off."""
+        """Jacobian by complex steps: exact to round-off."""
         step = 1e-30
         return np.column_stack([
             self.rhs(t, y + 1j * step * direction).imag / step for direction in np.eye(len(y))])

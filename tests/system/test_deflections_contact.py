@@ -48,7 +48,7 @@ def blocks(dimension, degree):
 @pytest.mark.parametrize("state", ["open", "smooth", "stuck", "sliding"])
 @pytest.mark.parametrize(("dimension", "degree"), [(2, 1), (2, 2), (3, 1), (3, 2)])
 def test_the_tangent_is_the_derivative_of_the_forces(dimension, degree, state):
-    """By differences, of turned and strained bodies; forces balance, and do work on the energy."""
+    """Differences for turned and strained bodies; forces balance, and do work on the energy."""
     bodies, faces = blocks(dimension, degree)
     friction = {"stuck": JenkinsFriction(1e8, 50.0), "sliding": JenkinsFriction(1e12, 0.01)}
     interface = Interface("seam", pair_faces(bodies, *faces, nodes_on="face"),
@@ -254,7 +254,7 @@ def test_friction_on_the_ground_is_that_of_a_cone():
 
 
 def test_energy_is_the_work_of_the_load_and_the_loss():
-    """Of two cantilevers that slide along each other while they bend."""
+    """Two cantilevers that slide along each other while they bend."""
     bodies, interface = stacked(12, normal=LinearContact(1e8), friction=ConstantFriction(0.5))
     load = Load(boundaries=(BoundaryLoad("high.top", pressure=4.0 * EI / L**3 / B),))
     paths = deflection_path(bodies, load, interfaces=[interface],

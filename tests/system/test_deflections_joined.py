@@ -57,7 +57,7 @@ def elastica_on_a_stop(line, gap):
 
 
 def test_a_cantilever_bends_onto_a_stop():
-    """Its end, deflected by 0.3 L, lies on smooth ground, along which it moves inwards."""
+    """The beam's end, deflected by 0.3 L, lies on smooth ground, along which it moves inwards."""
     line, gap, columns = 8.0 * EI / L**3, 0.3 * L, 48
     force, (x, y) = elastica_on_a_stop(line, gap)
     body = ElasticBody(rectangle(L, H, columns, 1), STEEL, fixed={"left": "xy"}, thickness=B)
@@ -87,7 +87,7 @@ def test_energy_is_the_work_of_the_load_on_a_stop():
 
 
 def test_contact_forces_are_derivatives_of_the_stored_energy():
-    """Of nodes on a face that a coupling turns, with a law that is not linear, by differences."""
+    """Nodes on a face that a coupling turns, with a law that is not linear, by differences."""
     mesh = block_mesh((3, 2, 2), (0.1, 0.04, 0.03))
     body = ElasticBody(Mesh(mesh.nodes, mesh.cells, mesh.boundaries, constraints=(
         Coupling("contact", "hub", (0.05, 0.01, 0.0)),)), STEEL, fixed={"top": "xyz"}, degree=1)

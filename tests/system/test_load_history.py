@@ -52,7 +52,7 @@ def chain(k=1e4, friction=None, forces=0.0):
 
 
 def test_loop_of_a_jenkins_element():
-    """Its loss is 4 mu F (X - mu F / k), however many increments there are."""
+    """The loss is 4 mu F (X - mu F / k) for any number of increments."""
     k, mu, F, X = 2e4, 0.4, 10.0, 5e-4
     losses = []
     for steps in (1, 7):

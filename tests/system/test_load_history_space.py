@@ -316,7 +316,7 @@ def test_work_is_stored_or_lost(ground):
 @pytest.mark.parametrize("friction", [JenkinsFriction(4e5, 0.4),
                                       IwanFriction(4e5, 0.4, elements=4)])
 def test_the_matrix_is_the_derivative_of_the_balance(ground, friction):
-    """By differences, with nodes that stick and nodes that slide in any direction."""
+    """Derivatives by differences, with nodes that stick and nodes that slide in any direction."""
     system = table(GROUNDS[ground], friction)
     arrays, n, m = travelling(system), 4, 6
     sliders = sliders_of(system, 0.82, None, np.full(n, 1e7))

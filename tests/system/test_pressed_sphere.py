@@ -37,7 +37,7 @@ def test_two_elements_along_the_radius(coarse):
 
 
 def test_the_loop_is_closed_and_symmetric(coarse):
-    """By Masing: the forces come back, and both ways lose the same."""
+    """Masing's rule: the forces come back, and both ways lose the same."""
     history = coarse.history
     there, back = history.loss[np.array([2, 3]) * ps.STEPS] - history.loss[
         np.array([1, 2]) * ps.STEPS]

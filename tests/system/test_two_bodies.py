@@ -75,7 +75,7 @@ def test_bars_part_as_their_waves_say(second):
 
 
 def test_the_force_between_bars_is_half_of_their_impedance_times_speed():
-    """Its mean is the momentum (1 + e) / 2 over the contact time."""
+    """The mean force is the momentum (1 + e) / 2 over the contact time."""
     found = colliding_bars.collision(1.0, 30)
     restitution, duration = colliding_bars.closed_form(found)
     period = 2.0 * colliding_bars.LENGTH / colliding_bars.WAVE_SPEED

@@ -93,7 +93,7 @@ def test_loop_is_that_of_increments_without_time(found):
 
 
 def test_many_rings_converge():
-    """By increments alone: the force to 1e-4, the loss to 0.15 % with 44 rings."""
+    """Increments alone: the force to 1e-4, the loss to 0.15 % with 44 rings."""
     exact, system = ts.ClosedForm(ts.RATIO), ts.spheres(44)
     state = np.zeros(system.size)
     state[: system.basis.modes] = fc.equilibrium(system).modal_coordinates

@@ -61,7 +61,7 @@ def test_a_column_that_does_not_reach_the_ground_is_free_of_stress():
 
 
 def test_two_columns_press_each_other():
-    """Of aluminium, warm, below one of steel, cold: a run settles at their equilibrium."""
+    """A column of aluminium, warm, below one of steel, cold: a run settles at their equilibrium."""
     bodies = {"below": column({"bottom": "y", "corner": "x"}, ALUMINIUM),
               "above": column({"top": "y", "above": "x"}, height=HEIGHT)}
     pairing = pair_faces(bodies, "above.bottom", "below.top")

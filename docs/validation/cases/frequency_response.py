@@ -38,7 +38,7 @@ def hardening(t: float, x: np.ndarray, p: np.ndarray, out: np.ndarray) -> None:
 
 
 def responses(quick: bool) -> tuple[FrequencyResponse, FrequencyResponse]:
-    """Of the damped mass and of the hardening spring."""
+    """Responses of the damped mass and of the hardening spring."""
     samples, forces = (256, [0.5, 1.0]) if quick else (512, [0.2, 0.3, 0.5, 0.75, 1.0])
     friction = frequency_response(
         damped_mass(), (0.11, 0.24), levels={"drive.amplitude_x": forces},

@@ -132,13 +132,13 @@ class PressedSphere:
 
     @property
     def approach(self) -> float:
-        """Of a half-space [m]."""
+        """Approach of a half-space [m]."""
         found = -float(self.basis.point_row("C", "z") @ self.history.modal_coordinates[0])
         return found - self.beyond(2) * self.exact.load
 
     @property
     def displacement(self) -> float:
-        """Of a half-space under Q [m]."""
+        """Displacement of a half-space under Q [m]."""
         found = float(self.basis.point_row("C", "x") @ self.history.modal_coordinates[STEPS])
         return found - self.beyond(0) * self.part * MU * self.exact.load
 
@@ -152,7 +152,7 @@ class PressedSphere:
 
     @property
     def loss(self) -> float:
-        """Of the cycle [J]."""
+        """Loss of the cycle [J]."""
         return self.history.loop(1, 3).loss
 
 
@@ -201,7 +201,7 @@ def half_space(cells: int, parts: np.ndarray, across: bool) -> np.ndarray:
     step = 1.0 / np.linalg.eigvalsh(stiffness)[-1]
     slip, moved, found = np.zeros(shape), np.zeros(shape), []
     for part in parts:
-        # Where the closed form is; 3 mu P S / (16 a) is 3 pi (2 - nu) / 4 of the unit for one body.
+        # Value of the closed form; 3 mu P S / (16 a) is 3 pi (2 - nu) / 4 of the unit for one body.
         moved[0] = 0.375 * np.pi * (2.0 - RATIO) * (1.0 - (1.0 - part) ** (2.0 / 3.0))
         before, guess, weight = slip.copy(), slip.copy(), 1.0
         # The work of slip and the elastic energy are least; by accelerated proximal gradients.

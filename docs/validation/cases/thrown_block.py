@@ -59,7 +59,7 @@ class Throw:
 
     @cached_property
     def stop(self) -> float:
-        """When it sticks, from the straight line of the speed over the belt [s]."""
+        """Time at which it sticks, from the straight line of the speed over the belt [s]."""
         speed = np.linalg.norm(self.velocities - BELT, axis=1)
         sliding = (speed > 0.1 * SPEED) & (self.run.time > 0.05)
         slope, start = np.polyfit(self.run.time[sliding], speed[sliding], 1)
@@ -72,7 +72,7 @@ class Throw:
 
     @property
     def excess(self) -> float:
-        """How much further on the belt than d it came [m]."""
+        """Way on the belt beyond d [m]."""
         end = self.places[-1] - BELT * self.run.time[-1]
         return float(end @ RELATIVE / SPEED - 0.5 * SPEED * STOP)
 
@@ -134,7 +134,7 @@ def excess(smoothing: Smoothing, slope: float) -> float:
 
 
 def lean(throw: Throw) -> np.ndarray:
-    """How far the centre of pressure (N, 2) lies from the middle of the block [m]."""
+    """Distance of the centre of pressure (N, 2) from the middle of the block [m]."""
     force = throw.run.normal_force
     places = throw.run.system.basis.contact_places[:, :2]
     return force @ (places - places.mean(axis=0)) / force.sum(axis=1, keepdims=True)

@@ -65,7 +65,7 @@ class ClosedForm:
 
     @property
     def approach(self) -> float:
-        """Of distant points of the spheres, 2 a^2 / R [m]."""
+        """Approach of distant points of the spheres, 2 a^2 / R [m]."""
         return 2.0 * WIDTH**2 / RADIUS
 
     @property
@@ -190,7 +190,7 @@ class Cycle:
 
     @property
     def approach(self) -> float:
-        """Of distant points along the normal [m]."""
+        """Approach of distant points along the normal [m]."""
         return -float(self.run.displacement("C")[0, 2])
 
     @property
