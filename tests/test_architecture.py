@@ -1,4 +1,4 @@
-"""The rooms of the package and the one way in which they import each other.
+"""The subpackages and the one way in which they import each other.
 
 This is what docs/architecture.md says, read from the sources: also imports inside functions and
 those for types alone count.
@@ -14,7 +14,7 @@ import pytest
 PACKAGE = Path(__file__).resolve().parent.parent / "fecontact"
 ROOMS = ("core", "fem", "laws", "reduction", "system", "integrate", "analysis", "bifurcation",
          "measured", "output", "study", "sweeps", "fitting", "cli")
-# Rooms that do not know each other, although the one stands above the other.
+# Subpackages that do not import each other, although the one stands above the other.
 STRANGERS = {("laws", "fem"), ("study", "output")}
 # Modules that hold nothing but public names under which people look for them.
 NAMESPACES = {"plot", "io"}

@@ -222,7 +222,7 @@ def start(field, harmonics, samples):
 
 
 def test_nodes_without_elements_have_no_deflection():
-    """Beside a node with two of them; whatever the room held before."""
+    """A node beside one with two elements; earlier contents of the workspace do not matter."""
     rows = np.zeros((2, 3, 2))
     rows[0, 0, 0] = rows[1, 0, 1] = 1.0
     basis = fc.basis_from_matrices(np.eye(2), np.diag([1.0, 2.0]), {

@@ -389,7 +389,7 @@ def test_ensembles():
                             outputs=times))
     for states, single in zip(found.states, singles, strict=True):
         assert states == pytest.approx(single.states, rel=1e-7, abs=1e-12)
-    # One after the other from the same system, which takes the room of the first.
+    # One after the other from the same system, which takes the workspace of the first.
     twice = fc.ensemble([systems[1]] * 2, times, initial=np.zeros(4), rtol=1e-8, solver=LONG)
     assert (twice.states[0] == twice.states[1]).all()
 

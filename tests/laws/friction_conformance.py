@@ -131,7 +131,7 @@ def _check_memory_point(law, v, F, z, p):
     force, rates = memory_outputs(law, v, F, z, p)
     assert np.isfinite(force).all()
     assert np.isfinite(rates).all()
-    # Rooms larger than its own, as in systems of several laws: the rest stays untouched.
+    # Work arrays larger than its own, as in systems of several laws: the rest stays untouched.
     wide_force, wide_rates = np.full(5 + s, 7.0), np.full((s + 2, 5 + s), 7.0)
     _compiled_memory(law.kernel.address, v, F, z, p, wide_force, wide_rates)
     np.testing.assert_allclose(wide_force[: 3 + s], force, rtol=1e-8, atol=1e-9 * abs(force[0]))
