@@ -57,7 +57,8 @@ _MADE_FROM: Mapping[str, Callable[["StudyModels"], Any]] = {
     "_bases": lambda study: (study.bodies, study.links, _MADE_FROM["_pairings"](study)),
     "_reduced": lambda study: (study.geometry, study.body, study.basis,
                                study.load if study.basis.prestress else None,
-                               _MADE_FROM["_bases"](study), _MADE_FROM["_wheel"](study)),
+                               _MADE_FROM["_bases"](study),
+                               None if study.symmetry is None else _MADE_FROM["_wheel"](study)),
 }
 
 

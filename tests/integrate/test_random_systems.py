@@ -36,7 +36,8 @@ def test_equations_are_those_of_the_package(systems):
             size = np.maximum(np.abs(expected), 1e-3 * np.abs(expected).max())
             assert (np.abs(found - expected) / size).max() < 1e-8, (number, case.names)
     assert met == {*systems.NORMAL, *law_names()[FrictionLaw], "cubic spring"}
-    assert len(systems.NORMAL) == len(law_names()[NormalLaw]) - 1
+    # Without the contact element of two laws and the rigid stop.
+    assert len(systems.NORMAL) == len(law_names()[NormalLaw]) - 2
 
 
 def test_errors_at_the_default_tolerance(systems):

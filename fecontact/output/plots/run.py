@@ -18,8 +18,6 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.run_diagrams import (
     AXES,
-    Curve,
-    Diagram,
     energy_diagrams,
     force_diagrams,
     labelled,
@@ -140,9 +138,9 @@ def plot_phase(
         x, v = trajectory.displacement(point)[:, row], trajectory.velocity(point)[:, row]
         unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
         plane.set_xlabel(f"displacement {component} [{symbol}]")
-        velocity = Diagram(f"velocity {component}", "m/s", (Curve("", COLOURS[0], v, 1.0),))
-        velocity.draw(plane, x / unit)
-        factor, _ = velocity.scale
+        factor, symbol = suitable_unit(float(np.abs(v).max()), "m/s")
+        plane.set_ylabel(f"velocity {component} [{symbol}]")
+        plane.plot(x / unit, v / factor, color=COLOURS[0], linewidth=1.0)
         plane.plot(x[-1] / unit, v[-1] / factor, "o", color=COLOURS[1], label="end of the run")
         speed = _ground_speed(trajectory, row)
         # The speed of a much faster ground would flatten the curve.

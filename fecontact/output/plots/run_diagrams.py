@@ -84,10 +84,11 @@ def motion_diagrams(
     Without the curves of points that do not move along an axis.
     """
     d = run.system.basis.dimension
+    motions = {what: [getattr(run, what)(point)[:, :d] for point in points]
+               for what in ("displacement", "velocity")}
     names, colours = [labelled(point, run) for point in points], distinct_colours(len(points))
     found: dict[tuple[str, int], Diagram] = {}
-    for what, unit in (("displacement", "m"), ("velocity", "m/s")):
-        values = [getattr(run, what)(point)[:, :d] for point in points]
+    for (what, values), unit in zip(motions.items(), ("m", "m/s"), strict=True):
         largest = max((float(np.abs(one).max()) for one in values), default=0.0)
         for axis in range(d):
             found[what, axis] = Diagram(f"{what} {AXES[axis]}", unit, tuple(
