@@ -137,8 +137,9 @@ def test_plots_take_a_style(tmp_path):
             pass
 
 
-def test_phase_plane_is_velocity_over_displacement_with_the_ground():
-    trajectory = run(times=101)
+@pytest.mark.parametrize("times", [101, 9001])
+def test_phase_plane_is_velocity_over_displacement_with_the_ground(times):
+    trajectory = run(times=times)
     figure = plot_phase(trajectory, 2, "x")
     plane = figure.axes[0]
     assert (plane.get_xlabel(), plane.get_ylabel()) == ("displacement x [µm]", "velocity x [mm/s]")

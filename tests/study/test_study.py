@@ -592,3 +592,9 @@ def test_a_temperature_is_a_load_of_the_body(tmp_path):
     assert moved.temperature == pytest.approx(80.0)
     strain = np.ptp(moved.displacement[:, 0]) / 0.1
     assert strain == pytest.approx(Material.named("aluminium").thermal_expansion * 80.0, rel=1e-6)
+
+
+def test_a_basis_stays_while_drive_and_load_change(tiny):
+    basis = tiny.modal_basis()
+    for name, value in (("drive.frequency_hz", 7.0), ("load.normal", 3.0), ("ground.speed", 0.5)):
+        assert tiny.with_(**{name: value}).modal_basis() is basis
