@@ -4,7 +4,7 @@ A wheel of blades from one sector: nodal diameters, rotation, friction between t
 
 The sector of a plane wheel is a piece of a ring with one blade. Its modes are those of the whole
 wheel, by nodal diameters; at speed, waves that run forwards and backwards differ. Then the blades
-rub on each other at their tips under an engine order: pressed lightly they slide, pressed hard they
+touch each other at their tips under an engine order: pressed lightly they slide, pressed hard they
 stick, and in between friction takes most. One blade stands for the wheel.
 """
 

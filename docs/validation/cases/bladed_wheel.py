@@ -2,7 +2,7 @@
 
 The sector of a plane wheel is a piece of a ring with one blade. Its modes are those of the whole
 wheel, by nodal diameters; at speed, waves that run forwards and backwards differ. Then blades
-alone, clamped at the root, rub on each other at the tips under engine order m. Pressed hard they
+alone, clamped at the root, slide on each other at the tips under engine order m. Pressed hard they
 stick: each mode of a blade feels the springs k_t of both contacts,
 
     4 k_t sin^2(pi m / N),

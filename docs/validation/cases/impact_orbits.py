@@ -187,11 +187,11 @@ def all_doubled(
 
 def special(branches: Sequence[Branch]) -> Iterator[tuple[int, BranchPoint]]:
     """Periods and point of all special points, once each."""
-    told: list[Array] = []
+    seen: list[Array] = []
     for branch in branches:
         for point in branch.special:
-            if point.kind != "period halving" and not known(point, told):
-                told.append(place(point))
+            if point.kind != "period halving" and not known(point, seen):
+                seen.append(place(point))
                 yield periods(branch), point
 
 

@@ -37,22 +37,22 @@ def stall_reason(field: VectorField, branch: Branch) -> str:
     closed = np.count_nonzero(force > 0.0, axis=0)
     opens = (closed > 0) & (closed < N)
     error = float(last.values["truncation_error"])
-    told = [branch.message] if branch.message else []
+    said = [branch.message] if branch.message else []
     if opens.any():
         fewest = int(np.minimum(closed, N - closed)[opens].min())
-        told.append(
+        said.append(
             f"Contact opens and closes at {np.count_nonzero(opens)} of {len(closed)} nodes, for "
             f"{fewest} of {N} samples at the least.")
         if fewest < _ENOUGH:
             needed = 2 ** int(np.ceil(np.log2(_ENOUGH * N / fewest)))
-            told.append(f"Take samples = {needed}, or a softer contact.")
+            said.append(f"Take samples = {needed}, or a softer contact.")
     if error > _LARGE:
-        told.append(f"The truncation error is {error:.2g} with {branch.attributes['harmonics']} "
+        said.append(f"The truncation error is {error:.2g} with {branch.attributes['harmonics']} "
                     f"harmonics: take more, or damp the modes that they excite.")
     if isinstance(field, WaveField):
         if np.isnan(error):
-            told.append("The truncation error is not known, as the wheel lacks nodal diameters of "
+            said.append("The truncation error is not known, as the wheel lacks nodal diameters of "
                         "further harmonics: make it with all.")
         if opens.any():
-            told.append(NO_WAVE)
-    return " ".join(told)
+            said.append(NO_WAVE)
+    return " ".join(said)
