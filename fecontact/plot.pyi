@@ -1,4 +1,5 @@
 from .fitting.plots import plot_fit, plot_profile
+from .output.diagrams.colours import COLOURS, STATE_COLOURS
 from .output.plots.amplitude_curve import plot_amplitude_curve
 from .output.plots.analysis import (
     plot_friction_work,
@@ -23,7 +24,6 @@ from .output.plots.responses.nonlinear_modes import plot_nonlinear_mode, plot_re
 from .output.plots.responses.response import plot_response
 from .output.plots.run import plot_energies, plot_history, plot_phase
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
-from .output.plots.style import COLOURS, STATE_COLOURS
 from .output.plots.wear import plot_wear
 from .output.render.mode_movie import render_mode
 from .output.render.movie import picture

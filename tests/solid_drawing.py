@@ -131,8 +131,8 @@ def solid_header(drawn, payload, scale=50.0):
     """The header of its page."""
     force = drawn.contact.forces[:, :, 2].sum(axis=1)
     chart = {"title": "total normal force", "unit": "N", "factor": 1.0,
-             "lines": [{"name": "contact", "colour": "#0072b2"}],
-             "values": payload.add(force[:, None], 1e-4 * force.max())}
+             "lines": [{"name": "contact", "colour": "#0072b2",
+                        "y": payload.add(force, 1e-4 * force.max())}]}
     box = drawn.motions.box(scale)
     return {"format": 2, "title": "Block in space", "status": "synthetic", "good": True,
             "notes": [], "facts": [], "numbers": [], "system": [], "study": [], "versions": [],

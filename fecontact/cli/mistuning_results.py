@@ -13,8 +13,8 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.files.atomic_write import write_text
 from fecontact.core.files.csv_text import csv_text
 from fecontact.core.tables import located
+from fecontact.output.diagrams.colours import COLOURS
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.style import COLOURS
 from fecontact.reduction.cyclic.cyclic_basis import CyclicBasis
 from fecontact.reduction.cyclic.whole_wheel import WholeWheel
 from fecontact.sweeps.mistuning import MistuningSweep, mistuning_sweep

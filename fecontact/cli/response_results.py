@@ -136,9 +136,10 @@ def response_table(
     """Table of peaks and special points of all levels; those above ``usable_hz`` are marked."""
     from fecontact.cli.tables import table
     from fecontact.core.units import quantity
-    from fecontact.output.plots.responses.response import drawn, drawn_label, level_texts
+    from fecontact.output.diagrams.branches import drawn, drawn_label, level_texts
+    from fecontact.output.diagrams.labels import name_and_unit
 
-    label, _, unit = drawn_label(response).removesuffix("]").rpartition(" [")
+    label, unit = name_and_unit(drawn_label(response))
     # The frequency of the response is then the same.
     over_frequency = response.parameter_name.endswith("frequency_hz")
     name, texts = ("", [""]) if response.level_name is None else level_texts(response)

@@ -14,6 +14,7 @@ UNITS = {
     "rad/s": ((1e-3, "mrad/s"), (1.0, "rad/s")),
     "s": ((1e-6, "µs"), (1e-3, "ms"), (1.0, "s")),
     "N": ((1e-3, "mN"), (1.0, "N"), (1e3, "kN")),
+    "N m": ((1e-6, "µN m"), (1e-3, "mN m"), (1.0, "N m"), (1e3, "kN m")),
     "N/m": ((1.0, "N/m"), (1e3, "N/mm"), (1e6, "kN/mm")),
     "Pa": ((1.0, "Pa"), (1e3, "kPa"), (1e6, "MPa"), (1e9, "GPa")),
     "W": ((1e-6, "µW"), (1e-3, "mW"), (1.0, "W"), (1e3, "kW")),
@@ -44,8 +45,7 @@ def suitable_unit(size: float, unit: str) -> tuple[float, str]:
     size : float
         Largest magnitude to show, in ``unit``; zero gives ``unit`` itself.
     unit : str
-        SI unit: m, m/s, rad, rad/s, s, Hz, N, N/m, Pa, W, J, J/m or
-        J/m^2.
+        SI unit: m, m/s, rad, rad/s, s, Hz, N, N m, N/m, Pa, W, J, J/m or J/m^2.
 
     Returns
     -------

@@ -10,9 +10,9 @@ from fecontact.core.checks import require_kind
 from fecontact.core.types import Array
 from fecontact.fitting.profile import ProfileLikelihood
 from fecontact.fitting.result import Fit
+from fecontact.output.diagrams.colours import COLOURS, DASHES
+from fecontact.output.plots.drawing import name_axis
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import name_axis
-from fecontact.output.plots.style import COLOURS, DASHES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

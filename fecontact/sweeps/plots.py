@@ -10,9 +10,9 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, require_choice
 from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
+from fecontact.output.diagrams.colours import COLOURS, distinct_colours
+from fecontact.output.plots.drawing import name_axis
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import name_axis
-from fecontact.output.plots.style import COLOURS, distinct_colours
 from fecontact.study.study import Study
 from fecontact.sweeps.statistics import SobolIndices
 from fecontact.sweeps.summaries import unit_of

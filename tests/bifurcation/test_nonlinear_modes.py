@@ -433,7 +433,7 @@ def test_picture_shows_frequency_over_amplitude(resonant, tmp_path):
     figure = plot.plot_nonlinear_mode(mode, path=tmp_path / "mode.png")
     upper, lower = figure.axes
     assert {line.get_linestyle() for line in lower.lines} == {"-", "--"}
-    assert lower.get_ylabel() == "energy [J]"
+    assert lower.get_ylabel() == "energy [kJ]"
     drawn = np.concatenate([line.get_ydata() for line in upper.lines])
     assert drawn.max() == pytest.approx(mode.frequency_hz.max())
     damped = nonlinear_mode(jenkins_system(), (0.5, 6.0), method=HarmonicBalance(1, 128))

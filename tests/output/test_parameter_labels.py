@@ -13,9 +13,10 @@ from fecontact.bifurcation import Branch, contact_field, equilibrium_branch, obs
 from fecontact.core.docstrings import documented
 from fecontact.io import read_branches, write_branches
 from fecontact.laws import Constant, Harmonic
+from fecontact.output.diagrams.branches import level_texts
+from fecontact.output.diagrams.labels import branch_label
+from fecontact.output.plots.drawing import name_axis
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import branch_label, name_axis
-from fecontact.output.plots.responses.response import level_texts
 from fecontact.plot import plot_branches, plot_eigenvalues, plot_sweep
 from fecontact.sweeps import SweepTable
 from fecontact.system.parameter_labels import _classes, _units_of, parameter_label

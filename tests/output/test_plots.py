@@ -12,7 +12,8 @@ import fecontact
 from fecontact import InputError, Trajectory, basis_from_matrices
 from fecontact.fem import BodyFields
 from fecontact.integrate import Energies
-from fecontact.output.plots import run_diagrams as plots
+from fecontact.output.diagrams.colours import ENERGY_COLOURS
+from fecontact.output.diagrams.diagram import thinned
 from fecontact.plot import (
     STATE_COLOURS,
     plot_contact_map,
@@ -46,8 +47,8 @@ def test_history_shows_each_point_in_suitable_units():
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
     assert legend == ["B", "contact node 0", "(0.2, 0.02) m"]
     line = figure.axes[2].lines[1]
-    np.testing.assert_allclose(line.get_xdata(), 1e3 * trajectory.time)
-    np.testing.assert_allclose(line.get_ydata(), 1e6 * trajectory.displacement(0)[:, 1])
+    np.testing.assert_allclose(line.get_xdata(), trajectory.time)
+    np.testing.assert_allclose(line.get_ydata(), trajectory.displacement(0)[:, 1])
     np.testing.assert_allclose(figure.axes[4].lines[0].get_ydata(),
                                trajectory.normal_force.sum(axis=1))
 
@@ -64,7 +65,7 @@ def test_history_leaves_out_what_stays_zero():
                                   modal_velocities=rate), ["C"])
     assert labels(figure) == ["displacement y [µm]", "velocity y [mm/s]", "total normal force [N]"]
     assert figure.axes[2].get_xlabel() == "time [ms]"
-    np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(), 1e6 * still[:, 1])
+    np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(), still[:, 1])
 
 
 def test_colours_of_a_stress_end_below_a_sharp_peak():
@@ -143,9 +144,9 @@ def test_phase_plane_is_velocity_over_displacement_with_the_ground(times):
     figure = plot_phase(trajectory, 2, "x")
     plane = figure.axes[0]
     assert (plane.get_xlabel(), plane.get_ylabel()) == ("displacement x [µm]", "velocity x [mm/s]")
-    np.testing.assert_allclose(plane.lines[0].get_xdata(), 1e6 * trajectory.displacement(2)[:, 0])
-    np.testing.assert_allclose(plane.lines[0].get_ydata(), 1e3 * trajectory.velocity(2)[:, 0])
-    assert list(plane.lines[2].get_ydata()) == [20.0, 20.0]  # the belt runs at 0.02 m/s
+    np.testing.assert_allclose(plane.lines[0].get_xdata(), trajectory.displacement(2)[:, 0])
+    np.testing.assert_allclose(plane.lines[0].get_ydata(), trajectory.velocity(2)[:, 0])
+    assert list(plane.lines[2].get_ydata()) == [0.02, 0.02]
     assert len(plot_phase(trajectory, "B", "y").axes[0].lines) == 2
     with pytest.raises(InputError, match="component = 'z'"):
         plot_phase(trajectory, "B", "z")
@@ -298,8 +299,8 @@ def test_energies_leave_out_what_is_zero():
     shown = [[text.get_text() for text in axis.get_legend().get_texts()] for axis in figure.axes]
     assert shown == [["kinetic", "elastic", "contact", "total"], ["friction", "total"]]
     np.testing.assert_allclose(figure.axes[0].lines[0].get_ydata(),
-                               1e3 * trajectory.energies.kinetic)
-    np.testing.assert_allclose(figure.axes[1].lines[0].get_ydata(), 1e3 * work[:, powers.FRICTION])
+                               trajectory.energies.kinetic)
+    np.testing.assert_allclose(figure.axes[1].lines[0].get_ydata(), work[:, powers.FRICTION])
 
 
 def test_modes_are_titled_by_their_frequencies():
@@ -321,27 +322,27 @@ def test_modes_are_titled_by_their_frequencies():
 
 def test_colours_of_energies_tell_where_they_are():
     named = {entry.name for entry in fields(Energies)} - {"rounding"}
-    assert set(plots.ENERGY_COLOURS) == named
+    assert set(ENERGY_COLOURS) == named
     panels = (("kinetic", "elastic", "drive_spring", "contact", "bristles"),
               ("drive_work", "belt_normal_work", "belt_friction_work", "load_work",
                "circulatory_work", "bristle_work"),
               ("modal_damping", "dashpots", "contact_damping", "friction"))
     for names in panels:
-        assert len({plots.ENERGY_COLOURS[name] for name in names}) == len(names)
+        assert len({ENERGY_COLOURS[name] for name in names}) == len(names)
 
 
 def test_long_lines_are_thinned_without_losing_peaks():
     t = np.linspace(0.0, 1.0, 100_003)
     y = np.sin(2.0 * np.pi * 3.0 * t)
     y[77_777], y[50_001], y[-1] = 5.0, -4.0, 3.0
-    x, thinned = plots.thinned(t, y)
+    x, kept = thinned(t, y)
     assert len(x) < 5000
-    assert (thinned.max(), thinned.min()) == (5.0, -4.0)
-    assert x[np.argmax(thinned)] == t[77_777]
-    assert (x[0], x[-1], thinned[-1]) == (0.0, 1.0, 3.0)
+    assert (kept.max(), kept.min()) == (5.0, -4.0)
+    assert x[np.argmax(kept)] == t[77_777]
+    assert (x[0], x[-1], kept[-1]) == (0.0, 1.0, 3.0)
     assert (np.diff(x) > 0.0).all()
-    assert plots.thinned(t[:100], y[:100])[0] is not None
-    assert len(plots.thinned(t[:7999], y[:7999])[0]) == 7999
+    assert thinned(t[:100], y[:100])[0] is not None
+    assert len(thinned(t[:7999], y[:7999])[0]) == 7999
 
 
 @pytest.mark.parametrize("triangles", [False, True])

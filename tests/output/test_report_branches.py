@@ -66,16 +66,22 @@ def test_the_diagram_is_that_of_the_branches(found, path):
     shown = Shown(path)
     for number, table in enumerate(shown.header["branches"]):
         branch = found.found[table["name"]]
-        x, y = (shown.array("branches", number, name, 0) for name in "xy")
-        np.testing.assert_allclose(x, branch.parameter, atol=1e-5 * np.ptp(branch.parameter))
+        x, y = (shown.array("diagrams", 0, "lines", number, name) for name in "xy")
+        np.testing.assert_allclose(1e-3 * x, branch.parameter,
+                                   atol=1e-5 * np.ptp(branch.parameter))
         heights = branch.column("observed_maximum")
-        np.testing.assert_allclose(1e-3 * y[:, 0], heights, rtol=1e-4)
+        np.testing.assert_allclose(1e-3 * y, heights, rtol=1e-4)
         special = {index for index, point in enumerate(branch.points) if point.kind is not None}
-        assert {index for index, _ in table["special"]} == special
         assert special <= set(table["kept"])
     diagram, = shown.header["diagrams"]
-    assert diagram["xLabel"] == "ground speed [m/s]"
-    assert diagram["yLabel"] == "displacement x of B, maximum [mm]"
+    places = [(1e3 * point.parameter, 1e3 * point.values["observed_maximum"])
+              for branch in found.found.values() for point in branch.points if point.kind]
+    assert {mark[0] for mark in diagram["marks"]} == {place for place, _ in places}
+    for x, y, letters in diagram["marks"]:
+        assert any((x, y) == pytest.approx(place) for place in places)
+        assert letters
+    assert diagram["xLabel"] == "ground speed [mm/s]"
+    assert (diagram["title"], diagram["unit"]) == ("largest displacement x of B", "mm")
     # The rigid block has no stress to paint.
     assert shown.header["bodies"]["paints"] == ["displacement", "none"]
 

@@ -47,15 +47,15 @@ def test_diagrams_are_amplitude_and_phase_of_all_levels(response, path):
     shown = Shown(path)
     assert [table["name"] for table in shown.header["branches"]] == [
         "drive amplitude x 20 µm", "drive amplitude x 300 µm"]
-    assert [one["yLabel"] for one in shown.header["diagrams"]] == ["amplitude of B x [µm]",
-                                                                   "phase [°]"]
+    assert [(one["title"], one["unit"]) for one in shown.header["diagrams"]] == [
+        ("amplitude of B x", "µm"), ("phase", "°")]
     assert shown.header["diagrams"][1]["xLabel"] == "drive frequency [Hz]"
     for level, branch in enumerate(response.branches):
         true = (response.amplitude(level) / MICRO, np.degrees(response.phase(level)))
         for which, curve in enumerate(true):
-            x, y = (shown.array("branches", level, name, which) for name in "xy")
+            x, y = (shown.array("diagrams", which, "lines", level, name) for name in "xy")
             np.testing.assert_allclose(x, branch.parameter, atol=1e-5 * np.ptp(branch.parameter))
-            assert np.abs(y[:, 0] - curve).max() < 2e-5 * np.abs(curve).max()
+            assert np.abs(y - curve).max() < 2e-5 * np.abs(curve).max()
 
 
 def test_points_beyond_the_basis_are_marked(response, system, tmp_path):
@@ -100,12 +100,12 @@ def test_orbits_are_those_of_the_response(response, system, path):
 def test_motions_of_a_mode_are_magnified_to_the_same_size(mode, system, mode_path):
     shown = Shown(mode_path)
     table, = shown.header["branches"]
-    x, frequency = (shown.array("branches", 0, name, 0) for name in "xy")
+    x, frequency = (shown.array("diagrams", 0, "lines", 0, name) for name in "xy")
     assert 10.0**x * 1e-3 == pytest.approx(mode.amplitude, rel=1e-4)
-    assert frequency[:, 0] == pytest.approx(mode.frequency_hz, rel=2e-5)
-    assert shown.array("branches", 0, "y", 1)[:, 0] == pytest.approx(
+    assert frequency == pytest.approx(mode.frequency_hz, rel=2e-5)
+    assert shown.array("diagrams", 1, "lines", 0, "y") == pytest.approx(
         mode.damping_ratio, abs=2e-5 * mode.damping_ratio.max())
-    assert [one["decades"] for one in shown.header["diagrams"]] == [True, True]
+    assert [one["log"] for one in shown.header["diagrams"]] == ["x", "x"]
     extent = np.hypot(0.12, 0.06)
     for number, index in enumerate(table["kept"]):
         drawn = shown.header["orbits"]["scales"][number] * mode.amplitude[index]

@@ -13,7 +13,7 @@ from fecontact.analysis.resolved import resolved
 from fecontact.cli import execute
 from fecontact.integrate import SetValued
 from fecontact.laws import ExponentialFriction, LinearContact, RoughSurface
-from fecontact.output.plots.run_diagrams import thinned
+from fecontact.output.diagrams.diagram import thinned
 from fecontact.plot import plot_contact_map, plot_friction_work, plot_history, plot_phase
 
 MASS, STIFFNESS, SPEED = 2.0, 1e6, 0.3
@@ -49,11 +49,11 @@ def test_impacts_have_their_height(outputs):
     axes = plot_history(run, ["B"]).axes
     t, force = drawn(axes[2]).T
     assert force.max() == pytest.approx(highest, rel=0.01)
-    assert np.trapezoid(force, 1e-3 * t) == pytest.approx(2.0 * MASS * SPEED, rel=0.01)
+    assert np.trapezoid(force, t) == pytest.approx(2.0 * MASS * SPEED, rel=0.01)
     # So deep is it there, and so fast again.
     assert drawn(axes[0])[:, 1].min() == pytest.approx(
-        -1e3 * SPEED * np.sqrt(MASS / STIFFNESS), rel=0.01)
-    assert drawn(axes[1])[:, 1].max() == pytest.approx(1e3 * SPEED, rel=0.01)
+        -SPEED * np.sqrt(MASS / STIFFNESS), rel=0.01)
+    assert drawn(axes[1])[:, 1].max() == pytest.approx(SPEED, rel=0.01)
     load = np.asarray(plot_contact_map(run).axes[0].collections[0].get_array())
     assert load.max() == pytest.approx(highest, rel=0.01)
 
@@ -64,7 +64,7 @@ def test_free_oscillation_at_seven_outputs_a_period_is_an_ellipse():
     periods = 5
     run = fc.simulate(system, periods * 2.0 * np.pi / w, outputs=7 * periods + 1, rtol=1e-8,
                       initial=np.sqrt(MASS) * np.array([size, 0.0]))
-    curve = drawn(plot_phase(run).axes[0]) / [1e3 * size, 1e3 * size * w]
+    curve = drawn(plot_phase(run).axes[0]) / [size, size * w]
     # Of the line, not of its corners alone.
     between = curve[:-1, None] + np.linspace(0.0, 1.0, 9)[:, None] * np.diff(curve, axis=0)[:, None]
     assert np.abs(np.linalg.norm(between, axis=2) - 1.0).max() < 0.01

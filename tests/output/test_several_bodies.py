@@ -329,7 +329,7 @@ def test_histories_name_bodies_and_interfaces(trajectory):
     assert forces == ["shoe", "foot"]
     assert figure.axes[4].get_ylabel() == "total normal force [kN]"
     np.testing.assert_allclose(figure.axes[4].lines[1].get_ydata(),
-                               1e-3 * trajectory.normal_force[:, 8:].sum(axis=1))
+                               trajectory.normal_force[:, 8:].sum(axis=1))
     assert history(trajectory, "velocity", 4, "y").title == (
         "relative velocity along n of shoe: node 4")
     assert history(trajectory, "displacement", 18).title == "displacement x of foot: node 18"

@@ -8,10 +8,12 @@ import numpy as np
 
 from fecontact.core.checks import as_several
 from fecontact.core.errors import InputError
+from fecontact.core.types import Array
 from fecontact.measured.amplitude_curve import AmplitudeCurve
+from fecontact.output.diagrams.colours import distinct_colours
+from fecontact.output.diagrams.diagram import WIDTH, Curve, Diagram
+from fecontact.output.plots.drawing import draw_stacked
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import name_axis
-from fecontact.output.plots.style import distinct_colours
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,26 +54,29 @@ def plot_amplitude_curve(
     if names and len(names) != len(given):
         raise InputError(f"plot_amplitude_curve: {len(names)} names do not go with {len(given)} "
                          f"curves; give one for each.")
+    title = given[0].observed
+    label = f"amplitude{f' of {title}' if title else ''} [{given[0].unit}]"
+    named, colours = list(names) or [""] * len(given), distinct_colours(len(given))
+    frequency, damping = (
+        Diagram(label, y_label, tuple(
+            _curve(curve, values, deviation, name, colour)
+            for (curve, values, deviation), name, colour in zip(each, named, colours, strict=True)),
+            logarithmic="x" * logarithmic)
+        for y_label, each in (
+            ("frequency [Hz]", [(one, one.frequency_hz, one.frequency_deviation_hz)
+                                for one in given]),
+            ("damping ratio", [(one, one.damping_ratio, one.damping_deviation)
+                               for one in given])))
     with new_figure(8.0, 6.0, path) as figure:
-        panels = figure.subplots(2, 1, sharex=True)
-        for curve, name, colour in zip(given, names or [""] * len(given),
-                                       distinct_colours(len(given)), strict=True):
-            known = curve.frequency_deviation_hz is not None or len(curve) < _LEAST
-            for axis, values, deviation in (
-                    (panels[0], curve.frequency_hz, curve.frequency_deviation_hz),
-                    (panels[1], curve.damping_ratio, curve.damping_deviation)):
-                bars = None if deviation is None else _DEVIATIONS * np.asarray(deviation)
-                axis.errorbar(curve.amplitude, values, bars, color=colour, label=name or None,
-                              marker="o" if known else "", linestyle="" if known else "-",
-                              markersize=3.5, elinewidth=0.9)
-        if logarithmic:
-            panels[1].set_xscale("log")
-        panels[0].set_ylabel("frequency [Hz]")
-        panels[1].set_ylabel("damping ratio")
-        title = given[0].observed
-        name_axis(panels[1], "x", f"amplitude{f' of {title}' if title else ''} [{given[0].unit}]",
-                  np.concatenate([curve.amplitude for curve in given]))
-        if names:
-            panels[0].legend(loc="best")
-        figure.align_ylabels()
+        draw_stacked(figure, (frequency, damping), (1.0, 1.0))
     return figure
+
+
+def _curve(
+    curve: AmplitudeCurve, values: Array, deviation: Array | None, name: str, colour: str
+) -> Curve:
+    """A line, or dots with their bars where deviations are known or points are few."""
+    known = curve.frequency_deviation_hz is not None or len(curve) < _LEAST
+    bars = None if deviation is None else _DEVIATIONS * np.asarray(deviation)
+    return Curve(name, colour, curve.amplitude, values, 0.0 if known else WIDTH,
+                 3.5 if known else 0.0, bars=bars)

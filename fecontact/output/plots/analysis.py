@@ -1,8 +1,9 @@
 """Plots of analyses: spectra, Poincare sections, friction work, frequency responses."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,28 +25,24 @@ from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array
 from fecontact.core.units import count, listed, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.diagrams.branches import beyond_band
+from fecontact.output.diagrams.colours import COLOURS, distinct_colours
+from fecontact.output.diagrams.diagram import WIDTH, Curve, Diagram
+from fecontact.output.diagrams.runs import phase_diagram
+from fecontact.output.diagrams.spectra import end_of_content, spectrum_diagram
+from fecontact.output.plots.drawing import draw
 from fecontact.output.plots.face_panels import abscissa_unit, face_panels, scale_row
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.run import direction_row
-from fecontact.output.plots.run_diagrams import thinned
-from fecontact.output.plots.style import (
-    COLOURS,
-    DASHES,
-    add_note,
-    distinct_colours,
-    shaded_beyond,
-)
+from fecontact.output.plots.style import add_note
 from fecontact.reduction.assembly.contact_faces import shown_faces
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-
-_COLUMNS = 1000  # most points of a line
 _RETURNS = 1e-3  # of the motion, within which an orbit has returned
 _ROUND_OFF = 1e-9  # of the largest response, below which others are not drawn
-LOWEST_DECADES = 5.0  # range of a logarithmic axis below its highest value
+
 
 def plot_spectrum(
     trajectory: Trajectory,
@@ -96,19 +93,14 @@ def plot_spectrum(
     if not density:
         require_periods(sampled.time, shown.values, float(sampled.time[-1] - sampled.time[0]))
     found = make(sampled.time, shown.values)
+    diagram = spectrum_diagram(
+        [found], f"density [({shown.unit})²/Hz]" if density else f"amplitude [{shown.unit}]",
+        [""], COLOURS[:1], title=shown.title, highest_hz=highest_hz)
+    end = diagram.x_limits[1] or 0.0
     with new_figure(9.0, 4.6, path) as figure:
         add_note(figure, sampled)
         panel = figure.subplots()
-        factor, symbol = (1.0, f"({shown.unit})²/Hz") if density else suitable_unit(
-            float(found.values.max()), shown.unit)
-        end = highest_hz or end_of_content(found.frequency_hz, found.values)
-        heights = np.maximum(found.values, 1e-300) / factor
-        panel.semilogy(*spectrum_line(found.frequency_hz, heights, end), color=COLOURS[0],
-                       linewidth=1.0)
-        top = float(found.values.max()) / factor
-        if top > 0.0:
-            panel.set_ylim(top * 10.0**-LOWEST_DECADES, 4.0 * top)
-        panel.set_xlim(0.0, end)
+        draw(panel, diagram)
         named: list[float] = []
         for peak in found.peaks(40):
             # Leave out labels that overlap those of higher peaks.
@@ -117,13 +109,10 @@ def plot_spectrum(
                 named.append(peak.frequency_hz)
                 # Numbers near an end stand beside their peak, not on the axis.
                 ends = int(peak.frequency_hz < 0.04 * end) - int(peak.frequency_hz > 0.96 * end)
-                panel.annotate(f"{peak.frequency_hz:.4g}", (peak.frequency_hz, peak.value / factor),
+                panel.annotate(f"{peak.frequency_hz:.4g}", (peak.frequency_hz, peak.value),
                                xytext=(3 * ends, 4), textcoords="offset points", fontsize=8.5,
                                path_effects=[withStroke(linewidth=2.0, foreground="white")],
                                ha={1: "left", 0: "center", -1: "right"}[ends])
-        panel.set_xlabel("frequency [Hz]")
-        panel.set_ylabel(f"{'density' if density else 'amplitude'} [{symbol}]")
-        panel.set_title(shown.title)
     return figure
 
 
@@ -160,28 +149,28 @@ def plot_spectrogram(
     sampled = evenly_sampled_history(trajectory, quantity, point, component)
     shown = sampled.history
     found = spectrogram(sampled.time, shown.values, piece=piece, overlap=0.9)
+    drawn = resolved(trajectory)
+    line = history(drawn.trajectory, quantity, point, component).values
+    time = trajectory.time
+    ends = (float(time[0]), float(time[-1]))
+    above = Diagram("time [s]", f"{quantity.replace('_', ' ')} [{shown.unit}]",
+                    (Curve("", COLOURS[0], drawn.trajectory.time, line, 0.8),),
+                    title=shown.title, x_limits=ends)
     with new_figure(9.5, 5.6, path) as figure:
-        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.2))
-        time_unit, time_symbol = suitable_unit(float(np.abs(trajectory.time).max()), "s")
-        unit, symbol = suitable_unit(float(np.abs(shown.values).max()), shown.unit)
-        drawn = resolved(trajectory)
         add_note(figure, drawn)
-        line = history(drawn.trajectory, quantity, point, component).values
-        upper.plot(*thinned(drawn.trajectory.time / time_unit, line / unit), color=COLOURS[0],
-                   linewidth=0.8)
-        upper.set_ylabel(f"{quantity.replace('_', ' ')} [{symbol}]")
-        upper.set_title(shown.title)
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.2))
+        draw(upper, above)
+        upper.set_xlabel("")
         factor, symbol = suitable_unit(float(found.values.max()), shown.unit)
         top = float(found.values.max()) / factor or 1.0
         image = lower.pcolormesh(
-            found.time / time_unit, found.frequency_hz, np.maximum(found.values / factor, 1e-300),
+            found.time, found.frequency_hz, np.maximum(found.values / factor, 1e-300),
             norm=LogNorm(top * 1e-4, top), cmap="viridis", shading="nearest", rasterized=True)
         figure.colorbar(image, ax=lower, label=f"amplitude [{symbol}]", pad=0.01)
         spread = found.values.max(axis=1)
+        lower.set_xlim(ends)
         lower.set_ylim(0.0, highest_hz or end_of_content(found.frequency_hz, spread))
-        lower.set_xlim(trajectory.time[0] / time_unit, trajectory.time[-1] / time_unit)
-        lower.set_ylabel("frequency [Hz]")
-        lower.set_xlabel(f"time [{time_symbol}]")
+        lower.set(xlabel=above.x_unit[1], ylabel="frequency [Hz]")
         lower.grid(False)
     return figure
 
@@ -227,25 +216,21 @@ def plot_poincare(
         found = strobed_states(trajectory, period=period, phase=phase, t_start=start)
     basis = trajectory.system.basis
     drawn = resolved(trajectory)
-    x, v = (values(point)[:, row] for values in (
-        drawn.trajectory.displacement, drawn.trajectory.velocity))
     rows = trajectory._rows(point)[row]
     m = basis.modes
     once = found.states[:, :m] @ rows, found.states[:, m : 2 * m] @ rows
-    _require_section(found, once, (np.ptp(x), np.ptp(v)))
+    diagram = phase_diagram(drawn.trajectory, point, row, Curve(
+        f"once per {found.period:.4g} s" if found.maxima_of is None else
+        f"maxima of {component}, {found.period:.4g} s apart", COLOURS[1], *once, 0.0, 3.5))
+    motion = diagram.curves[0]
+    _require_section(found, once, (np.ptp(motion.x), np.ptp(motion.y)))
+    diagram = replace(diagram,
+                      title=f"{point_name(point, basis)}, {count(len(found.time), 'point')}")
     with new_figure(6.4, 5.2, path) as figure:
         add_note(figure, drawn)
         plane = figure.subplots()
-        unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
-        factor, rate_symbol = suitable_unit(float(np.abs(v).max()), "m/s")
-        plane.plot(x / unit, v / factor, color="#b9c4cc", linewidth=0.6, label="motion")
-        plane.plot(once[0] / unit, once[1] / factor, "o", markersize=3.5, color=COLOURS[1],
-                   label=f"once per {found.period:.4g} s" if found.maxima_of is None else
-                   f"maxima of {component}, {found.period:.4g} s apart")
-        plane.set_xlabel(f"displacement {component} [{symbol}]")
-        plane.set_ylabel(f"velocity {component} [{rate_symbol}]")
+        draw(plane, diagram)
         plane.legend(loc="best")
-        plane.set_title(f"{point_name(point, basis)}, {count(len(found.time), 'point')}")
     return figure
 
 
@@ -348,41 +333,47 @@ def plot_receptance(
         raise InputError(f"{_place(responses[0].responses[0])} does not move by a force at "
                          f"{_place(responses[0].excitations[0])}; choose another point or "
                          f"component.")
+    curves, still = _responses(responses, labels)
+    many = len(responses) > 1 or responses[0].values[0].size > 1
+    units = list(dict.fromkeys(curve.unit for curve in curves))
+    first = responses[0]
+    f = first.frequency_hz
+    ends = (float(f[0]), float(f[-1])) if len(f) > 1 else (None, None)
+    bands = beyond_band(np.concatenate([one.frequency_hz for one in responses]), usable_hz)
+    upper_curves, lower_curves = [], []
+    for number, (curve, colour) in enumerate(zip(curves, distinct_colours(len(curves)),
+                                                 strict=True)):
+        name = f"{curve.name} [{curve.unit}]" if len(units) > 1 else curve.name
+        if not curve.of.stable:
+            name += f"\nUNSTABLE, not to be measured:\n{curve.of.growth_in_words}"
+        # The first is the widest: others on top do not hide it.
+        shown: dict[str, Any] = {
+            "width": 3.0 if many and number == 0 else WIDTH,
+            "stable": None if curve.of.stable else np.zeros(len(curve.values) - 1, dtype=bool)}
+        # From the lower end of the axis on: what follows a force at 180 degrees does not leap.
+        degrees = (np.degrees(np.angle(curve.values)) + 190.0) % 360.0 - 190.0
+        upper_curves.append(Curve(name, colour, curve.of.frequency_hz, np.abs(curve.values),
+                                  **shown))
+        lower_curves.append(Curve("", colour, curve.of.frequency_hz, degrees, **shown))
+    upper_diagram = Diagram(
+        "frequency [Hz]", f"{first.kind} [{units[0]}]" if len(units) == 1 else first.kind,
+        tuple(upper_curves), bands=bands, logarithmic="y", x_limits=ends)
+    lower_diagram = Diagram("frequency [Hz]", "phase [°]", tuple(lower_curves), bands=bands,
+                            x_limits=ends, y_limits=(-190.0, 190.0))
     with new_figure(9.0, 6.0, path) as figure:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
-        curves, still = _responses(responses, labels)
-        many = len(responses) > 1 or responses[0].values[0].size > 1
-        units = list(dict.fromkeys(curve.unit for curve in curves))
-        for number, (curve, colour) in enumerate(zip(curves, distinct_colours(len(curves)),
-                                                     strict=True)):
-            style = "-" if curve.of.stable else DASHES
-            name = f"{curve.name} [{curve.unit}]" if len(units) > 1 else curve.name
-            if not curve.of.stable:
-                name += f"\nUNSTABLE, not to be measured:\n{curve.of.growth_in_words}"
-            f = curve.of.frequency_hz
-            # The first is the widest: others on top do not hide it.
-            width = 3.0 if many and number == 0 else 1.2
-            upper.semilogy(f, np.abs(curve.values), color=colour, label=name, linestyle=style,
-                           linewidth=width)
-            # From the lower end of the axis on: what follows a force at 180 degrees does not leap.
-            degrees = (np.degrees(np.angle(curve.values)) + 190.0) % 360.0 - 190.0
-            lower.plot(f, degrees, color=colour, linewidth=width, linestyle=style)
+        draw(upper, upper_diagram)
+        draw(lower, lower_diagram)
+        upper.set_xlabel("")
         if still:
             figure.supxlabel(f"not drawn, as zero but for round-off: {listed(still)}", x=0.99,
                              ha="right", fontsize=8.0, color="#6a6a6a")
-        first = responses[0]
-        many |= shaded_beyond((upper, lower), usable_hz)
-        upper.set_ylabel(f"{first.kind} [{units[0]}]" if len(units) == 1 else first.kind)
-        if many or not first.stable:
+        if many or bands or not first.stable:
             upper.legend(loc="best")
         else:
             upper.set_title(f"{_place(first.responses[0])} by a force at "
                             f"{_place(first.excitations[0])}")
-        lower.set_ylim(-190.0, 190.0)
         lower.set_yticks([-180, -90, 0, 90, 180])
-        lower.set_ylabel("phase [°]")
-        lower.set_xlabel("frequency [Hz]")
-        _whole_width(lower, first)
         figure.align_ylabels([upper, lower])
     return figure
 
@@ -414,30 +405,5 @@ def _responses(
             [one.name for one, moving in zip(found, moves, strict=True) if not moving])
 
 
-def _whole_width(panel: "Axes", response: Receptance) -> None:
-    f = response.frequency_hz
-    if len(f) > 1:
-        panel.set_xlim(f[0], f[-1])
-
-
 def _place(place: tuple[str | int, str]) -> str:
     return f"{point_name(place[0])} {place[1]}"
-
-
-def end_of_content(frequency: Array, values: Array) -> float:
-    """Highest frequency with more than 0.002 of the highest value."""
-    heard = np.flatnonzero(values > 2e-3 * values.max(initial=0.0))
-    end = 1.1 * frequency[heard[-1]] if len(heard) else frequency[-1]
-    return float(min(max(end, 10.0 * frequency[1]), frequency[-1]))
-
-
-def spectrum_line(frequency: Array, values: Array, end: float) -> tuple[Array, Array]:
-    """A long spectrum up to ``end``, thinned to the maxima of its bins."""
-    shown = int(np.searchsorted(frequency, end, side="right"))
-    few = shown // _COLUMNS
-    if few < 2:
-        return frequency[:shown], values[:shown]
-    blocks = values[: shown - shown % few].reshape(-1, few)
-    tops = np.arange(len(blocks)) * few + blocks.argmax(axis=1)
-    return frequency[tops], values[tops]
-

@@ -8,8 +8,10 @@ import numpy as np
 
 from fecontact.analysis.campbell import CampbellDiagram
 from fecontact.core.checks import require_kind
+from fecontact.output.diagrams.colours import COLOURS, INK, distinct_colours
+from fecontact.output.diagrams.diagram import Curve, Diagram
+from fecontact.output.plots.drawing import draw
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.style import DASHES, distinct_colours
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,25 +42,27 @@ def plot_campbell(
     require_kind("plot_campbell", (Sequence, np.ndarray), orders=orders)
     speeds, hertz = diagram.speeds, diagram.frequencies_hz
     growing = diagram.damping_ratios < -1e-6
+    top = 1.05 * float(hertz.max(initial=0.0)) or 1.0
+    curves = []
+    for column, colour in enumerate(distinct_colours(hertz.shape[1])):
+        curves.append(Curve("", colour, speeds, hertz[:, column]))
+        if growing[:, column].any():
+            curves.append(Curve("", colour, speeds, np.where(
+                growing[:, column], hertz[:, column], np.nan), 4.0))
+    for order in orders:
+        critical = diagram.critical_speeds(order)
+        curves += [Curve("", COLOURS[6], speeds, order * speeds / (2.0 * np.pi), 0.9,
+                         stable=np.zeros(len(speeds) - 1, dtype=bool)),
+                   Curve("", INK, critical, order * critical / (2.0 * np.pi), 0.0, 4.0)]
+    shown = Diagram("speed [rad/s]", "frequency [Hz]", tuple(curves),
+                    x_limits=(speeds[0], speeds[-1]), y_limits=(0.0, top))
     with new_figure(8.0, 5.2, path) as figure:
         axis = figure.subplots()
-        for column, colour in enumerate(distinct_colours(hertz.shape[1])):
-            axis.plot(speeds, hertz[:, column], color=colour)
-            if growing[:, column].any():
-                axis.plot(speeds, np.where(growing[:, column], hertz[:, column], np.nan),
-                          color=colour, linewidth=4.0, alpha=0.6)
-        top = 1.05 * float(hertz.max(initial=0.0)) or 1.0
+        draw(axis, shown)
         for order in orders:
-            axis.plot(speeds, order * speeds / (2.0 * np.pi), color="#6a6a6a", linestyle=DASHES,
-                      linewidth=0.9)
-            critical = diagram.critical_speeds(order)
-            axis.plot(critical, order * critical / (2.0 * np.pi), "o", color="#303030",
-                      markersize=4.0)
             end = min(float(speeds[-1]), 2.0 * np.pi * top / order) if order > 0.0 else speeds[-1]
             axis.annotate(f"{order:g}", (end, order * end / (2.0 * np.pi)), xytext=(3, 3),
-                          textcoords="offset points", fontsize=9.0, color="#6a6a6a")
-        axis.set(xlim=(speeds[0], speeds[-1]), ylim=(0.0, top), xlabel="speed [rad/s]",
-                 ylabel="frequency [Hz]")
+                          textcoords="offset points", fontsize=9.0, color=COLOURS[6])
         minute = axis.secondary_xaxis("top", functions=(
             lambda x: np.multiply(x, 30.0 / np.pi), lambda x: np.multiply(x, np.pi / 30.0)))
         minute.set_xlabel("speed [1/min]")

@@ -14,9 +14,10 @@ from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.wear import WearLaw
+from fecontact.output.diagrams.colours import STATE_COLOURS
 from fecontact.output.plots.face_panels import similar
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.style import STATE_COLOURS, add_note, state_names
+from fecontact.output.plots.style import add_note, state_names
 from fecontact.reduction.assembly.contact_faces import ContactFace, shown_faces
 
 if TYPE_CHECKING:

@@ -9,7 +9,8 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.types import Array
-from fecontact.output.plots.style import DASHES
+from fecontact.output.diagrams.colours import DASHES, DOTS, INK
+from fecontact.output.diagrams.diagram import Curve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,12 +23,9 @@ if TYPE_CHECKING:
 
 Label = tuple[str, float, float]  # text and place in a diagram
 
-_INK = "#303030"
 _AWAY = 6.0  # points between a place and its letters
 # Sides on which letters may stand, the usual ones first: steps to the right and up.
 _SIDES = ((1, 1), (-1, -1), (-1, 1), (1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
-# Colours of runs; branches have others.
-DOTS = {"up": "#b4b0a8", "down": "#e69f00"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +115,7 @@ def draw_insets(
         x, y = place(inset.point)
         letters.append((_letter(number), x, y))
         small = figure.add_subplot(grid[0, number])
-        small.plot(inset.displacement / length, inset.velocity / speed, color=_INK, linewidth=1.0,
+        small.plot(inset.displacement / length, inset.velocity / speed, color=INK, linewidth=1.0,
                    linestyle="-" if inset.point.values.get("stable", True) else DASHES)
         small.set_title(f"{letters[-1][0]}: {inset.title}", fontsize=9.0)
         small.tick_params(labelsize=7.5)
@@ -125,7 +123,7 @@ def draw_insets(
                          loc="left")
         small.set_ylabel(f"velocity [{speed_name}]" if number == 0 else "", fontsize=8.0)
         small.margins(0.08)
-        axis.plot(x, y, "o", markersize=4.0, color=_INK, zorder=6)
+        axis.plot(x, y, "o", markersize=4.0, color=INK, zorder=6)
     return letters
 
 
@@ -183,23 +181,14 @@ def _along(places: Array, joined: bool) -> Array:
     return np.column_stack([np.interp(at, length, values) for values in places.T])
 
 
-def draw_beneath(
-    axis: "Axes", runs: "PoincareScan | None", observe: tuple[str | int, str] | str
-) -> list[Any]:
-    """Dots of runs once per period or on a section, up and down; handles for the legend."""
+def scan_curves(
+    runs: "PoincareScan | None", observe: tuple[str | int, str] | str
+) -> list[Curve]:
+    """Dots of runs once per period or on a section, up and down."""
     if runs is None:
         return []
-    from matplotlib.lines import Line2D
-
     point, component = (observe, None) if isinstance(observe, str) else observe
     up, down = runs.observed(point, component)  # type: ignore[arg-type]
-    handles = []
-    for name, values, size in (("up", up, 2.6), ("down", down, 1.3)):
-        if not values.size:
-            continue
-        places = np.repeat(runs.values, values.shape[1])
-        axis.plot(places, values.reshape(-1), "o", color=DOTS[name], markersize=size,
-                  markeredgewidth=0.0, linestyle="none", zorder=1, rasterized=True)
-        handles.append(Line2D([], [], color=DOTS[name], marker="o", linestyle="none",
-                              markersize=4.0, label=f"runs, {name}"))
-    return handles
+    return [Curve(f"runs, {name}", DOTS[name], np.repeat(runs.values, values.shape[1]),
+                  values.reshape(-1), 0.0, size)
+            for name, values, size in (("up", up, 2.6), ("down", down, 1.3)) if values.size]

@@ -7,8 +7,10 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import require_positive
+from fecontact.output.diagrams.colours import COLOURS, distinct_colours
+from fecontact.output.diagrams.diagram import Curve, Diagram
+from fecontact.output.plots.drawing import draw
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.style import DASHES, distinct_colours
 from fecontact.reduction.sector_modes import SectorModes
 
 if TYPE_CHECKING:
@@ -42,19 +44,21 @@ def plot_diameters(
     if speed is not None:
         require_positive("plot_diameters", speed=speed)
     hertz = found.frequencies_hz
+    top = 1.05 * float(hertz.max(initial=0.0)) or 1.0
+    curves = [Curve("", colour, np.array(found.diameters), hertz[:, column], 0.9, 6.0)
+              for column, colour in enumerate(distinct_colours(hertz.shape[1]))]
+    if speed is not None:
+        N = found.symmetry.sectors
+        orders = np.arange(int(2.0 * np.pi * top / speed) + 2)
+        folded = np.abs((orders + N // 2) % N - N // 2)
+        curves.append(Curve(f"engine orders at {speed:g} rad/s", COLOURS[6], folded,
+                            np.asarray(orders * speed / (2.0 * np.pi)), 0.9, 2.0,
+                            stable=np.zeros(len(orders) - 1, dtype=bool)))
+    diagram = Diagram("nodal diameter", "frequency [Hz]", tuple(curves), y_limits=(0.0, top))
     with new_figure(7.0, 5.0, path) as figure:
         axis = figure.subplots()
-        for column, colour in enumerate(distinct_colours(hertz.shape[1])):
-            axis.plot(found.diameters, hertz[:, column], "o-", color=colour, linewidth=0.9)
-        top = 1.05 * float(hertz.max(initial=0.0)) or 1.0
+        draw(axis, diagram)
         if speed is not None:
-            N = found.symmetry.sectors
-            orders = np.arange(int(2.0 * np.pi * top / speed) + 2)
-            folded = np.abs((orders + N // 2) % N - N // 2)
-            axis.plot(folded, orders * speed / (2.0 * np.pi), color="#6a6a6a", marker=".",
-                      linestyle=DASHES, linewidth=0.9, markersize=4.0,
-                      label=f"engine orders at {speed:g} rad/s")
             axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0))
-        axis.set(xlabel="nodal diameter", ylabel="frequency [Hz]", ylim=(0.0, top))
         axis.set_xticks(found.diameters if len(found.diameters) <= 20 else found.diameters[::2])
     return figure

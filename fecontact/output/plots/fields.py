@@ -10,8 +10,8 @@ from fecontact.core.errors import require_choice
 from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.fem.fields import BodyFields
+from fecontact.output.plots.drawing import name_axis
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import name_axis
 from fecontact.output.plots.solids.surface import draw_surface, draw_triad, view_axes
 from fecontact.output.plots.style import stress_limit
 

@@ -13,13 +13,12 @@ from fecontact.analysis.summaries import usual_point
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import ArrayLike
-from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.plots.analysis import LOWEST_DECADES, end_of_content, spectrum_line
+from fecontact.output.diagrams.colours import distinct_colours
+from fecontact.output.diagrams.diagram import Curve, Diagram
+from fecontact.output.diagrams.spectra import spectrum_diagram
+from fecontact.output.plots.drawing import draw, name_axis
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import name_axis
-from fecontact.output.plots.run_diagrams import thinned
-from fecontact.output.plots.style import distinct_colours, legend_label
 from fecontact.reduction.modal_basis import Component
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.parameter_labels import parameter_label
@@ -67,27 +66,15 @@ def plot_runs(
     found = [history(run, quantity, point, component) for run in runs.values()]
     spectra = [amplitude_spectrum(run.time, one.values, resample=True)
                for run, one in zip(runs.values(), found, strict=True)]
-    last = max(float(np.abs(run.time).max()) for run in runs.values())
-    time_unit, time_symbol = suitable_unit(last, "s")
-    unit, symbol = suitable_unit(max(float(np.abs(one.values).max()) for one in found),
-                                 found[0].unit)
-    end = highest_hz or max(end_of_content(one.frequency_hz, one.values) for one in spectra)
-    largest = max(float(one.values.max()) for one in spectra)
-    height, height_symbol = suitable_unit(largest, found[0].unit)
+    colours = distinct_colours(len(runs))
+    histories = Diagram("time [s]", f"{found[0].title} [{found[0].unit}]", tuple(
+        Curve(name, colour, run.time, one.values, 1.0)
+        for (name, run), one, colour in zip(runs.items(), found, colours, strict=True)))
     with new_figure(10.0, 6.6, path) as figure:
         upper, lower = figure.subplots(2, 1)
-        for name, run, one, spectrum, colour in zip(
-                runs, runs.values(), found, spectra, distinct_colours(len(runs)), strict=True):
-            upper.plot(*thinned(run.time / time_unit, one.values / unit), color=colour,
-                       linewidth=1.0, label=legend_label(name))
-            frequency, values = spectrum_line(spectrum.frequency_hz, spectrum.values, end)
-            lower.semilogy(frequency, np.maximum(values, 1e-300) / height, color=colour,
-                           linewidth=1.0)
-        upper.set(xlabel=f"time [{time_symbol}]", ylabel=f"{found[0].title} [{symbol}]")
-        lower.set(xlabel="frequency [Hz]", ylabel=f"amplitude [{height_symbol}]", xlim=(0.0, end))
-        if largest > 0.0:
-            top = largest / height
-            lower.set_ylim(top * 10.0**-LOWEST_DECADES, 4.0 * top)
+        draw(upper, histories)
+        draw(lower, spectrum_diagram(spectra, f"amplitude [{found[0].unit}]", [""] * len(runs),
+                                     colours, highest_hz=highest_hz))
         figure.legend(loc="outside upper center", ncols=min(len(runs), 4))
     return figure
 

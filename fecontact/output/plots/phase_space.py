@@ -13,8 +13,8 @@ from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.output.diagrams.colours import COLOURS, distinct_colours
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.style import COLOURS, distinct_colours
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

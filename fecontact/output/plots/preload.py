@@ -8,11 +8,14 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
-from fecontact.core.units import quantity, suitable_unit
+from fecontact.core.units import quantity
 from fecontact.laws.ground.sliding import SlidingRotation
+from fecontact.output.diagrams.colours import COLOURS, DASHES, STATE_COLOURS
+from fecontact.output.diagrams.diagram import Curve, Diagram
+from fecontact.output.plots.drawing import draw
 from fecontact.output.plots.face_panels import abscissa_unit, face_panels, scale_row
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.style import COLOURS, DASHES, STATE_COLOURS, legend_label
+from fecontact.output.plots.style import legend_label
 from fecontact.reduction.assembly.contact_faces import several_bodies, shown_faces
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import STATES
@@ -24,12 +27,12 @@ if TYPE_CHECKING:
 _STATE_COLOURS = {"open": "#c8c4bc", **STATE_COLOURS}
 # Labels of the displacement and the force of an action.
 _LABELS = {
-    "load": ("work of the load per scale", "N m", "scale of the load", ""),
-    "motion_x": ("displacement of the drive x", "m", "force of the drive", "N"),
-    "motion_y": ("displacement of the drive y", "m", "force of the drive", "N"),
-    "motion_z": ("displacement of the drive z", "m", "force of the drive", "N"),
-    "travel": ("travel of the ground", "m", "force of the ground on the body", "N"),
-    "travel_y": ("travel of the ground along y", "m", "force of the ground on the body", "N"),
+    "load": ("work of the load per scale [N m]", "scale of the load [-]"),
+    "motion_x": ("displacement of the drive x [m]", "force of the drive [N]"),
+    "motion_y": ("displacement of the drive y [m]", "force of the drive [N]"),
+    "motion_z": ("displacement of the drive z [m]", "force of the drive [N]"),
+    "travel": ("travel of the ground [m]", "force of the ground on the body [N]"),
+    "travel_y": ("travel of the ground along y [m]", "force of the ground on the body [N]"),
 }
 
 
@@ -133,31 +136,19 @@ def plot_loop(
         raise InputError("plot_loop: the loading has one point only, so there is no curve; lower "
                          "its loads.")
     part = history.loop(first, last, action)
-    wide, wide_unit, high, high_unit = _LABELS.get(
-        part.action, ("displacement of the force", "m", "force", "N"))
+    wide, high = _LABELS.get(part.action, ("displacement of the force [m]", "force [N]"))
     if part.action == "travel" and any(
             isinstance(one, SlidingRotation) for one in history.system.sliding.values()):
-        wide, wide_unit, high, high_unit = "turn of the other side", "rad", "its moment", "N m"
+        wide, high = "turn of the other side [rad]", "its moment [N m]"
     vertices = [row for row in history.path.rows_of_vertices
                 if history.row(first) <= row <= history.row(last)]
     marks = np.array(vertices) - vertices[0]
+    diagram = Diagram(wide, high, (
+        Curve("", COLOURS[0], part.displacement, part.force),
+        Curve("vertices of the path", COLOURS[1], part.displacement[marks], part.force[marks],
+              0.0, 6.0)), title=f"friction loses {quantity(part.loss, 'J', 4)}")
     with new_figure(6.4, 5.2, path) as figure:
         plane = figure.subplots()
-        across, across_symbol = _unit(part.displacement, wide_unit)
-        up, up_symbol = _unit(part.force, high_unit)
-        plane.plot(part.displacement / across, part.force / up, color=COLOURS[0])
-        plane.plot(part.displacement[marks] / across, part.force[marks] / up, "o",
-                   color=COLOURS[1], label="vertices of the path")
-        plane.set_xlabel(f"{wide} [{across_symbol}]")
-        plane.set_ylabel(f"{high} [{up_symbol}]")
-        plane.set_title(f"friction loses {quantity(part.loss, 'J', 4)}")
+        draw(plane, diagram)
         plane.legend(loc="best")
     return figure
-
-
-def _unit(values: Array, unit: str) -> tuple[float, str]:
-    """Factor and symbol of a suitable unit; that of numbers without unit is a hyphen."""
-    if unit == "N m":
-        factor, symbol = suitable_unit(float(np.abs(values).max()), "J")
-        return factor, symbol.replace("J", "N m")
-    return suitable_unit(float(np.abs(values).max()), unit) if unit else (1.0, "-")

@@ -5,35 +5,25 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from fecontact.analysis.histories import Point
 from fecontact.analysis.resolved import resolved
-from fecontact.analysis.summaries import usual_point
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
-from fecontact.core.types import Array
-from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.run_diagrams import (
+from fecontact.output.diagrams.runs import (
     AXES,
     energy_diagrams,
     force_diagrams,
-    labelled,
     motion_diagrams,
+    phase_diagram,
+    usual_points,
 )
-from fecontact.output.plots.style import (
-    COLOURS,
-    add_note,
-)
-from fecontact.reduction.assembly.contact_faces import contact_faces
+from fecontact.output.plots.drawing import draw
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.style import add_note
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-_MOST_MIDDLES = 5  # of contact nodes shown without being asked for
 
 
 def plot_history(
@@ -74,26 +64,28 @@ def plot_history(
         panels.append([one for one in forces if one is forces[0] or one.largest > 0.0])
     with new_figure(10.0, 2.5 * len(panels), path) as figure:
         add_note(figure, drawn)
-        grid = figure.subplot_mosaic([[row[0].title, row[-1].title] for row in panels],
+        grid = figure.subplot_mosaic([[row[0].y_label, row[-1].y_label] for row in panels],
                                      sharex=True)
-        bottom = [grid[one.title] for one in panels[-1]]
-        time = _time(bottom, trajectory)
+        bottom = {one.y_label for one in panels[-1]}
         for one in chain.from_iterable(panels):
-            one.draw(grid[one.title], time)
-            if grid[one.title] not in bottom:
-                grid[one.title].tick_params(labelbottom=False)
+            axes = grid[one.y_label]
+            draw(axes, one)
+            if one.y_label not in bottom:
+                axes.set_xlabel("")
+                axes.tick_params(labelbottom=False)
         for side in (0, -1):
-            figure.align_ylabels([grid[row[side].title] for row in panels])
-        points_shown = {text: line for one in motions.values() if one.title in grid for line, text
-                        in zip(*grid[one.title].get_legend_handles_labels(), strict=True)}
+            figure.align_ylabels([grid[row[side].y_label] for row in panels])
+        points_shown = {text: line for one in motions.values() if one.y_label in grid
+                        for line, text in zip(*grid[one.y_label].get_legend_handles_labels(),
+                                              strict=True)}
         figure.legend(points_shown.values(), points_shown, loc="outside upper center",
                       ncols=max(1, min(len(points), 6)))
         for one in forces:
-            if one.title in grid and len({curve.name for curve in one.curves} - {""}) > 0 and (
+            if one.y_label in grid and len({curve.name for curve in one.curves} - {""}) > 0 and (
                     one is forces[0] or one.curves[0].name != forces[0].curves[0].name):
                 # Above the forces: within the panel it would hide curves.
-                grid[one.title].legend(loc="lower left", bbox_to_anchor=(-0.02, 0.98),
-                                       ncols=max(1, min(len(one.curves), 6)))
+                grid[one.y_label].legend(loc="lower left", bbox_to_anchor=(-0.02, 0.98),
+                                         ncols=max(1, min(len(one.curves), 6)))
     return figure
 
 
@@ -131,35 +123,12 @@ def plot_phase(
     require_kind("plot_phase", Trajectory, trajectory=trajectory)
     row = direction_row(trajectory, component)
     drawn = resolved(trajectory)
-    trajectory = drawn.trajectory
     with new_figure(6.4, 5.2, path) as figure:
         add_note(figure, drawn)
         plane = figure.subplots()
-        x, v = trajectory.displacement(point)[:, row], trajectory.velocity(point)[:, row]
-        unit, symbol = suitable_unit(float(np.abs(x).max()), "m")
-        plane.set_xlabel(f"displacement {component} [{symbol}]")
-        factor, symbol = suitable_unit(float(np.abs(v).max()), "m/s")
-        plane.set_ylabel(f"velocity {component} [{symbol}]")
-        plane.plot(x / unit, v / factor, color=COLOURS[0], linewidth=1.0)
-        plane.plot(x[-1] / unit, v[-1] / factor, "o", color=COLOURS[1], label="end of the run")
-        speed = _ground_speed(trajectory, row)
-        # The speed of a much faster ground would flatten the curve.
-        if 0.0 < abs(speed) <= 5.0 * float(np.abs(v).max()):
-            plane.axhline(speed / factor, color="#303030", linestyle=(0, (4, 3)), linewidth=1.0,
-                          label="ground")
+        draw(plane, phase_diagram(drawn.trajectory, point, row))
         plane.legend(loc="best")
-        plane.set_title(labelled(point, trajectory))
     return figure
-
-
-def _ground_speed(trajectory: Trajectory, row: int) -> float:
-    """Steady speed of the ground along an axis [m/s]; zero where it has none everywhere."""
-    ground, d = trajectory.system.ground, trajectory.system.basis.dimension
-    if ground.rotation_speed or row == d - 1:
-        return 0.0
-    if row == 0:
-        return ground.speed if ground.motion is None else 0.0
-    return ground.speed_y if ground.motion_y is None else 0.0
 
 
 def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> "Figure":
@@ -187,31 +156,13 @@ def plot_energies(trajectory: Trajectory, *, path: str | Path | None = None) -> 
     with new_figure(10.0, 0.5 + 2.5 * len(panels), path) as figure:
         add_note(figure, drawn)
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-        time = _time([axes[-1]], trajectory)
         for axis, diagram in zip(axes, panels, strict=True):
             if len(diagram.curves) == 1:  # nothing but the total, which is zero
                 axis.set(ylim=(-1.0, 1.0), yticks=[0.0])
-            diagram.draw(axis, time)
+            draw(axis, diagram)
             axis.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        for axis in axes[:-1]:
+            axis.set_xlabel("")
         figure.align_ylabels(axes)
         axes[0].set_title(f"error of the energy balance: {imbalance:.1e} of the largest term")
     return figure
-
-
-def usual_points(trajectory: Trajectory) -> tuple[Point, ...]:
-    """Point B, unless it is fixed, and the middle contact node of each face; C without any."""
-    basis = trajectory.system.basis
-    middles = [(face.nodes.start + face.nodes.stop) // 2 for face in contact_faces(basis)
-               if face.nodes.stop > face.nodes.start]
-    found = (*(("B",) if basis.T[0].any() else ()), *middles[:_MOST_MIDDLES])
-    return found or (usual_point(basis),)
-
-
-def _time(bottom: Sequence["Axes"], trajectory: Trajectory) -> Array:
-    """Times in a suitable unit, which the given axes name."""
-    factor, symbol = suitable_unit(float(np.abs(trajectory.time).max()), "s")
-    for axis in bottom:
-        axis.set_xlabel(f"time [{symbol}]")
-        if len(trajectory.time) > 1:
-            axis.set_xlim(trajectory.time[0] / factor, trajectory.time[-1] / factor)
-    return trajectory.time / factor

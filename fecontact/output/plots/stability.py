@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fecontact.core.checks import require_kind
+from fecontact.output.diagrams.branches import eigenvalue_diagrams
+from fecontact.output.plots.drawing import draw, name_axis
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.parameter_labels import branch_label, name_axis
-from fecontact.output.plots.style import DASHES, distinct_colours
-from fecontact.system.complex_modes import followed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,32 +46,17 @@ def plot_eigenvalues(
     from fecontact.bifurcation.continuation.branch import Branch
 
     require_kind("plot_eigenvalues", Branch, branch=branch)
-    values, lines = branch.parameter, followed(branch.column("eigenvalues"))
     with new_figure(8.0, 6.4, path) as figure:
-        upper, lower = figure.subplots(2, 1, sharex=True)
-        modes = []
-        for mode in lines.T:
-            hertz = mode.imag / (2.0 * np.pi)
-            inside = (hertz >= range_hz[0]) & (hertz <= range_hz[1])
-            if (hertz >= 0.0).all() and hertz.any() and inside.any():
-                modes.append(mode)
-        for mode, colour in zip(modes, distinct_colours(len(modes)), strict=True):
-            upper.plot(values, mode.imag / (2.0 * np.pi), color=colour)
-            lower.plot(values, mode.real, color=colour)
-        lower.axhline(0.0, color="#303030", linewidth=0.8)
+        upper, lower = panels = figure.subplots(2, 1, sharex=True)
+        for panel, diagram in zip(panels, eigenvalue_diagrams(branch, range_hz, x_label),
+                                  strict=True):
+            draw(panel, diagram)
+        upper.set_xlabel("")
         for point in branch.of_kind("Hopf"):
-            if not range_hz[0] <= point.frequency_hz <= range_hz[1]:
-                continue
-            for axis in (upper, lower):
-                axis.axvline(point.parameter, color="#6a6a6a", linestyle=DASHES, linewidth=0.9)
-            upper.annotate(f"{point.frequency_hz:.4g} Hz",
-                           (point.parameter, point.frequency_hz), xytext=(6, 6),
-                           textcoords="offset points", fontsize=9.0)
-        upper.set_ylabel("frequency [Hz]")
-        lower.set_ylabel("growth rate [1/s]")
-        name_axis(lower, "x", x_label or branch_label(branch), values)
-        if values.min() < values.max():
-            lower.set_xlim(values.min(), values.max())
+            if range_hz[0] <= point.frequency_hz <= range_hz[1]:
+                upper.annotate(f"{point.frequency_hz:.4g} Hz",
+                               (point.parameter, point.frequency_hz), xytext=(6, 6),
+                               textcoords="offset points", fontsize=9.0)
         figure.align_ylabels([upper, lower])
     return figure
 

@@ -9,9 +9,10 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.units import suitable_unit
 from fecontact.integrate.wear import WearHistory
+from fecontact.output.diagrams.colours import COLOURS
 from fecontact.output.plots.face_panels import scale_row
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.style import COLOURS, legend_label
+from fecontact.output.plots.style import legend_label
 from fecontact.reduction.assembly.contact_faces import ContactFace, shown_faces
 from fecontact.reduction.modal_basis import ModalBasis
 

@@ -11,8 +11,9 @@ from fecontact.analysis.resolved import resolved
 from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.plots.run_diagrams import thinned
-from fecontact.output.plots.style import COLOURS, DASHES, distinct_colours, legend_label
+from fecontact.output.diagrams.colours import COLOURS, DASHES, distinct_colours
+from fecontact.output.diagrams.diagram import thinned
+from fecontact.output.plots.style import legend_label
 from fecontact.output.render.canvas import canvas_of
 from fecontact.output.render.frames_data import Motion
 from fecontact.reduction.assembly.contact_faces import contact_faces

@@ -9,9 +9,9 @@ import numpy as np
 from fecontact.core.checks import is_numeric
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
+from fecontact.output.diagrams.colours import distinct_colours
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.phase_space import Curve, Motion, phase_axis, phase_curves
-from fecontact.output.plots.style import distinct_colours
 from fecontact.output.render.movie import Image, Progress, target, write_images
 from fecontact.output.render.overlay import pixels
 

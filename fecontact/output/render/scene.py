@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
-from fecontact.output.plots.style import STATE_COLOURS
+from fecontact.output.diagrams.colours import STATE_COLOURS
 from fecontact.output.render.offscreen import known_window
 from fecontact.output.render.pixels import blend, label_image, reduced
 from fecontact.reduction.mode_shapes import ModeShapes

@@ -11,10 +11,9 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
-from fecontact.core.units import suitable_unit
+from fecontact.output.diagrams.branches import branch_diagram
 from fecontact.output.report.diagram_page import (
     SAMPLES,
-    Diagram,
     Motion,
     Shown,
     point_texts,
@@ -77,16 +76,7 @@ def report_branches(
     if not named or not all(len(branch) for branch in named.values()):
         raise InputError("report_branches needs branches with at least one point each.")
     title = path.stem if title is None else title
-    point, component = observe
-    # Only what is observed has a unit that is known here.
-    heights = [np.asarray(one.column(y), dtype=float) for one in named.values()]
-    largest = max(float(np.abs(one).max()) for one in heights)
-    factor, symbol = suitable_unit(largest, "m") if y.startswith("observed") else (1.0, "")
-    diagram = Diagram(
-        field.parameter_label(next(iter(named.values())).parameter_name),
-        y.replace("_", " ").replace("observed", f"displacement {component} of {point},")
-        + f" [{symbol}]" * bool(symbol),
-        [branch.parameter for branch in named.values()], [one / factor for one in heights])
+    diagram = branch_diagram(list(named.values()), list(named), y)
     return write_diagrams(path, title, named, [diagram], shown_of(field, observe, usable_hz),
                           study)
 

@@ -1,56 +1,99 @@
-"""Charts of a page: histories, spectra, phase portraits and energies."""
+"""Diagrams as parts of a page, and those of a run: histories, spectra, phase planes, energies."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from fecontact.analysis.histories import History, Point
+from fecontact.analysis.histories import Point
 from fecontact.analysis.spectra import amplitude_spectrum
 from fecontact.core.types import Array
-from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.plots.analysis import LOWEST_DECADES, end_of_content
-from fecontact.output.plots.run import usual_points
-from fecontact.output.plots.run_diagrams import (
+from fecontact.output.diagrams.colours import distinct_colours
+from fecontact.output.diagrams.diagram import Curve, Diagram
+from fecontact.output.diagrams.labels import name_and_unit
+from fecontact.output.diagrams.runs import (
     AXES,
-    Diagram,
     energy_diagrams,
     force_diagrams,
     labelled,
     motion_diagrams,
+    usual_points,
 )
-from fecontact.output.plots.style import distinct_colours
+from fecontact.output.diagrams.spectra import spectrum_diagram
 from fecontact.output.report.payload import SMALLEST, Payload
 
-_STEP = 1e-4  # of curves, of their largest value
-_FREQUENCIES = 800  # points of a spectrum
+_OVER_TIME = 1e-4  # error of curves over time, as a part of their largest value
+_STEP = 1e-5  # error of other ordinates
+_ACROSS = 1e-6  # error of abscissae, as a part of their range
 _FEWEST = 16  # output times of a spectrum
 _FLAT = 1e-9  # of the largest motion, below which a spectrum is round-off
+
+
+def diagram_table(
+    diagram: Diagram, payload: Payload, *, over_time: bool = False
+) -> dict[str, Any]:
+    """A diagram as a part of a page, in the units in which it is shown.
+
+    Logarithmic axes hold common logarithms. Curves ``over_time`` have the times of the page as
+    their abscissae.
+    """
+    (x_factor, x_label), (factor, y_label) = diagram.x_unit, diagram.y_unit
+    name, unit = name_and_unit(y_label)
+
+    def shown(axis: str, values: Array) -> Array:
+        values = np.asarray(values, dtype=float) / (x_factor if axis == "x" else factor)
+        return np.log10(values) if axis in diagram.logarithmic else values
+
+    limits = {axis: [None if end is None else float(shown(axis, np.array(end))) for end in ends]
+              for axis, ends in (("x", diagram.x_limits),
+                                 ("y", diagram.flat_range or diagram.y_limits))
+              if ends != (None, None) and not (over_time and axis == "x")}
+    lines = []
+    for curve in diagram.curves:
+        y = shown("y", curve.y)
+        step = (_OVER_TIME * diagram.largest / factor if over_time
+                else _STEP * float(np.abs(y).max(initial=0.0)))
+        line: dict[str, Any] = {"name": f"{diagram.heading} {curve.name}".strip(),
+                                "colour": curve.colour, "width": curve.width,
+                                "y": payload.add(y, max(step, SMALLEST))}
+        if not over_time:
+            x = shown("x", curve.x)
+            size = max(float(np.ptp(x)), _ACROSS * float(np.abs(x).max()))
+            line["x"] = payload.add(x, max(_ACROSS * size, SMALLEST))
+        if curve.stable is not None and not curve.stable.all():
+            line["stable"] = payload.add(curve.stable)
+        lines.append(line)
+    return {"title": diagram.title or name, "unit": unit, "factor": factor, "xLabel": x_label,
+            "log": diagram.logarithmic, "limits": limits, "lines": lines,
+            "marks": [[float(shown("x", np.array(mark.x))), float(shown("y", np.array(mark.y))),
+                       mark.letters or mark.kind] for mark in diagram.marks]}
 
 
 def chart_tables(
     run: Trajectory, points: Sequence[Point], payload: Payload
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """Charts over time, and phase portraits as pairs of their curves.
+    """Charts over time, and phase planes as pairs of their curves.
 
     Curves that stay zero are left out, and so are charts without curves.
     """
     shown = [(key, one) for key, one in motion_diagrams(
         run, tuple(points) or usual_points(run)).items() if one.curves]
-    charts = [chart_table(one, payload) for _, one in shown]
+    charts = [diagram_table(one, payload, over_time=True) for _, one in shown]
     place = {(*key, curve.name): (chart, row) for chart, (key, one) in enumerate(shown)
              for row, curve in enumerate(one.curves)}
     phases = [{"title": f"{name}, {AXES[axis]}", "x": place["displacement", axis, name], "y": at}
               for (what, axis, name), at in place.items()
               if what == "velocity" and ("displacement", axis, name) in place]
-    charts += [chart_table(one, payload) for one in force_diagrams(run) if one.largest > 0.0]
+    charts += [diagram_table(one, payload, over_time=True)
+               for one in force_diagrams(run) if one.largest > 0.0]
     return charts, phases
 
 
 def energy_charts(run: Trajectory, payload: Payload) -> list[dict[str, Any]]:
     """Charts of stored energy, work put in and energy lost, each with its total."""
-    return [chart_table(one, payload) for one in energy_diagrams(run) if len(one.curves) > 1]
+    return [diagram_table(one, payload, over_time=True)
+            for one in energy_diagrams(run) if len(one.curves) > 1]
 
 
 def spectrum_tables(
@@ -59,55 +102,27 @@ def spectrum_tables(
     """Charts of the velocity spectra of points, one for each direction in which they move."""
     d = run.system.basis.dimension
     points = tuple(points) or usual_points(run)
-    colours, charts = distinct_colours(len(points)), []
     motions = [run.velocity(point)[:, :d] for point in points]
     largest = max((float(np.abs(one).max()) for one in motions), default=0.0)
-    for axis, letter in enumerate("xyz"[:d]):
-        lines = [(labelled(point, run), colour, run.time, History(one[:, axis], "m/s", ""))
-                 for point, colour, one in zip(points, colours, motions, strict=True)
+    charts = []
+    for axis, letter in enumerate(AXES[:d]):
+        lines = [Curve(labelled(point, run), colour, run.time, one[:, axis])
+                 for point, colour, one in zip(points, distinct_colours(len(points)), motions,
+                                               strict=True)
                  if np.ptp(one[:, axis]) > _FLAT * largest]
-        chart = spectrum_table(f"velocity {letter}", lines, payload) if lines else None
-        if chart is not None:
-            charts.append(chart)
+        charts += spectrum_table(f"velocity {letter}", "m/s", lines, payload) if lines else []
     return charts
 
 
 def spectrum_table(
-    title: str, lines: Sequence[tuple[str, str, Array, History]], payload: Payload
-) -> dict[str, Any] | None:
-    """A chart of amplitude spectra on a common axis of frequencies; None without motion.
-
-    Values are common logarithms of amplitudes in the unit of the chart.
-    """
-    if any(len(time) < _FEWEST for _, _, time, _ in lines):
-        return None
-    found = [amplitude_spectrum(time, one.values, resample=True) for _, _, time, one in lines]
-    largest = max(float(one.values.max()) for one in found)
-    if not 0.0 < largest < np.inf:
-        return None
-    factor, symbol = suitable_unit(largest, lines[0][3].unit)
-    end = max(end_of_content(one.frequency_hz, one.values) for one in found)
-    edges = np.linspace(0.0, end, _FREQUENCIES + 1)
-    floor = largest * 10.0**-(LOWEST_DECADES + 1.0)
-    columns = []
-    for one in found:
-        # The largest amplitude between two frequencies, so that no peak is lost.
-        middles = 0.5 * (edges[:-1] + edges[1:])
-        values = np.interp(middles, one.frequency_hz, one.values, right=0.0)
-        inside = one.frequency_hz < end
-        np.maximum.at(values, np.searchsorted(edges, one.frequency_hz[inside], side="right") - 1,
-                      one.values[inside])
-        columns.append(np.log10(np.maximum(values, floor) / factor))
-    return {"title": title, "unit": symbol, "decades": LOWEST_DECADES,
-            "lines": [{"name": name, "colour": colour} for name, colour, _, _ in lines],
-            "frequency": payload.add(0.5 * (edges[:-1] + edges[1:]), 1e-6 * end),
-            "values": payload.add(np.column_stack(columns), 1e-3)}
-
-
-def chart_table(diagram: Diagram, payload: Payload) -> dict[str, Any]:
-    """A chart of a diagram, stored in the unit in which it is shown."""
-    factor, symbol = diagram.scale
-    values = np.column_stack([one.values for one in diagram.curves]) / factor
-    return {"title": diagram.title, "unit": symbol, "factor": factor,
-            "lines": [{"name": one.name, "colour": one.colour} for one in diagram.curves],
-            "values": payload.add(values, max(_STEP * diagram.largest / factor, SMALLEST))}
+    title: str, unit: str, histories: Sequence[Curve], payload: Payload
+) -> list[dict[str, Any]]:
+    """A chart of the amplitude spectra of histories; empty without motion or for a short one."""
+    if any(len(one.x) < _FEWEST for one in histories):
+        return []
+    found = [amplitude_spectrum(one.x, one.y, resample=True) for one in histories]
+    if not 0.0 < max(float(one.values.max()) for one in found) < np.inf:
+        return []
+    return [diagram_table(spectrum_diagram(
+        found, f"amplitude [{unit}]", [one.name for one in histories],
+        [one.colour for one in histories], title=title), payload)]

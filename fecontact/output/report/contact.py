@@ -11,9 +11,10 @@ from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.height_map import HeightMap
+from fecontact.output.diagrams.colours import STATE_COLOURS
 from fecontact.output.files.frames import contact_forces
 from fecontact.output.plots.solids.plans import FacePlan, face_plan
-from fecontact.output.plots.style import STATE_COLOURS, state_names
+from fecontact.output.plots.style import state_names
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.report.bodies import PRESSURE, STATE
 from fecontact.output.report.drawing import DrawnContact, DrawnGround

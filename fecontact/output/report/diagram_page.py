@@ -13,10 +13,11 @@ from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.core.units import UNITS, count, round_125, suitable_unit
+from fecontact.output.diagrams.colours import distinct_colours
+from fecontact.output.diagrams.diagram import Diagram
 from fecontact.output.files.stored_system import library_versions
-from fecontact.output.plots.bifurcation_diagram import LETTERS, stable_pieces
-from fecontact.output.plots.style import distinct_colours
 from fecontact.output.report.bodies import Motions, bodies_table
+from fecontact.output.report.charts import diagram_table
 from fecontact.output.report.drawing import drawn_bodies
 from fecontact.output.report.page import write_page
 from fecontact.output.report.payload import SMALLEST, Payload
@@ -27,25 +28,11 @@ from fecontact.reduction.report import beyond_basis
 SAMPLES = 129  # of a motion, both ends included
 _ORBITS = 240  # of all branches together
 _ORBITS_RUN = 60  # by shooting, which are run again
-_STEP = 1e-4  # of curves, of their largest value
+_STEP = 1e-4  # of motions, of their largest value
+_HEIGHTS = {1: (440,), 2: (330, 190)}  # of diagrams above each other [pixels]
 _VISIBLE = 0.1  # largest motion drawn, as a part of the bodies' extent
 
 Motion = tuple[float, Array]  # period [s], and states (SAMPLES, d) at equal distances in time
-
-
-@dataclass(frozen=True, eq=False)
-class Diagram:
-    """Curves of all branches in one diagram: x (N,) and y (N, ...), in the units of the labels.
-
-    With ``decades`` x holds common logarithms; the axis shows the numbers themselves.
-    """
-
-    x_label: str
-    y_label: str
-    x: Sequence[Array]
-    y: Sequence[Array]
-    height: int = 440
-    decades: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +85,9 @@ def write_diagrams(
         "status": _status(named),
         "good": all(branch.status.name != "STALLED" for branch in named.values()),
         "notes": [f"{name}: {branch.message}" for name, branch in named.items() if branch.message],
-        "diagrams": [{"xLabel": one.x_label, "yLabel": one.y_label, "height": one.height,
-                      "decades": one.decades}
-                     for one in diagrams],
+        "diagrams": _diagram_tables(list(named), diagrams, payload),
         "columns": shown.columns,
-        "branches": _branch_tables(named, diagrams, kept, shown.texts, payload),
+        "branches": _branch_tables(named, kept, shown.texts),
         "samples": SAMPLES,
         "observed": shown.observed,
         "study": study_tables(study, "branch", "response"),
@@ -179,33 +164,31 @@ def _orbit_tables(
     return found, states[:, :m]
 
 
+def _diagram_tables(
+    names: list[str], diagrams: Sequence[Diagram], payload: Payload
+) -> list[dict[str, Any]]:
+    """Diagrams above each other over one abscissa; each line has the number of its branch."""
+    tables = [diagram_table(one, payload) | {"height": height}
+              for one, height in zip(diagrams, _HEIGHTS[len(diagrams)], strict=True)]
+    for table in tables[:-1]:
+        table["xLabel"] = ""
+    for line in (line for table in tables for line in table["lines"]):
+        line["branch"] = names.index(line["name"]) if line["name"] else 0
+    return tables
+
+
 def _branch_tables(
-    named: Mapping[str, Branch], diagrams: Sequence[Diagram], kept: list[tuple[str, int]],
-    texts: Callable[[BranchPoint], list[str]], payload: Payload,
+    named: Mapping[str, Branch], kept: list[tuple[str, int]],
+    texts: Callable[[BranchPoint], list[str]],
 ) -> list[dict[str, Any]]:
     places = {place: number for number, place in enumerate(kept)}
     found = []
-    for number, ((name, branch), colour) in enumerate(
-            zip(named.items(), distinct_colours(len(named)), strict=True)):
+    for (name, branch), colour in zip(named.items(), distinct_colours(len(named)), strict=True):
         indices = [index for other, index in kept if other == name]
-        curves = [_curve(one.x[number], one.y[number], payload) for one in diagrams]
-        found.append({
-            "name": name, "colour": colour,
-            "x": [x for x, _ in curves], "y": [y for _, y in curves],
-            "stable": payload.add(np.append(stable_pieces(branch), True)),
-            "special": [[index, LETTERS.get(point.kind, point.kind)]
-                        for index, point in enumerate(branch.points) if point.kind is not None],
-            "kept": indices, "first": places[name, indices[0]],
-            "rows": [texts(branch.points[index]) for index in indices],
-        })
+        found.append({"name": name, "colour": colour, "kept": indices,
+                      "first": places[name, indices[0]],
+                      "rows": [texts(branch.points[index]) for index in indices]})
     return found
-
-
-def _curve(x: Array, y: Array, payload: Payload) -> tuple[Any, Any]:
-    heights = np.asarray(y, dtype=float).reshape(len(x), -1)
-    size = max(float(np.ptp(x)), 1e-6 * float(np.abs(x).max()))
-    return (payload.add(x, max(1e-6 * size, SMALLEST)),
-            payload.add(heights, max(1e-5 * float(np.abs(heights).max()), SMALLEST)))
 
 
 def point_texts(point: BranchPoint, usable_hz: float = np.inf) -> list[str]:

@@ -10,8 +10,9 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
-from fecontact.core.units import quantity, suitable_unit
-from fecontact.output.report.diagram_page import SAMPLES, Diagram, Shown, sampled, write_diagrams
+from fecontact.core.units import quantity
+from fecontact.output.diagrams.branches import mode_diagrams
+from fecontact.output.report.diagram_page import SAMPLES, Shown, sampled, write_diagrams
 from fecontact.output.report.run_report import require_page
 from fecontact.system.contact_system import ContactSystem
 
@@ -63,14 +64,8 @@ def report_modes(
     path = require_page(path)
     named = _numbered(given)
     unit = "rad" if observe[1].startswith("phi") else "m"
-    scale, symbol = suitable_unit(max(float(mode.amplitude.max()) for mode in given), unit)
-    x = [np.log10(mode.amplitude / scale) for mode in given]
     lossless = all(mode.conservative for mode in given)
-    below: list[Any] = [mode.energy if lossless else mode.damping_ratio for mode in given]
-    diagrams = [
-        Diagram("", "frequency [Hz]", x, [mode.frequency_hz for mode in given], 300, True),
-        Diagram(f"amplitude of {given[0].observed} [{symbol}]",
-                "energy [J]" if lossless else "damping ratio", x, below, 210, True)]
+    diagrams = mode_diagrams(given, list(named))
     point, component = observe
     shown = Shown(system.basis, system.basis.point_row(point, component),
                   f"displacement {component} of {point}", _motion,

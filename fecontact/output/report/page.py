@@ -15,7 +15,6 @@ from typing import Literal
 from fecontact.core.errors import InputError, ModelWarning
 from fecontact.core.files.atomic_write import write_text
 from fecontact.output.report.payload import as_text
-from fecontact.output.report.shorten import shortened
 
 Kind = Literal["run", "runs", "branches", "sweep", "widget"]
 # In the order in which they need each other; together one script.
@@ -50,14 +49,14 @@ content="default-src 'none'; script-src 'sha256-{seal}'; style-src 'sha256-{styl
 
 @cache
 def script(kind: Kind) -> str:
-    """The script of a page, in few letters."""
-    return shortened("\n".join(_asset(name) for name in SCRIPTS[kind]))
+    """The script of a page."""
+    return _plain("\n".join(_asset(name) for name in SCRIPTS[kind]))
 
 
 @cache
 def styles() -> str:
     """The styles of all pages."""
-    return re.sub(r"\s*\n\s*", "\n", _asset("report.css"))
+    return _plain(_asset("report.css"))
 
 
 def page(title: str, block: bytes, kind: Kind = "run") -> str:
@@ -96,6 +95,11 @@ def require_own_page(path: Path) -> None:
     if not own:
         raise InputError(f"{path} exists and is no page of fecontact; move it, or choose another "
                          f"name by fecontact report -o NAME.html.")
+
+
+def _plain(text: str) -> str:
+    """A script or styles without indents, empty lines and lines of comments."""
+    return re.sub(r"\s*\n\s*", "\n", re.sub(r"^\s*//.*$", "", text, flags=re.MULTILINE)).strip()
 
 
 def _asset(name: str) -> str:

@@ -10,14 +10,9 @@ from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.harmonic.response import FrequencyResponse
 from fecontact.core.checks import require_kind
 from fecontact.core.units import quantity
-from fecontact.output.plots.parameter_labels import branch_label, in_unit
-from fecontact.output.plots.responses.response import (
-    drawn,
-    drawn_label,
-    level_texts,
-)
+from fecontact.output.diagrams.branches import level_texts, response_diagrams
 from fecontact.output.report.branch_report import COLUMNS, shown_of
-from fecontact.output.report.diagram_page import Diagram, point_texts, write_diagrams
+from fecontact.output.report.diagram_page import point_texts, write_diagrams
 from fecontact.output.report.run_report import require_page
 from fecontact.system.contact_system import ContactSystem
 
@@ -66,16 +61,11 @@ def report_response(
     names = [*response.branches[0].parameter_names,
              *([response.level_name] if response.level_name and not response.force_name else [])]
     field = contact_field(system, dict.fromkeys(names))
-    named = dict(zip(_names(response), response.branches, strict=True))
-    x_label = branch_label(response.branches[0])
-    x = [branch.parameter for branch in response.branches]
-    curves = [drawn(response, level) for level in range(len(named))]
+    heading, levels = level_texts(response)
+    named = {f"{heading} {text}".strip() or "response": branch
+             for text, branch in zip(levels, response.branches, strict=True)}
     unit = "rad" if observe[1].startswith("phi") else "m"
-    scale, y_label = in_unit(drawn_label(response), np.concatenate(curves))
-    diagrams = [
-        Diagram("", y_label, x, [one / scale for one in curves], height=330),
-        Diagram(x_label, "phase [°]", x,
-                [np.degrees(response.phase(level)) for level in range(len(named))], height=170)]
+    diagrams = response_diagrams(response, usable_hz=usable_hz)
     shown = shown_of(field, observe)
 
     def texts(point: BranchPoint) -> list[str]:
@@ -89,12 +79,3 @@ def report_response(
                     texts=texts)
     return write_diagrams(path, path.stem if title is None else title, named, diagrams, shown,
                           study)
-
-
-def _names(response: FrequencyResponse) -> list[str]:
-    """Names of the levels, each once."""
-    if response.level_name is None:
-        return ["response"]
-    words, texts = level_texts(response)
-    return [f"{words} {text}" + f" ({number})" * (text in texts[:number])
-            for number, text in enumerate(texts)]

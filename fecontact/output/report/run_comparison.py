@@ -1,6 +1,7 @@
 """The report of a comparison: a page with several runs over each other."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,10 @@ from fecontact.analysis.histories import Point, history, usual_component
 from fecontact.analysis.summaries import usual_point
 from fecontact.core.units import UNITS
 from fecontact.integrate.trajectory import Status, Trajectory
+from fecontact.output.diagrams.colours import distinct_colours
+from fecontact.output.diagrams.diagram import Curve, Diagram
 from fecontact.output.files.stored_system import library_versions
-from fecontact.output.plots.run_diagrams import Curve, Diagram
-from fecontact.output.plots.style import distinct_colours
-from fecontact.output.report.charts import chart_table, spectrum_table
+from fecontact.output.report.charts import diagram_table, spectrum_table
 from fecontact.output.report.page import write_page
 from fecontact.output.report.payload import Payload
 from fecontact.output.report.run_report import require_page
@@ -72,20 +73,21 @@ def report_runs(
         for quantity in ("displacement", "velocity")]
     if all(run.system.basis.contact_nodes for run in runs.values()):
         wanted += [("total_normal_force", "B", "x"), ("total_friction_force", "B", "x")]
-    charts, spectra = [], []
+    charts: list[dict[str, Any]] = []
+    spectra: list[dict[str, Any]] = []
     for wish in wanted:
-        shown = [history(run, *wish) for run in runs.values()]
-        if not any(one.values.any() for one in shown):
+        histories = [history(run, *wish) for run in runs.values()]
+        if not any(one.values.any() for one in histories):
             continue
+        title_of, unit = histories[0].title, histories[0].unit
+        curves = tuple(Curve(name, colour, run.time, one.values) for (name, run), one, colour
+                       in zip(runs.items(), histories, colours, strict=True))
         if time is not None:
-            charts.append(chart_table(Diagram(shown[0].title, shown[0].unit, tuple(
-                Curve(name, colour, np.interp(time, run.time, one.values))
-                for (name, run), one, colour in zip(runs.items(), shown, colours, strict=True))),
-                payload))
+            charts.append(diagram_table(Diagram("time [s]", f"{title_of} [{unit}]", tuple(
+                replace(one, x=time, y=np.interp(time, one.x, one.y)) for one in curves)),
+                payload, over_time=True))
         if wish[0] == "velocity":
-            spectra.append(spectrum_table(shown[0].title, [
-                (name, colour, run.time, one) for (name, run), one, colour in zip(
-                    runs.items(), shown, colours, strict=True)], payload))
+            spectra += spectrum_table(title_of, unit, curves, payload)
     notes = [f"{name}: {run.status.value}" for name, run in runs.items()
              if run.status not in (Status.FINISHED, Status.EVENT)]
     if time is None:
@@ -99,7 +101,7 @@ def report_runs(
         "parameters": [list(row) for row in found.parameter_rows()],
         "same": "All parameters that the files hold are equal.",
         "time": None if time is None else payload.add(time, 1e-9 * (end - begin)),
-        "charts": charts, "spectra": [one for one in spectra if one is not None],
+        "charts": charts, "spectra": spectra,
         "versions": list(map(list, library_versions().items())),
     }
     return write_page(path, title, payload.block(header), "runs")

@@ -16,10 +16,11 @@ from fecontact.core.units import quantity, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.integrate.wear import WearHistory
 from fecontact.laws.wear import WearLaw
+from fecontact.output.diagrams.colours import COLOURS, STATE_COLOURS
+from fecontact.output.diagrams.diagram import thinned
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.run_diagrams import thinned
 from fecontact.output.plots.solids.plans import FacePlan, draw_arrows, draw_plan, face_plans
-from fecontact.output.plots.style import COLOURS, STATE_COLOURS, add_note, legend_label, state_names
+from fecontact.output.plots.style import add_note, legend_label, state_names
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import STATES

@@ -2,28 +2,10 @@
 
 class Diagram extends Chart {
   constructor(data, which, pick) {
-    const lines = data.branches.flatMap((branch) => {
-      const x = branch.x[which].values, { columns, values } = branch.y[which];
-      return Array.from({ length: columns }, (_, k) => ({
-        ...branch, branch, x, stable: branch.stable.values, y: values.filter((_, at) => at % columns === k) }));
-    });
-    const longest = max(...lines.map(({ x }) => x.length)) - 1, { xLabel, yLabel, height, decades } = data.diagrams[which];
-    super({ window: () => [0, longest], set: pick }, { title: yLabel, xLabel, lines,
-      legend: which ? [] : data.branches, height, kind: "diagram" });
-    this.decades = decades;
-  }
-
-  // On a logarithmic axis 1, 2, 5 in each decade where there is room, else powers of ten.
-  marks(low, high, most) {
-    if (!this.decades) return ticks(low, high, most);
-    const digits = high - low < most / 4 ? [1, 2, 5] : [1], found = [];
-    for (let k = floor(low); k <= high; k++) {
-      for (const digit of digits) {
-        const at = k + Math.log10(digit);
-        if (at >= low && at <= high) found.push([at, `${+(digit * 10 ** k).toPrecision(1)}`]);
-      }
-    }
-    return found.length > 1 ? found : ticks(low, high, most).map(([at]) => [at, `${+(10 ** at).toPrecision(3)}`]);
+    const diagram = data.diagrams[which];
+    const lines = linesOf(diagram).map((line) => ({ ...line, kept: data.branches[line.branch].kept }));
+    const longest = max(...lines.map(({ x }) => x.length)) - 1;
+    super({ window: () => [0, longest], set: pick }, { ...diagram, lines, legend: which ? [] : lines, kind: "diagram" });
   }
 
   // The point that was picked in this diagram or in another one.
@@ -31,42 +13,6 @@ class Diagram extends Chart {
     const own = this.lines.includes(line) ? line : this.lines.find(({ branch }) => branch === line.branch);
     this.chosen = { line: own, index };
     this.point();
-  }
-
-  // Unstable parts are dashed.
-  trace(c, { x, y, stable }) {
-    for (const solid of [1, 0]) {
-      c.beginPath();
-      c.setLineDash(solid ? [] : [6, 4]);
-      c.lineWidth = solid ? 2 : 1.2;
-      for (let i = 0; i + 1 < x.length; i++) {
-        if (stable[i] === solid) { c.moveTo(this.px(x[i]), this.py(y[i])); c.lineTo(this.px(x[i + 1]), this.py(y[i + 1])); }
-      }
-      c.stroke();
-    }
-    c.beginPath();
-    c.setLineDash([]);
-  }
-
-  draw() {
-    super.draw();
-    const c = this.context;
-    c.font = `600 12px ${css("font")}`;
-    c.textAlign = "left";
-    for (const { x, y, special } of this.lines) {
-      for (const [at, letters] of special) {
-        const [px, py] = [this.px(x[at]), this.py(y[at])];
-        c.beginPath();
-        c.arc(px, py, 4.5, 0, 7);
-        c.fillStyle = css("panel");
-        c.strokeStyle = css("ink");
-        c.lineWidth = 1.2;
-        c.fill();
-        c.stroke();
-        c.fillStyle = css("ink");
-        c.fillText(letters, px + 7, py - 9);
-      }
-    }
   }
 
   // Of the points whose orbits are stored, the nearest.
@@ -105,8 +51,7 @@ async function build(host, data, told) {
     xLabel: "", lines: [{ ...line("x"), y: phases }], height: 220, kind: "phase" });
   const facts = el("div");
   const choose = (chosen) => {
-    const { line: { branch }, number: place } = chosen;
-    const number = branch.first + place;
+    const { line, number: place } = chosen, branch = data.branches[line.branch], number = branch.first + place;
     clock.load(phases.map((value) => value * orbits.periods.values[number]));
     if (player) data.coordinates.values = part(orbits.coordinates, number);
     history.xLabel = clock.label;

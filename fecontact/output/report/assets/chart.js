@@ -34,6 +34,19 @@ function ticks(low, high, most) {
     ? value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1") : value.toPrecision(3)]);
 }
 
+// On a logarithmic axis, of common logarithms: 1, 2, 5 in each decade where there is room, else powers
+// of ten.
+function decades(low, high, most) {
+  const digits = high - low < most / 4 ? [1, 2, 5] : [1], found = [];
+  for (let k = floor(low); k <= high; k++) {
+    for (const digit of digits) {
+      const at = k + Math.log10(digit);
+      if (at >= low && at <= high) found.push([at, k > -4 && k < 5 ? `${+(digit * 10 ** k).toPrecision(1)}` : `${digit}e${k}`]);
+    }
+  }
+  return found.length > 1 ? found : ticks(low, high, most).map(([at]) => [at, `${+(10 ** at).toPrecision(3)}`]);
+}
+
 // Index of the last time that is not after t.
 function before(times, t) {
   let low = 0, high = times.length - 1;
@@ -52,6 +65,10 @@ function layer(canvas, width, height) {
   return context;
 }
 
+// Lines of a diagram of the page: over the clock, or over abscissae of their own.
+const linesOf = ({ lines }) => lines.map(({ x, y, stable, ...line }) => ({
+  ...line, y: y.values, x: x?.values, stable: stable?.values }));
+
 // Letters of labels.
 function letters(c, textAlign) {
   c.font = `11px ${css("font")}`;
@@ -60,9 +77,12 @@ function letters(c, textAlign) {
 }
 
 class Chart {
-  // lines: [{name, colour, x?, y}] with arrays; without x over the time of the clock.
-  constructor(clock, { title, unit, xLabel, lines, legend = lines, height = 132, kind = "chart" }) {
-    Object.assign(this, { clock, lines, xLabel, height });
+  // lines: [{name, colour, width?, x?, y, stable?}] with arrays; without x over the time of the clock.
+  // Logarithmic axes, named in `log`, have common logarithms; `limits` fixes ends of axes, `marks` are
+  // places with letters.
+  constructor(clock, { title, unit, xLabel, lines, legend = lines, height = 132, kind = "chart",
+    log = "", limits = {}, marks = [] }) {
+    Object.assign(this, { clock, lines, xLabel, height, log, marks, ends: limits });
     this.base = el("canvas");
     this.top = el("canvas");
     this.box = el("div.plot", {}, this.base, this.top);
@@ -74,8 +94,9 @@ class Chart {
   }
 
   legend(lines) {
-    if (lines.length < 2) return [];
-    return lines.map(({ name, colour, back }) => {
+    const named = lines.filter(({ name }, k) => lines.findIndex((line) => line.name === name) === k);
+    if (named.length < 2) return [];
+    return named.map(({ name, colour, back }) => {
       const swatch = el("i");
       swatch.style.background = back || themed(colour);
       return el("span", {}, swatch, name);
@@ -105,8 +126,8 @@ class Chart {
           if (line[name][i] > high) high = line[name][i];
         }
       }
-      const room = 0.06 * (high - low) || 0.1 * abs(high) || 1;
-      return [low - room, high + room];
+      const room = 0.06 * (high - low) || 0.1 * abs(high) || 1, [first, last] = this.ends[name] ?? [];
+      return [first ?? low - room, last ?? high + room];
     };
     return { x: this.overTime ? this.clock.shown() : span("x"), y: span("y") };
   }
@@ -121,7 +142,8 @@ class Chart {
     letters(c, "right");
     c.strokeStyle = css("grid");
     c.lineWidth = 1;
-    const xs = (this.marks || ticks).call(this, ...x, clamp((right - left) / 70, 2, 10)), ys = (this.levels || ticks)(...y, this.height / 32);
+    const places = (name) => this.log.includes(name) ? decades : ticks;
+    const xs = places("x")(...x, clamp((right - left) / 70, 2, 10)), ys = places("y")(...y, this.height / 32);
     c.beginPath();
     for (const [value] of xs) { c.moveTo(this.px(value), top); c.lineTo(this.px(value), bottom); }
     for (const [value] of ys) { c.moveTo(left, this.py(value)); c.lineTo(right, this.py(value)); }
@@ -135,12 +157,28 @@ class Chart {
     c.clip();
     for (const line of this.lines) {
       c.strokeStyle = themed(line.colour);
-      c.lineWidth = line.name === "total" ? 1.8 : 1.2;
+      c.lineWidth = line.width ?? 1.2;
       c.beginPath();
       if (line.x) this.trace(c, line); else this.envelope(c, line.y);
       c.stroke();
+      if (line.stable) this.unstable(c, line);
     }
     c.restore();
+    c.font = `600 12px ${css("font")}`;
+    c.textAlign = "left";
+    for (const [at, height, text] of this.marks) this.circle(c, this.px(at), this.py(height), text);
+  }
+
+  circle(c, x, y, text) {
+    c.beginPath();
+    c.arc(x, y, 4.5, 0, 7);
+    c.fillStyle = css("panel");
+    c.strokeStyle = css("ink");
+    c.lineWidth = 1.2;
+    c.fill();
+    c.stroke();
+    c.fillStyle = css("ink");
+    c.fillText(text, x + 7, y - 9);
   }
 
   bottomLabels(c, xs) {
@@ -153,9 +191,26 @@ class Chart {
     }
   }
 
-  trace(c, { x, y }) {
-    const [i0, i1] = this.clock.window();
-    for (let i = i0; i <= i1; i++) c.lineTo(this.px(x[i]), this.py(y[i]));
+  trace(c, { x, y, stable }) {
+    const [i0, i1] = this.clock.window(), end = min(i1, x.length - 1);
+    for (let i = i0; i <= end; i++) {
+      if (stable && i && !stable[i - 1]) c.moveTo(this.px(x[i]), this.py(y[i]));
+      else c.lineTo(this.px(x[i]), this.py(y[i]));
+    }
+  }
+
+  // Unstable parts are dashed and thin.
+  unstable(c, { x, y, stable }) {
+    c.beginPath();
+    c.setLineDash([6, 4]);
+    c.lineWidth = 1.2;
+    stable.forEach((solid, i) => {
+      if (solid) return;
+      if (!i || stable[i - 1]) c.moveTo(this.px(x[i]), this.py(y[i]));
+      c.lineTo(this.px(x[i + 1]), this.py(y[i + 1]));
+    });
+    c.stroke();
+    c.setLineDash([]);
   }
 
   // Of many values in a column of pixels: what comes in, the lowest, the highest, what goes out.

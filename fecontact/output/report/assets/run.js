@@ -31,7 +31,7 @@ async function build(host, data, told) {
   units = data.units;
   const clock = new Clock(data.time.values, told);
   const player = data.bodies ? new Player(data, clock) : null;
-  const charts = data.charts.map((one) => new Chart(clock, columns(one, clock)));
+  const charts = data.charts.map((one) => new Chart(clock, overTime(one, clock)));
   const phases = data.phases.map(({ title, x, y }) => {
     const [one, other] = [x, y].map(([chart, line]) => ({ unit: data.charts[chart].unit, ...charts[chart].lines[line] }));
     return new Chart(clock, { title: `${title}: velocity [${other.unit}] over displacement [${one.unit}]`, xLabel: "",
@@ -40,7 +40,7 @@ async function build(host, data, told) {
   const maps = data.contact ? data.contact.faces.flatMap((face) => (face.plan ? [Footprint, ContactMap] : [ContactMap])
     .map((kind) => new kind(clock, data.contact, face, data.maps["von Mises stress"]))) : [];
   const spectra = data.spectra.map((one) => new Spectrum(one));
-  const energies = data.energies.map((one) => new Chart(clock, columns(one, clock)));
+  const energies = data.energies.map((one) => new Chart(clock, overTime(one, clock)));
   const all = [...charts, ...spectra, ...phases, ...maps, ...energies];
   const resize = () => { for (const one of all) one.resize(); };
   const timing = controls(data, clock, player, resize);

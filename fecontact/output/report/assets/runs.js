@@ -3,7 +3,7 @@
 async function build(host, data, told) {
   units = data.units;
   const clock = data.time ? new Clock(data.time.values, told) : null;
-  const charts = clock ? data.charts.map((one) => new Chart(clock, { ...columns(one, clock), height: 180 })) : [];
+  const charts = clock ? data.charts.map((one) => new Chart(clock, { ...overTime(one, clock), height: 180 })) : [];
   const spectra = data.spectra.map((one) => new Spectrum(one));
   const all = [...charts, ...spectra], nodes = (some) => some.map((one) => one.node);
   const resize = () => { for (const one of all) one.resize(); };

@@ -1,29 +1,14 @@
-// Amplitude spectra over frequency, with a logarithmic axis; a click reads a frequency.
+// Amplitude spectra over frequency; a click reads a frequency.
 
 class Spectrum extends Chart {
-  constructor({ title, unit, lines, frequency, values, decades }) {
-    const x = frequency.values, { values: all, columns: count } = values;
-    const read = { window: () => [0, x.length - 1], set: (hertz) => { this.at = hertz; this.point(); } };
-    super(read, { title, unit, xLabel: "frequency [Hz]", lines: lines.map((line, k) => ({ ...line, x,
-      y: Float64Array.from(x, (_, i) => all[i * count + k]) })) });
-    this.decades = decades;
-  }
-
-  limits() {
-    const high = this.lines.reduce((sum, { y }) => max(sum, max(...y)), -300) + 0.3;
-    return { x: [0, this.lines[0].x.at(-1)], y: [high - this.decades, high] };
-  }
-
-  // The axis has common logarithms and shows the numbers themselves.
-  levels(low, high) {
-    const found = [];
-    for (let k = Math.ceil(low); k <= high; k++) found.push([k, k > -4 && k < 5 ? `${+(10 ** k).toPrecision(1)}` : `1e${k}`]);
-    return found;
+  constructor(diagram) {
+    const lines = linesOf(diagram), longest = max(...lines.map(({ x }) => x.length)) - 1;
+    super({ window: () => [0, longest], set: (hertz) => { this.at = hertz; this.point(); } }, { ...diagram, lines });
   }
 
   timeAt(x) {
-    const { left, right } = this.inner;
-    return this.lines[0].x.at(-1) * clamp((x - left) / (right - left), 0, 1);
+    const { left, right } = this.inner, [low, high] = this.range.x;
+    return low + (high - low) * clamp((x - left) / (right - left), 0, 1);
   }
 
   point() {

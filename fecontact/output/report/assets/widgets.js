@@ -169,12 +169,8 @@ function addPlayer(data, player, more) {
   more.append(field("view", view), field("see-through", ticked("through")));
 }
 
-// Curves of a chart, stored beside each other.
-function columns({ values, lines, title, unit }, clock) {
-  const { values: all, columns: count, rows } = values;
-  return { title, unit, xLabel: clock.label, lines: lines.map((line, k) => ({ ...line,
-    y: Float64Array.from({ length: rows }, (_, i) => all[i * count + k]) })) };
-}
+// A diagram over the time of the clock.
+const overTime = (diagram, clock) => ({ ...diagram, xLabel: clock.label, lines: linesOf(diagram) });
 
 function cards(title, sections) {
   return section(title, ...sections.length ? [el("div.cards", {}, ...sections.map(({ name, rows }) =>

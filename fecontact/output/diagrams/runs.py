@@ -1,22 +1,16 @@
-"""Diagrams of a run over time: named curves with a unit, for pictures and pages alike."""
+"""Diagrams of a run: motions, forces and energies over time, and phase planes."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.analysis.histories import Point, is_relative, point_name
+from fecontact.analysis.summaries import usual_point
 from fecontact.core.types import Array
-from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.plots.style import COLOURS, ENERGY_COLOURS, distinct_colours, legend_label
+from fecontact.output.diagrams.colours import COLOURS, ENERGY_COLOURS, distinct_colours
+from fecontact.output.diagrams.diagram import WIDTH, Curve, Diagram, Level
 from fecontact.reduction.assembly.contact_faces import contact_faces, several_bodies
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 AXES = ("x", "y", "z")
 # Title of each diagram of energies, attribute of their sum, attributes of the terms.
@@ -26,54 +20,11 @@ _ENERGIES = (
                              "circulatory_work", "bristle_work")),
     ("energy lost", "lost", ("modal_damping", "dashpots", "contact_damping", "friction")),
 )
-_DARK, _PALE = "#303030", "#b8b4ad"
+_PALE = "#b8b4ad"
 _FLAT = 1e-9  # of the largest motion, below which a curve is round-off
-_LINE_BINS = 2000  # a long line is drawn by minimum and maximum of each
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """Values (N,) over time; without a colour in that of text. Lines have their width in points."""
-
-    name: str
-    colour: str
-    values: Array
-    width: float = 1.2
-
-
-@dataclass(frozen=True, eq=False)
-class Diagram:
-    """Curves of one unit over the same times."""
-
-    title: str
-    unit: str
-    curves: tuple[Curve, ...]
-
-    @cached_property
-    def largest(self) -> float:
-        """Largest size of all values."""
-        return max((float(np.abs(one.values).max(initial=0.0)) for one in self.curves), default=0.0)
-
-    @cached_property
-    def scale(self) -> tuple[float, str]:
-        """Factor and symbol of a unit that suits the values."""
-        return suitable_unit(self.largest, self.unit)
-
-    def draw(self, axes: "Axes", time: Array) -> None:
-        """Draw the curves over times in the unit of their axis, and label the axis of values."""
-        factor, symbol = self.scale
-        axes.set_ylabel(f"{self.title} [{symbol}]")
-        for one in self.curves:
-            # Thick lines lie behind thin ones.
-            axes.plot(*thinned(time, one.values / factor), color=one.colour or _DARK,
-                      linewidth=one.width, zorder=2.5 - 0.1 * one.width,
-                      label=legend_label(one.name))
-        low = min((float(one.values.min()) for one in self.curves), default=0.0)
-        high = max((float(one.values.max()) for one in self.curves), default=0.0)
-        if 0.0 <= high - low < _FLAT * self.largest:
-            # Do not magnify round-off about a constant.
-            axes.set_ylim((low - 0.05 * self.largest) / factor,
-                          (high + 0.05 * self.largest) / factor)
+_MOST_MIDDLES = 5  # contact nodes shown by default
+_FASTEST = 5.0  # largest ground speed shown in a phase plane, as a multiple of the body's velocity
+_TIME = "time [s]"
 
 
 def motion_diagrams(
@@ -91,8 +42,8 @@ def motion_diagrams(
     for (what, values), unit in zip(motions.items(), ("m", "m/s"), strict=True):
         largest = max((float(np.abs(one).max()) for one in values), default=0.0)
         for axis in range(d):
-            found[what, axis] = Diagram(f"{what} {AXES[axis]}", unit, tuple(
-                Curve(name, colour, one[:, axis], 1.2 if number else 2.0)
+            found[what, axis] = _over_time(run, f"{what} {AXES[axis]} [{unit}]", tuple(
+                Curve(name, colour, run.time, one[:, axis], WIDTH if number else 2.0)
                 for number, (name, colour, one) in enumerate(zip(names, colours, values,
                                                                  strict=True))
                 if np.abs(one[:, axis]).max() > _FLAT * largest))
@@ -108,8 +59,8 @@ def force_diagrams(run: Trajectory) -> list[Diagram]:
     colours = [""] if single else distinct_colours(len(faces))
 
     def of_faces(title: str, values: Array) -> Diagram:
-        return Diagram(title, "N", tuple(
-            Curve(face.name, colour, values[:, face.nodes].sum(axis=1))
+        return _over_time(run, f"{title} [N]", tuple(
+            Curve(face.name, colour, run.time, values[:, face.nodes].sum(axis=1))
             for face, colour in zip(faces, colours, strict=True)))
 
     normal = of_faces("total normal force", run.normal_force)
@@ -121,11 +72,11 @@ def force_diagrams(run: Trajectory) -> list[Diagram]:
     totals = [on_body[:, face.nodes].sum(axis=1) for face in faces]
     if single:
         size = np.linalg.norm(totals[0], axis=1)
-        return [normal, Diagram("total friction on the body", "N", (
-            Curve("size", _PALE, size, 2.4), Curve("x", "", totals[0][:, 0]),
-            Curve("y", COLOURS[1], totals[0][:, 1])))]
-    sizes = Diagram("size of total friction", "N", tuple(
-        Curve(face.name, colour, np.linalg.norm(total, axis=1))
+        return [normal, _over_time(run, "total friction on the body [N]", (
+            Curve("size", _PALE, run.time, size, 2.4), Curve("x", "", run.time, totals[0][:, 0]),
+            Curve("y", COLOURS[1], run.time, totals[0][:, 1])))]
+    sizes = _over_time(run, "size of total friction [N]", tuple(
+        Curve(face.name, colour, run.time, np.linalg.norm(total, axis=1))
         for face, colour, total in zip(faces, colours, totals, strict=True)))
     ways = ("t", "t2") if several_bodies(basis) else ("-x", "-y")
     return [normal, sizes, *(of_faces(f"total friction force along {way}", friction[:, :, k])
@@ -141,11 +92,12 @@ def energy_diagrams(run: Trajectory) -> list[Diagram]:
     found: list[Diagram] = []
     for title, total, names in _ENERGIES:
         terms = {name: getattr(energies, name) for name in names}
-        curves = [Curve(name.removesuffix("_work").replace("_", " "), ENERGY_COLOURS[name], term)
+        curves = [Curve(name.removesuffix("_work").replace("_", " "), ENERGY_COLOURS[name],
+                        run.time, term)
                   for name, term in terms.items() if term.any()]
         if curves or not found:
-            found.append(Diagram(title, "J", (
-                *curves, Curve("total", "", getattr(energies, total), 1.8))))
+            found.append(_over_time(run, f"{title} [J]", (
+                *curves, Curve("total", "", run.time, getattr(energies, total), 1.8))))
     # Without drive, friction and damping nothing is put in or lost.
     shown = [one for one in found if len(one.curves) > 1]
     return shown or found[:1]
@@ -158,24 +110,42 @@ def labelled(point: Point, run: Trajectory) -> str:
     return point_name(point, basis) + way * is_relative(point, basis)
 
 
-def thinned(x: Array, y: Array) -> tuple[Array, Array]:
-    """A long line by what it is where it enters and leaves each of many narrow columns, and by its
-    lowest and highest points there, so that no peak is lost.
+def phase_diagram(run: Trajectory, point: Point, axis: int, curve: Curve | None = None) -> Diagram:
+    """Velocity of a point over its displacement along an axis, by its number.
+
+    The end of the run is marked, and the speed of the ground where it is not much larger than the
+    velocities. A ``curve`` is drawn in the place of the end and the ground.
     """
-    if len(x) < 4 * _LINE_BINS:
-        return x, y
-    columns = np.linspace(x[0], x[-1], _LINE_BINS + 1)[:-1]
-    starts = np.unique(np.searchsorted(x, columns))
-    low, high = (_places(extreme.reduceat(y, starts), y, starts)
-                 for extreme in (np.minimum, np.maximum))
-    ends = np.append(starts[1:], len(x)) - 1
-    chosen = np.unique(np.concatenate([starts, low, high, ends]))
-    return x[chosen], y[chosen]
+    x, v = run.displacement(point)[:, axis], run.velocity(point)[:, axis]
+    motion = (Curve("", COLOURS[0], x, v, 1.0) if curve is None else
+              Curve("motion", "#b9c4cc", x, v, 0.6))
+    second = curve or Curve("end of the run", COLOURS[1], x[-1:], v[-1:], 0.0, marker=6.0)
+    speed = 0.0 if curve else ground_speed(run, axis)
+    shown = 0.0 < abs(speed) <= _FASTEST * float(np.abs(v).max())
+    return Diagram(f"displacement {AXES[axis]} [m]", f"velocity {AXES[axis]} [m/s]",
+                   (motion, second), title=labelled(point, run),
+                   levels=(Level(speed, name="ground", dashed=True),) if shown else ())
 
 
-def _places(extremes: Array, y: Array, starts: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Index of the extreme in each column of points."""
-    counts = np.diff(np.append(starts, len(y)))
-    met = np.flatnonzero(y == np.repeat(extremes, counts))
-    columns = np.searchsorted(starts, met, side="right")
-    return np.asarray(met[np.unique(columns, return_index=True)[1]])
+def ground_speed(run: Trajectory, axis: int) -> float:
+    """Steady speed of the ground along an axis [m/s]; zero where it has none everywhere."""
+    ground, d = run.system.ground, run.system.basis.dimension
+    if ground.rotation_speed or axis == d - 1:
+        return 0.0
+    if axis == 0:
+        return ground.speed if ground.motion is None else 0.0
+    return ground.speed_y if ground.motion_y is None else 0.0
+
+
+def usual_points(run: Trajectory) -> tuple[Point, ...]:
+    """Point B, unless it is fixed, and the middle contact node of each face; C without any."""
+    basis = run.system.basis
+    middles = [(face.nodes.start + face.nodes.stop) // 2 for face in contact_faces(basis)
+               if face.nodes.stop > face.nodes.start]
+    found = (*(("B",) if basis.T[0].any() else ()), *middles[:_MOST_MIDDLES])
+    return found or (usual_point(basis),)
+
+
+def _over_time(run: Trajectory, label: str, curves: tuple[Curve, ...]) -> Diagram:
+    ends = (float(run.time[0]), float(run.time[-1])) if len(run.time) > 1 else (None, None)
+    return Diagram(_TIME, label, curves, x_limits=ends)

@@ -1,0 +1,180 @@
+"""Diagrams drawn into axes of matplotlib, and their legends."""
+
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from matplotlib.ticker import Formatter
+from numpy.typing import NDArray
+
+from fecontact.core.types import Array
+from fecontact.output.diagrams.colours import BEYOND_COLOUR, DASHES, INK
+from fecontact.output.diagrams.diagram import WIDTH, Curve, Diagram, thinned
+from fecontact.output.diagrams.labels import in_unit
+from fecontact.output.diagrams.special_points import SPECIAL
+from fecontact.output.plots.style import legend_label
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MOST_RATIO = 1e3  # of the ends of a logarithmic axis with labels between decades
+_DIGITS = 10  # of ticks, at most
+_SIZE = 7.0  # of the markers of special points [points]
+_EMPTY: Any = {"color": INK, "markerfacecolor": "white", "linestyle": "none", "markersize": _SIZE}
+
+
+class _InUnit(Formatter):
+    """Ticks at values in SI units, labelled in a prefixed unit with equal numbers of digits."""
+
+    def __init__(self, factor: float) -> None:
+        self.factor = factor
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        return f"{x / self.factor:.{_DIGITS}g}".replace("-", "\N{MINUS SIGN}")
+
+    def format_ticks(self, values: Any) -> list[str]:
+        """Labels of all ticks of an axis."""
+        texts = super().format_ticks(values)
+        if any("e" in text for text in texts):
+            return texts
+        digits = max((len(text.partition(".")[2]) for text in texts), default=0)
+        return [f"{value / self.factor:.{digits}f}".replace("-", "\N{MINUS SIGN}")
+                for value in values]
+
+
+class _OnDecades(_InUnit):
+    """Major ticks of a logarithmic axis in a prefixed unit."""
+
+    def format_ticks(self, values: Any) -> list[str]:
+        """Labels of all ticks of an axis."""
+        return [self(value) for value in values]
+
+
+class _BetweenDecades(_OnDecades):
+    """Minor ticks of a logarithmic axis in a prefixed unit: 2 and 5, where they have room."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        digit = round(x / 10.0 ** np.floor(np.log10(x) + 1e-9))
+        low, high = np.abs(self.axis.get_view_interval())  # type: ignore[union-attr]
+        return super().__call__(x, pos) if digit in (2, 5) and high < _MOST_RATIO * low else ""
+
+
+def name_axis(axes: "Axes", which: Literal["x", "y"], label: str, values: Array) -> None:
+    """Label an axis whose data are in SI units, with ticks in a unit that suits the values.
+
+    ``ground speed [m/s]`` with values up to 4e-3 becomes ``ground speed [mm/s]``, with a tick 4
+    there. Labels without a unit, or with one that has no prefixes, stay as they are.
+    """
+    factor, label = in_unit(label, values)
+    axes.set(**{f"{which}label": label})
+    if factor != 1.0:
+        axis = axes.xaxis if which == "x" else axes.yaxis
+        if axis.get_scale() == "log":
+            axis.set_major_formatter(_OnDecades(factor))
+            axis.set_minor_formatter(_BetweenDecades(factor))
+        else:
+            axis.set_major_formatter(_InUnit(factor))
+
+
+def draw(axes: "Axes", diagram: Diagram, *, marker_size: float = _SIZE) -> None:
+    """Draw a diagram into empty axes, and label them.
+
+    Data are in SI units, ticks in units that suit them. Thick lines lie behind thin ones.
+    """
+    for name in diagram.logarithmic:
+        axes.set(**{f"{name}scale": "log"})
+    for curve in diagram.curves:
+        _draw_curve(axes, curve)
+    for mark in diagram.marks:
+        axes.plot(mark.x, mark.y, SPECIAL.get(mark.kind, ("", "."))[1], zorder=4,
+                  **_EMPTY | {"markersize": marker_size})
+    for level in diagram.levels:
+        line = axes.axhline if level.axis == "y" else axes.axvline
+        line(level.value, color="#6a6a6a" if level.dashed else INK, linewidth=0.9,
+             linestyle=DASHES if level.dashed else "-", label=level.name or None)
+    for band in diagram.bands:
+        axes.axvspan(band.low, band.high, color=BEYOND_COLOUR, zorder=0.5, label=band.name)
+    if "y" not in diagram.logarithmic:
+        axes.ticklabel_format(axis="y", scilimits=(-3, 5))
+    name_axis(axes, "x", diagram.x_label, diagram.values("x"))
+    name_axis(axes, "y", diagram.y_label, diagram.values("y"))
+    if diagram.title:
+        axes.set_title(diagram.title)
+    if diagram.x_limits != (None, None):
+        axes.set_xlim(*diagram.x_limits)
+    ends = diagram.flat_range or diagram.y_limits
+    if ends != (None, None):
+        axes.set_ylim(*ends)
+
+
+def _draw_curve(axes: "Axes", curve: Curve) -> None:
+    shown: dict[str, Any] = {"color": curve.colour or INK, "label": legend_label(curve.name)}
+    if curve.marker:
+        shown |= {"marker": "o", "markersize": curve.marker}
+    if curve.bars is not None:
+        axes.errorbar(curve.x, curve.y, curve.bars, elinewidth=0.9,
+                      linestyle="-" if curve.width else "none", **shown)
+    elif not curve.width:
+        axes.plot(curve.x, curve.y, linestyle="none", markeredgewidth=0.0, rasterized=True, **shown)
+    elif curve.stable is None:
+        axes.plot(*thinned(curve.x, curve.y), linewidth=curve.width,
+                  zorder=2.5 - 0.1 * curve.width, **shown)
+    else:
+        for first, last in runs_of(curve.stable):
+            solid = bool(curve.stable[first])
+            axes.plot(curve.x[first : last + 1], curve.y[first : last + 1],
+                      linewidth=curve.width if solid else WIDTH, linestyle="-" if solid else DASHES,
+                      **shown)
+
+
+def runs_of(stable: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last point of each run of equal pieces."""
+    edges = [0, *(np.flatnonzero(np.diff(stable)) + 1).tolist(), len(stable)]
+    return list(pairwise(edges))
+
+
+def legend_entries(diagrams: Iterable[Diagram]) -> list[Any]:
+    """Handles of a legend: heading and curves by name, dashes, special points, bands."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    given = list(diagrams)
+    curves = {curve.name: curve for one in given for curve in one.curves[::-1] if curve.name}
+    names = list(dict.fromkeys(curve.name for one in given for curve in one.curves if curve.name))
+    handles: list[Any] = [Line2D([], [], linestyle="none", label=heading)
+                          for heading in dict.fromkeys(one.heading for one in given) if heading]
+    for name in names:
+        curve = curves[name]
+        handles.append(Line2D(
+            [], [], color=curve.colour or INK, linewidth=curve.width, label=legend_label(name),
+            linestyle="-" if curve.width else "none", marker="o" if curve.marker else "",
+            markersize=max(curve.marker, 4.0)))
+    if any(curve.stable is not None and not curve.stable.all()
+           for one in given for curve in one.curves):
+        handles += [Line2D([], [], color=INK, linewidth=1.8, label="stable"),
+                    Line2D([], [], color=INK, linewidth=WIDTH, linestyle=DASHES, label="unstable")]
+    for kind in dict.fromkeys(mark.kind for one in given for mark in one.marks):
+        letters, marker = SPECIAL.get(kind, ("", "."))
+        handles.append(Line2D([], [], marker=marker, **_EMPTY,
+                              label=f"{kind} ({letters})" if letters else kind))
+    handles += [Patch(color=BEYOND_COLOUR, label=name)
+                for name in dict.fromkeys(band.name for one in given for band in one.bands)]
+    return handles
+
+
+def draw_stacked(
+    figure: "Figure", diagrams: Sequence[Diagram], heights: Sequence[float]
+) -> list["Axes"]:
+    """Draw diagrams over a common x above each other, with one legend beside the uppermost."""
+    panels = list(figure.subplots(len(diagrams), 1, sharex=True, height_ratios=heights))
+    for panel, diagram in zip(panels, diagrams, strict=True):
+        draw(panel, diagram)
+        panel.margins(x=0.02)
+    for panel in panels[:-1]:
+        panel.set_xlabel("")
+    if handles := legend_entries(diagrams):
+        panels[0].legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    figure.align_ylabels(panels)
+    return panels
