@@ -9,9 +9,10 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, require_choice
 from fecontact.core.types import Array
-from fecontact.core.units import suitable_unit
 from fecontact.output.diagrams.colours import COLOURS, distinct_colours
-from fecontact.output.plots.drawing import name_axis
+from fecontact.output.diagrams.diagram import Curve, Diagram
+from fecontact.output.diagrams.labels import in_unit
+from fecontact.output.plots.drawing import draw, name_axis
 from fecontact.output.plots.figure import new_figure
 from fecontact.study.study import Study
 from fecontact.sweeps.statistics import SobolIndices
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
 _FAILED = "#c8c4bc"
 _LEAST_OF_MAP = 3  # values of each parameter
+_LEAST_OF_DOTS = 200  # cases up to which ascending ones are joined by a line
 _MOST_TICKS, _SHORT = 8, 4  # named cells along an axis of a map, and digits of their values
 _COLOUR_MAP = "viridis"
 
@@ -96,28 +98,25 @@ def _curves(
     path: str | Path | None = None,
 ) -> "Figure":
     """A summary over one parameter, a curve for each value of another."""
+    x, labels = _places(table.parameters[parameter])
+    groups: dict[Any, list[int]] = {None: list(range(len(table)))}
+    if by is not None:
+        groups = {}
+        for k, value in enumerate(table.parameters[by]):
+            groups.setdefault(value, []).append(k)
+    curves = []
+    for (value, cases), colour in zip(groups.items(), distinct_colours(len(groups)), strict=True):
+        order = sorted(cases, key=lambda k: x[k])
+        places, values = x[order], table.values[name][order]
+        if not np.isfinite(values).any():
+            continue
+        # Cases that also differ in other parameters do not form a curve.
+        curve = len(places) <= _LEAST_OF_DOTS and (np.diff(places) > 0.0).all()
+        curves.append(Curve("" if by is None else _shown(value), colour, places, values,
+                            0.9 if curve else 0.0, 3.5 if len(places) <= _LEAST_OF_DOTS else 1.5))
     with new_figure(7.0, 4.6, path) as figure:
         axes = figure.subplots()
-        factor = _label(axes, name, table.values[name])
-        x, labels = _places(table.parameters[parameter])
-        groups: dict[Any, list[int]] = {None: list(range(len(table)))}
-        if by is not None:
-            groups = {}
-            for k, value in enumerate(table.parameters[by]):
-                groups.setdefault(value, []).append(k)
-        colours = distinct_colours(len(groups))
-        for (value, cases), colour in zip(groups.items(), colours, strict=True):
-            order = sorted(cases, key=lambda k: x[k])
-            places, values = x[order], table.values[name][order] / factor
-            if not np.isfinite(values).any():
-                continue
-            # Cases that also differ in other parameters do not form a curve.
-            curve = len(places) <= 200 and (np.diff(places) > 0.0).all()
-            axes.plot(places, values, linestyle="-" if curve else "none", color=colour,
-                      linewidth=0.9, marker="o", markersize=3.5 if len(places) <= 200 else 1.5,
-                      label=None if by is None else f"{_shown(value)}")
-        _mark_failed(axes, table, x)
-        _named(axes, table.label(parameter), x, labels)
+        _draw_over(axes, table, parameter, x, labels, _label(name), curves)
         if by is not None:
             figure.legend(title=table.label(by), loc="outside right upper")
     return figure
@@ -149,17 +148,12 @@ def plot_strobed(
                          f"{choices(table.parameters)}.")
     if table.strobed is None:
         raise InputError("The sweep has no displacements once per period; give it a key strobe.")
+    x, labels = _places(table.parameters[parameter])
+    dots = Curve("", "#1a1a1a", np.repeat(x, table.strobed.shape[1]), table.strobed.ravel(), 0.0,
+                 0.5 * float(np.clip(60.0 / np.sqrt(len(table)), 0.8, 4.0)))
     with new_figure(7.5, 4.8, path) as figure:
         axes = figure.subplots()
-        x, labels = _places(table.parameters[parameter])
-        known = table.strobed[np.isfinite(table.strobed)]
-        factor, unit = suitable_unit(float(np.abs(known).max()) if len(known) else 0.0, "m")
-        axes.plot(np.repeat(x, table.strobed.shape[1]), table.strobed.ravel() / factor, ".",
-                  color="#1a1a1a", markersize=float(np.clip(60.0 / np.sqrt(len(table)), 0.8, 4.0)),
-                  markeredgewidth=0, rasterized=True)
-        _mark_failed(axes, table, x)
-        axes.set_ylabel(f"displacement once per period [{unit}]")
-        _named(axes, table.label(parameter), x, labels)
+        _draw_over(axes, table, parameter, x, labels, "displacement once per period [m]", [dots])
     return figure
 
 
@@ -185,7 +179,7 @@ def _map(
         axes.grid(False)
         axes.set_facecolor(_FAILED)
         known = values[np.isfinite(values)]
-        factor, unit = _unit(name, known)
+        factor, label = in_unit(_label(name), known)
         logs = [_is_geometric(points) for points in (x, y)]
         drawn = axes.pcolormesh(_edges(x, logs[0]), _edges(y, logs[1]),
                                 np.ma.masked_invalid(values / factor),
@@ -194,7 +188,7 @@ def _map(
             if log:
                 _logarithmic(axes, which)
         bar = figure.colorbar(drawn, ax=axes, pad=0.02)
-        bar.set_label(_with_unit(name, unit))
+        bar.set_label(label)
         bar.outline.set_visible(False)
         name_axis(axes, "x", table.label(first), x)
         name_axis(axes, "y", table.label(second), y)
@@ -216,20 +210,16 @@ def _scatter(
     columns = -(-(len(parameters) + 1) // rows)
     with new_figure(3.1 * columns, 3.1 * rows, path) as figure:
         grid = np.atleast_1d(figure.subplots(rows, columns, sharey=True)).ravel()
+        size = 0.5 * float(np.clip(80.0 / np.sqrt(len(table)), 2.0, 8.0))
         for axes, parameter in zip(grid, parameters, strict=False):
             x, labels = _places(table.parameters[parameter])
-            factor = _label(axes, name, table.values[name])
-            axes.plot(x, table.values[name] / factor, ".", color=COLOURS[0], markeredgewidth=0,
-                      markersize=float(np.clip(80.0 / np.sqrt(len(table)), 2.0, 8.0)),
-                      alpha=0.7)
-            _mark_failed(axes, table, x)
-            _named(axes, table.label(parameter), x, labels)
+            dots = Curve("", COLOURS[0], x, table.values[name], 0.0, size)
+            _draw_over(axes, table, parameter, x, labels, _label(name), [dots])
         last = grid[len(parameters)]
         known = table.values[name][np.isfinite(table.values[name])]
         if len(known):
-            factor = _unit(name, known)[0]
-            last.hist(known / factor, bins=int(np.clip(np.sqrt(len(known)), 5, 60)),
-                      orientation="horizontal", color=COLOURS[0], alpha=0.7)
+            last.hist(known, bins=int(np.clip(np.sqrt(len(known)), 5, 60)),
+                      range=None if np.ptp(known) else last.get_ylim(), orientation="horizontal", color=COLOURS[0], alpha=0.7)
         last.set_xlabel("cases")
         for k, axes in enumerate(grid):
             if k % columns:
@@ -284,22 +274,29 @@ def plot_sobol(
     return figure
 
 
-def _with_unit(name: str, unit: str) -> str:
-    return f"{name.replace('_', ' ')} [{unit}]" if unit else name.replace("_", " ")
+def _label(name: str) -> str:
+    """Label of a summary with its SI unit."""
+    words, unit = name.replace("_", " "), unit_of(name)
+    return f"{words} [{unit}]" if unit else words
 
 
-def _unit(name: str, values: Array) -> tuple[float, str]:
-    unit = unit_of(name)
-    known = values[np.isfinite(values)]
-    if unit in ("", "1/s") or not len(known):
-        return 1.0, unit
-    return suitable_unit(float(np.abs(known).max()), unit)
+def _draw_over(
+    axes: "Axes", table: SweepTable, parameter: str, x: Array, labels: list[str] | None,
+    y_label: str, curves: Sequence[Curve],
+) -> None:
+    """Draw curves over a parameter, logarithmic for values of equal ratios; mark failed cases.
 
-
-def _label(axes: "Axes", name: str, values: Array) -> float:
-    factor, unit = _unit(name, values)
-    axes.set_ylabel(_with_unit(name, unit))
-    return factor
+    ``labels`` name the values of a parameter that are no numbers.
+    """
+    logarithmic = labels is None and _is_geometric(np.unique(x))
+    diagram = Diagram(table.label(parameter), y_label, tuple(curves), logarithmic="x" * logarithmic)
+    draw(axes, diagram)
+    _mark_failed(axes, table, x)
+    if labels is not None:
+        axes.set_xticks(range(len(labels)), labels)
+    elif logarithmic:
+        _logarithmic(axes, "x")
+        name_axis(axes, "x", diagram.x_label, x)
 
 
 def _places(values: Sequence[Any]) -> tuple[Array, list[str] | None]:
@@ -312,17 +309,6 @@ def _places(values: Sequence[Any]) -> tuple[Array, list[str] | None]:
 
 def _shown(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else f"{value}"
-
-
-def _named(axes: "Axes", label: str, x: Array, labels: list[str] | None) -> None:
-    """Label the axis of a parameter, logarithmic for values of equal ratios."""
-    if labels is not None:
-        axes.set_xticks(range(len(labels)), labels)
-        axes.set_xlabel(label)
-        return
-    if _is_geometric(np.unique(x)):
-        _logarithmic(axes, "x")
-    name_axis(axes, "x", label, x)
 
 
 def _logarithmic(axes: "Axes", which: str) -> None:

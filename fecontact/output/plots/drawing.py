@@ -5,7 +5,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from matplotlib.ticker import Formatter
+from matplotlib.ticker import Formatter, ScalarFormatter
 from numpy.typing import NDArray
 
 from fecontact.core.types import Array
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _MOST_RATIO = 1e3  # of the ends of a logarithmic axis with labels between decades
 _DIGITS = 10  # of ticks, at most
+_POWERS = (-3, 5)  # of ten, beyond which ticks have a common factor
 _SIZE = 7.0  # of the markers of special points [points]
 _EMPTY: Any = {"color": INK, "markerfacecolor": "white", "linestyle": "none", "markersize": _SIZE}
 
@@ -96,8 +97,8 @@ def draw(axes: "Axes", diagram: Diagram, *, marker_size: float = _SIZE) -> None:
              linestyle=DASHES if level.dashed else "-", label=level.name or None)
     for band in diagram.bands:
         axes.axvspan(band.low, band.high, color=BEYOND_COLOUR, zorder=0.5, label=band.name)
-    if "y" not in diagram.logarithmic:
-        axes.ticklabel_format(axis="y", scilimits=(-3, 5))
+    if isinstance(ticks := axes.yaxis.get_major_formatter(), ScalarFormatter):
+        ticks.set_powerlimits(_POWERS)
     name_axis(axes, "x", diagram.x_label, diagram.values("x"))
     name_axis(axes, "y", diagram.y_label, diagram.values("y"))
     if diagram.title:
