@@ -38,7 +38,7 @@ from fecontact.fem.constraints import (
     reference_points,
 )
 from fecontact.fem.elements.cell_kinds import numbered_rows
-from fecontact.fem.equations import expansion
+from fecontact.fem.equations import Elimination, eliminated
 from fecontact.fem.incompatible_modes import in_parts, reductions
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
 from fecontact.fem.mesh import Bricks, Mesh
@@ -435,9 +435,15 @@ class ElasticBody(Summarised):
     def expansion(self) -> Any:
         """All degrees of freedom from the free ones, sparse (d N, f).
 
-        Supports and constraints are eliminated; see :func:`fecontact.fem.equations.expansion`.
+        Supports and constraints are eliminated; see
+        :attr:`fecontact.fem.equations.Elimination.expansion`.
         """
-        return expansion(self)
+        return self.elimination.expansion
+
+    @cached_property
+    def elimination(self) -> Elimination:
+        """Supports and constraints, substituted into each other."""
+        return eliminated(self)
 
     @property
     def added(self) -> Sequence[Attachment]:

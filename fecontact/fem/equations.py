@@ -7,6 +7,7 @@ M_r = G^T M G. Each equation determines one unknown; chains are resolved by subs
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -68,11 +69,59 @@ class Equations:
     strict: bool = True
 
 
-def expansion(body: _Body) -> Any:
-    """All degrees of freedom from the free ones, sparse (d N, f).
+@dataclass(frozen=True, eq=False)
+class Elimination:
+    """All unknowns from those that are left where equations are substituted into each other.
 
-    The free ones are displacements without a support or a constraint, then one angle per hinge,
-    then displacements and rotations of reference points.
+    Attributes
+    ----------
+    matrix : sparse (n, p) array
+        G: displacements, angles of hinges and motions of reference points from the p left.
+    numbers : (p,) integers
+        Number of each of these among all n.
+    rest : sparse (m, p) array
+        Rows R of the equations ``R p = 0`` between them, each with a largest coefficient of one:
+        those that substitution does not solve, mostly of many unknowns.
+    displacements : int
+        Number of displacements, the first of the n unknowns.
+    """
+
+    matrix: Any
+    numbers: Integers
+    rest: Any
+    displacements: int
+
+    @cached_property
+    def expansion(self) -> Any:
+        """Displacements from independent unknowns, sparse (d N, f), which meet ``R p = 0`` too.
+
+        They are displacements without a support or a constraint, then one angle per hinge, then
+        displacements and rotations of reference points.
+        """
+        return self._independent[0]
+
+    @property
+    def spread(self) -> Any:
+        """The p unknowns from the independent ones, sparse (p, f)."""
+        return self._independent[1]
+
+    @cached_property
+    def _independent(self) -> tuple[Any, Any]:
+        import scipy.sparse as sp
+
+        G = sp.csr_array(self.matrix[:self.displacements])
+        Z, numbers = sp.eye_array(len(self.numbers), format="csr"), self.numbers
+        if self.rest.shape[0]:
+            Z, kept = _null_space(self.rest)
+            G, numbers = G @ Z, numbers[kept]
+        turn = _seen(sp.csc_array(G), np.flatnonzero(numbers >= self.displacements))
+        if turn is None:
+            return sp.csc_array(G), sp.csr_array(Z)
+        return sp.csc_array(G @ turn), sp.csr_array(Z @ turn)
+
+
+def eliminated(body: _Body) -> Elimination:
+    """Equations of supports and constraints, substituted into each other.
 
     Raises
     ------
@@ -88,7 +137,7 @@ def expansion(body: _Body) -> Any:
     """
     unknowns = Unknowns(body)
     found = [*_hinge_equations(unknowns), *constraint_equations(unknowns)]
-    return _eliminated(unknowns, found)
+    return _substituted_equations(unknowns, found)
 
 
 class Unknowns:
@@ -323,14 +372,15 @@ def _tied(unknowns: Unknowns, one: Tie, name: str) -> Equations:
     return Equations(unknowns.rows(rows, columns, values, count * d), own, name)
 
 
-def _eliminated(unknowns: Unknowns, found: Sequence[Equations]) -> Any:
-    """Displacements from independent unknowns, sparse (d N, f)."""
+def _substituted_equations(unknowns: Unknowns, found: Sequence[Equations]) -> Elimination:
     import scipy.sparse as sp
 
     free = np.ones(unknowns.count, bool)
     free[unknowns.held] = False
     if not found:
-        return sp.csc_array(sp.eye_array(unknowns.count, format="csc")[:, free])
+        return Elimination(sp.csr_array(sp.eye_array(unknowns.count, format="csc")[:, free]),
+                           np.flatnonzero(free), sp.csr_array((0, np.count_nonzero(free))),
+                           unknowns.angles)
     ordered = sorted(found, key=lambda one: not one.strict)
     C = sp.csr_array(sp.vstack([one.matrix for one in ordered]))
     dependent = np.concatenate([one.dependent for one in ordered])
@@ -347,12 +397,9 @@ def _eliminated(unknowns: Unknowns, found: Sequence[Equations]) -> Any:
     for row in np.flatnonzero(~implied):
         if ordered[owner[left[row]]].strict:
             raise _over_constrained(unknowns, ordered, owner, dependent, left[row])
-    if not implied.all():
-        kept = np.flatnonzero(~implied)
-        Z, independent = _null_space(sp.csr_array(sp.diags_array(1.0 / size[kept]) @ rest[kept]))
-        G, unknown = G @ Z, unknown[independent]
-    G = sp.csc_array(sp.csr_array(G)[:unknowns.angles])
-    return _without_unseen(G, np.flatnonzero(unknown >= unknowns.angles))
+    kept = np.flatnonzero(~implied)
+    return Elimination(G, unknown, sp.csr_array(sp.diags_array(1.0 / size[kept]) @ rest[kept]),
+                       unknowns.angles)
 
 
 def _acyclic(C: Any, dependent: Integers) -> NDArray[np.bool_]:
@@ -407,18 +454,23 @@ def _null_space(R: Any) -> tuple[Any, Integers]:
     return Z, kept
 
 
-def _without_unseen(G: Any, extra: Integers) -> Any:
-    """G without what of its columns ``extra``, motions of points, moves no node.
+def _seen(G: Any, extra: Integers) -> Any:
+    """Unknowns, sparse (p, f), without what of those of points ``extra`` moves no node; or None.
 
-    Such are turns about the line on which all nodes of a coupling lie.
+    Such are turns about the line on which all nodes of a coupling lie. None stands for all of them.
     """
     import scipy.sparse as sp
     from scipy.sparse.csgraph import connected_components
 
+    if not len(extra):
+        return None
     motions = G[:, extra]
     gram = sp.csr_array(motions.T @ motions)
     parts, label = connected_components(gram, directed=False)
-    found = []
+    size = G.shape[1]
+    rest = np.setdiff1d(np.arange(size), extra)
+    rows, columns, data = [rest], [np.arange(len(rest))], [np.ones(len(rest))]
+    count = len(rest)
     for part in range(parts):
         which = np.flatnonzero(label == part)
         own = gram[which][:, which].toarray()
@@ -426,10 +478,15 @@ def _without_unseen(G: Any, extra: Integers) -> Any:
         scale[scale == 0.0] = 1.0
         values, vectors = np.linalg.eigh(own / np.outer(scale, scale))
         seen = values > _UNSEEN * values[-1]
-        found.append(motions[:, which] if seen.all() else
-                     sp.csc_array(motions[:, which] @ (vectors[:, seen] / scale[:, None])))
-    rest = np.setdiff1d(np.arange(G.shape[1]), extra)
-    return sp.csc_array(sp.hstack([G[:, rest], *found]))
+        turn = np.eye(len(which)) if seen.all() else vectors[:, seen] / scale[:, None]
+        row, column = np.nonzero(turn)
+        rows.append(extra[which[row]])
+        columns.append(count + column)
+        data.append(turn[row, column])
+        count += turn.shape[1]
+    return sp.csc_array(sp.coo_array(
+        (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns))),
+        shape=(size, count)))
 
 
 def _over_constrained(

@@ -1,5 +1,6 @@
 """Vibration modes of the finite-element body: exact rigid modes, elastic ones by Lanczos."""
 
+import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, get_args
@@ -8,19 +9,22 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.compiled import kernel
-from fecontact.core.errors import AnalysisError, InputError, choices, nearest
+from fecontact.core.errors import AnalysisError, InputError, ModelWarning, choices, nearest
 from fecontact.core.records import Block, IntegerMatrix, IntegerVector, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.equations import least_squares, selects
 from fecontact.reduction.solid_motions import allowed_motions, solid_strain_energies
+from fecontact.reduction.solvers.congruence import Congruence, as_matrix, largest_column_sum
 from fecontact.reduction.solvers.factorisation import SINGULAR, Factors, factorised
-from fecontact.reduction.solvers.solid_solver import Eigensolver, SolidSolver, possible, suited
+from fecontact.reduction.solvers.solid_solver import Eigensolver, SolidSolver, suited
 
 _BUCKLED = ("The stress takes the stiffness of the body: its load is beyond the buckling load; see "
             "fecontact.analysis.buckling_loads.")
 # Below this size, and for a large share of all modes, the dense solver is faster.
 _DENSE = 600
+# Size, relative to forces, of what is left of them beside inertia that is rounding.
+_BALANCED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +33,7 @@ class FreeSystem:
 
     Attributes
     ----------
-    stiffness, mass : sparse (f, f) arrays
+    stiffness, mass : sparse (f, f) arrays or Congruence
         K, symmetric and positive semi-definite, and M, positive definite.
     rigid : (f, r) array
         Mass-normalised rigid modes: ``K rigid = 0``.
@@ -64,20 +68,22 @@ class FreeSystem:
         Raises
         ------
         InputError
-            For an unknown eigensolver, or the iterative one for a plane body or one with a hinge,
-            constraints or attachments.
+            For an unknown eigensolver, or the iterative one for a plane body.
         """
         if eigensolver not in get_args(Eigensolver):
             raise InputError(f"eigensolver = {eigensolver!r} must be one of "
                              f"{choices(get_args(Eigensolver))}"
                              f"{nearest(str(eigensolver), get_args(Eigensolver))}.")
-        if eigensolver == "iterative" and not possible(body):
-            raise InputError("eigensolver = 'iterative' is for solids without hinges and "
-                             "constraints; leave it out, or take 'direct'.")
-        E, stiffness = body.expansion, body.stiffness
-        rigid = rigid_modes(body)
+        if eigensolver == "iterative" and body.dimension == 2:
+            raise InputError("eigensolver = 'iterative' is for solids; leave it out, or take "
+                             "'direct'.")
+        E, rigid = body.expansion, rigid_modes(body)
+        eigensolver = "direct" if stress is not None else eigensolver
+        if not selects(E) and _iterable(body, eigensolver):
+            return cls(*_congruences(body), least_squares(E, rigid), None, body, eigensolver)
+        stiffness = body.stiffness
         if stress is not None:
-            stiffness, eigensolver = (stiffness + stress).tocsc(), "direct"
+            stiffness = (stiffness + stress).tocsc()
         solid = (body if body.dimension == 3 else None, eigensolver, stress is not None)
         if E.shape[0] == E.shape[1]:
             return cls(stiffness, body.mass, rigid, None if body.added else body.component_mass,
@@ -103,7 +109,7 @@ class FreeSystem:
     @cached_property
     def factors(self) -> Factors:
         """Factors of the positive definite stiffness of the isostatically supported body."""
-        K = self.stiffness
+        K = as_matrix(self.stiffness)
         if len(self.held) < K.shape[0]:
             K = K[self.held][:, self.held]
         trouble = _BUCKLED if self.stressed else SINGULAR
@@ -114,11 +120,28 @@ class FreeSystem:
 
     @cached_property
     def iterative(self) -> SolidSolver | None:
-        """The iterative solver of a solid that is large and compact, or where it is asked for."""
-        if (self.body is None or self.eigensolver == "direct"
-                or (self.eigensolver == "auto" and not suited(self.body))):
+        """The iterative solver of a solid that is large and compact, or where it is asked for.
+
+        None for others, and for bodies whose unknowns it does not support.
+
+        Warns
+        -----
+        ModelWarning
+            If it is asked for and does not support the body.
+        """
+        if self.body is None or not _iterable(self.body, self.eigensolver):
             return None
-        return SolidSolver.of(self.body, self.rigid.shape[1])
+        found = SolidSolver.of(self.body, self.rigid.shape[1])
+        if found is None:
+            self.falls_back("does not know the motions of some of the body's reference points, or "
+                            "the body has hundreds of equations between many displacements")
+        return found
+
+    def falls_back(self, reason: str) -> None:
+        """Warn, where the iterative solver was asked for, that the direct one takes over."""
+        if self.eigensolver == "iterative":
+            warnings.warn(f"eigensolver = 'iterative' {reason}; the direct solver takes over.",
+                          ModelWarning, stacklevel=2)
 
     @cached_property
     def inertia(self) -> Array:
@@ -132,7 +155,7 @@ class FreeSystem:
 
         if self.component_mass is None:
             # The product is faster by rows.
-            return self.mass.T
+            return as_matrix(self.mass).T
         if 2 * self.component_mass.shape[0] < self.mass.shape[0]:
             return LinearOperator(
                 self.mass.shape, lambda x: (self.component_mass @ x.reshape(-1, 3)).ravel(),
@@ -161,7 +184,10 @@ class FreeSystem:
         """
         balanced = forces - self.inertia @ (self.rigid.T @ forces)
         if self.iterates:
-            found = self._iterated_deflection(balanced.reshape(len(balanced), -1), accuracy)
+            # Rounding alone, of forces that only move the body, is in balance with nothing.
+            still = np.linalg.norm(balanced, axis=0) <= _BALANCED * np.linalg.norm(forces, axis=0)
+            found = self._iterated_deflection(
+                np.where(still, 0.0, balanced).reshape(len(balanced), -1), accuracy)
             if found is not None:
                 return found.reshape(balanced.shape)
         deflection = np.zeros_like(balanced)
@@ -172,9 +198,36 @@ class FreeSystem:
         """Response (f, k) to balanced forces by conjugate gradients; None if they fail."""
         assert self.body is not None
         assert self.iterative is not None
-        E = self.body.expansion
-        found, converged = self.iterative.deflections(E @ balanced, accuracy)
-        return self.without_rigid(E.T @ found) if converged else None
+        unknowns = self.iterative.unknowns
+        assert unknowns is not None
+        found, converged = self.iterative.deflections(unknowns.pick.T @ balanced, accuracy)
+        if converged:
+            return self.without_rigid(unknowns.pick @ found)
+        self.falls_back("does not converge to deflections under forces")
+        return None
+
+
+def _iterable(body: ElasticBody, eigensolver: Eigensolver) -> bool:
+    """True if the iterative solver is asked for, or suits a body."""
+    return eigensolver == "iterative" or (eigensolver == "auto" and suited(body))
+
+
+def _congruences(body: ElasticBody) -> tuple[Congruence, Congruence]:
+    """Stiffness and mass of a constrained solid, not formed."""
+    E, (rows, k, _) = body.expansion, body.springs
+    blocks = body.stiffness_blocks
+
+    def stiffness(u: Array) -> Array:
+        pushed = np.asarray(blocks @ u)
+        return pushed + rows.T @ (k[:, None] * (rows @ u)) if len(k) else pushed
+
+    def mass(u: Array) -> Array:
+        if body.added:
+            return np.asarray(body.mass @ u)
+        return np.asarray(body.component_mass @ u.reshape(len(u) // 3, -1)).reshape(u.shape)
+
+    return (Congruence(E, stiffness, lambda: body.stiffness if len(k) else blocks),
+            Congruence(E, mass, lambda: body.mass))
 
 
 def eigenfrequencies_hz(
@@ -200,8 +253,8 @@ def eigenmodes(
 
     The direct solver is inverse Lanczos iteration with the factors of K. The iterative one, LOBPCG
     with multigrid, is several times faster and smaller for large, compact solids; 'auto' takes it
-    for solids of 20,000 unknowns and more without hinges and constraints, whose cells are mostly
-    less than five times as long as wide and whose Poisson's ratio is at most 0.45. Where it does
+    for solids of 20,000 unknowns and more whose cells are mostly less than five times as long as
+    wide and whose Poisson's ratio is at most 0.45. Where it does
     not converge, the direct one takes over. Frequencies agree to 1e-8, as far as round-off allows.
 
     Raises
@@ -210,6 +263,11 @@ def eigenmodes(
         For less than one mode, or more modes than unknowns, or an unknown or unsuited eigensolver.
     AnalysisError
         If a mode of the direct solver violates ``|K s - w^2 M s| < 1e-10 |K| |s|``.
+
+    Warns
+    -----
+    ModelWarning
+        If the iterative solver is asked for and does not support the body or does not converge.
     """
     w, free_shapes = free_modes(FreeSystem.of(body, eigensolver), count)
     shapes = body.expansion @ free_shapes
@@ -343,11 +401,14 @@ def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
     K, M = system.stiffness, system.mass
     size = K.shape[0]
     if size > max(_DENSE, 6 * count) and system.iterative is not None:
-        assert system.body is not None
-        E = system.body.expansion
-        found = system.iterative.modes(count, E @ system.rigid)
+        unknowns = system.iterative.unknowns
+        assert unknowns is not None
+        found = system.iterative.modes(count, unknowns.spread @ system.rigid)
         if found.converged:
-            return found.squares, E.T @ found.shapes
+            return found.squares, np.asarray(unknowns.pick @ found.shapes)
+        system.falls_back(f"does not converge in {found.steps} steps to the lowest modes")
+        _ = system.factors
+    K, M = as_matrix(K), as_matrix(M)
     if system.stressed:
         _ = system.factors
     if size <= _DENSE or 3 * count > size:
@@ -384,8 +445,7 @@ def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
 def backward_error(K: Any, M: Any, squares: Array, shapes: Array) -> Array:
     """``|K s - w^2 M s| / (|K| |s|)`` (m,) of each mode, with the 1-norm of K."""
     residual = np.linalg.norm(K @ shapes - (M @ shapes) * squares, axis=0)
-    largest = float(abs(K).sum(axis=0).max())
-    return np.asarray(residual / (largest * np.linalg.norm(shapes, axis=0)))
+    return np.asarray(residual / (largest_column_sum(K) * np.linalg.norm(shapes, axis=0)))
 
 
 def _largest(K: Any, M: Any) -> float:

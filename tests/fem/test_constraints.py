@@ -21,7 +21,7 @@ from fecontact import (
 from fecontact.fem import Coupling, LinearEquation, Rotation, Term, Tie
 from fecontact.laws import Constant
 from fecontact.reduction import eigenfrequencies_hz
-from fecontact.reduction.eigenmodes import FreeSystem, eigenmodes, rigid_modes
+from fecontact.reduction.eigenmodes import eigenmodes, rigid_modes
 from fecontact.reduction.solid_motions import rigid_motions
 
 STEEL = Material()
@@ -375,13 +375,6 @@ def test_a_middle_of_an_edge_is_a_node_or_the_mean_of_two():
     far = LinearEquation((Term((0, int(mesh.cells.max())), (0, 0, 1)),))
     with pytest.raises(MeshError, match=r"^Mesh constraints must be edges of cells"):
         eigenfrequencies_hz(ElasticBody(mesh, constraints=[far]), 1)
-
-
-def test_constrained_bodies_take_the_direct_solver():
-    body = bar(same("a", "b"), points=TIPS)
-    assert FreeSystem.of(body).iterative is None
-    with pytest.raises(InputError, match=r"'iterative' is for solids without hinges and constr"):
-        FreeSystem.of(body, "iterative")
 
 
 def test_own_constraints_of_a_body_replace_those_of_its_mesh():

@@ -105,8 +105,9 @@ def multigrid(fine: Any, coarse: Any, interpolation: Any, rigid: Array) -> Multi
     fine, coarse : sparse arrays of 3 x 3 blocks
         The positive definite matrices of the quadratic and of the linear elements; those of linear
         elements alone for both.
-    interpolation : sparse (N, n) array or None
-        Nodal displacements of quadratic elements from those of linear ones; None for none.
+    interpolation : sparse (N, n) or (3 N, 3 n) array or None
+        Nodal displacements of quadratic elements from those of linear ones, for each of the three
+        components or for all; None for none.
     rigid : (3 n, r) array
         The rigid motions of the linear elements, without those of fixed nodes.
     """
@@ -133,6 +134,8 @@ def _nodal_level(matrix: Any, interpolation: Any) -> Level:
     inverse = np.linalg.inv(_diagonal_blocks(matrix)).astype(np.float32)
     P = interpolation.astype(np.float32)
     R = P.T.tocsr()
+    if P.shape[0] < matrix.shape[0]:
+        P, R = ByNodes(P), ByNodes(R)
 
     def product(x: Any) -> Any:
         return rows.product(x.reshape(len(inverse), 3, -1)).reshape(x.shape)
@@ -146,7 +149,7 @@ def _nodal_level(matrix: Any, interpolation: Any) -> Level:
                            x.reshape(shape)).reshape(x.shape)
 
     return Level(product, precondition, smooth,
-                 _largest(product, precondition, matrix.shape[0]), ByNodes(P), ByNodes(R))
+                 _largest(product, precondition, matrix.shape[0]), P, R)
 
 
 @dataclass(frozen=True, eq=False)

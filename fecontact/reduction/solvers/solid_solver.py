@@ -5,6 +5,7 @@ allows. Its gauge are the rigid motions: what forces K z they seem to need, meas
 norm, is the smallest residual that can be reached.
 """
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,13 +13,17 @@ from typing import Any, Literal
 
 import numpy as np
 
+from fecontact.core.errors import FecontactError, ModelWarning
 from fecontact.core.types import Array, Integers
+from fecontact.fem.attachments import PointMass, added_mass
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import shape_functions
 from fecontact.reduction.solid_motions import rigid_motions
 from fecontact.reduction.solvers.block_rows import BlockRows, step_on, turn_to
+from fecontact.reduction.solvers.links import Links
 from fecontact.reduction.solvers.lobpcg import Found, lowest_modes
 from fecontact.reduction.solvers.multigrid import Multigrid, multigrid
+from fecontact.reduction.solvers.solver_unknowns import Dependence, SolverUnknowns
 
 Eigensolver = Literal["auto", "direct", "iterative"]
 
@@ -41,18 +46,12 @@ _SINGLE = 1e-3
 def suited(body: ElasticBody) -> bool:
     """True if the iterative solver is expected to be better for a body than factorisation.
 
-    It is not for small and plane bodies, hinges, constraints, nearly incompressible or strongly
-    anisotropic material, and where a tenth of the cells are longer than five times their width, as
-    in thin plates.
+    It is not for small and plane bodies, nearly incompressible or strongly anisotropic material,
+    and where a tenth of the cells are longer than five times their width, as in thin plates.
     """
-    return (possible(body) and 3 * len(body.nodes) >= _FEW
+    return (body.dimension == 3 and 3 * len(body.nodes) >= _FEW
             and max(one.stiffness_ratio for one in body.materials) <= _INCOMPRESSIBLE
             and float(np.quantile(aspect_ratios(body), 0.9)) <= _STRETCHED)
-
-
-def possible(body: ElasticBody) -> bool:
-    """True if the iterative solver supports a body: solids with plain supports only."""
-    return body.dimension == 3 and not (body.hinges or body.equations or body.added)
 
 
 def aspect_ratios(body: ElasticBody) -> Array:
@@ -71,19 +70,26 @@ def aspect_ratios(body: ElasticBody) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class SolidSolver:
-    """K, M and multigrid of a solid over all degrees of freedom; fixed ones are zero.
+    """K, M and multigrid of a solid over the unknowns x (3 n,); fixed ones are zero.
 
     Attributes
     ----------
     stiffness, component_mass : BlockRows
+        Of all displacements; E^T K E is not formed.
     mesh_cycle : Multigrid
-        Approximate inverse of K, for free bodies of K and a small part of M.
-    moving : (N, 3, 1) array
-        One for degrees of freedom that are not fixed, zero for the others.
-    gauge : (3 N, 6) array
+        Approximate inverse of E^T K E, for free bodies of K and a small part of M.
+    moving : (n, 3, 1) array
+        One for unknowns, zero for those that are fixed.
+    gauge : (3 n, 6) array
         Forces K z that mass-normalised rigid motions z seem to need.
     shift : float
         The part of M.
+    unknowns : SolverUnknowns, optional
+        Unknowns of the whole body.
+    links : Links, optional
+        Springs at points and equations between many unknowns.
+    added_mass : sparse (3 n, 3 n) array, optional
+        Mass at points.
     """
 
     stiffness: BlockRows
@@ -92,31 +98,53 @@ class SolidSolver:
     moving: Array
     gauge: Array
     shift: float
+    unknowns: SolverUnknowns | None = None
+    links: Links | None = None
+    added_mass: Any = None
 
     @classmethod
-    def of(cls, body: ElasticBody, rigid: int) -> "SolidSolver":
-        """The solver for a body with a number of rigid modes."""
+    def of(cls, body: ElasticBody, rigid: int) -> "SolidSolver | None":
+        """The solver for a body with a number of rigid modes; None where it has none for a body."""
+        import scipy.sparse as sp
+
+        unknowns = SolverUnknowns.of(body)
+        coarse = replace(body, degree=1, bricks="full") if body.degree == 2 else body
+        coarse_unknowns = unknowns if coarse is body else _unknowns_of_coarse(coarse)
+        if unknowns is None or coarse_unknowns is None:
+            return None
         K, M = body.stiffness_blocks, body.component_mass
         motions = rigid_motions(body.nodes, body.nodes.mean(axis=0))
         moved = (M @ motions.reshape(len(body.nodes), -1)).reshape(motions.shape)
         triangle = np.linalg.cholesky(motions.T @ moved)
         gauge = np.linalg.solve(triangle, np.asarray(K @ motions).T).T
+        one = unknowns.dependence
+        gauge = gauge if one is None else one.forces(gauge)
+        rows, compliance = _linking_rows(body, unknowns)
         # A part of the mass makes K positive definite, too small to matter beside elastic modes.
         speeds = body.shear_moduli / body.densities
         waves = float(speeds.min()) * (np.pi / body.mesh.extent) ** 2
-        shift = 0.02 * waves if rigid else 0.0
-        moving = moving_components(body)
-        held = held_matrix(K, moving)
-        coarse = replace(body, degree=1, bricks="full") if body.degree == 2 else body
-        coarse_moving = moving_components(coarse)
-        coarse_matrix = shifted(held_matrix(coarse.stiffness_blocks, coarse_moving),
-                                coarse.component_mass, shift)
+        shift = 0.02 * waves if rigid or len(compliance) else 0.0
+        held = held_matrix(K, unknowns.moving) if one is None else K
+        fine = shifted(held, M, shift) if one is None else congruent(shifted(K, M, shift), one)
         scaled = (coarse.nodes - coarse.nodes.mean(axis=0)) / body.mesh.extent
-        coarse_motions = rigid_motions(scaled, np.zeros(3)) * coarse_moving.reshape(-1, 1)
-        cycle = multigrid(shifted(held, M, shift), coarse_matrix,
-                          interpolation(body) if body.degree == 2 else None, coarse_motions)
-        return cls(BlockRows.of(held), BlockRows.of(M), cycle, moving[:, :, None],
-                   gauge * moving.reshape(-1, 1), shift)
+        coarse_motions = coarse_unknowns.coordinates(rigid_motions(scaled, np.zeros(3)))
+        if coarse is body:
+            coarse_matrix, between = fine, None
+        else:
+            coarse_matrix = _coarse_matrix(coarse, coarse_unknowns, shift)
+            between = interpolation(body)
+            if one is not None:
+                between = _between(unknowns, between, coarse_unknowns)
+        cycle = multigrid(fine, coarse_matrix, between, coarse_motions)
+        solver = cls(BlockRows.of(held), BlockRows.of(M), cycle, unknowns.moving[:, :, None],
+                     gauge * unknowns.moving.reshape(-1, 1), shift, unknowns)
+        if len(compliance):
+            solver = replace(solver, links=Links.of(rows, compliance, solver._cycle))
+        if any(isinstance(added, PointMass) for added in body.added):
+            mass = added_mass(body)
+            E = unknowns.expansion
+            solver = replace(solver, added_mass=sp.csr_array(E.T @ mass @ E))
+        return solver
 
     def modes(self, count: int, rigid: Array) -> Found:
         """The lowest elastic modes; ``rigid`` (3 N, r) are the rigid ones."""
@@ -182,15 +210,23 @@ class SolidSolver:
         return x, bool(reached.all())
 
     def stiffness_product(self, x: Array) -> Array:
-        """K x of displacements (3 N, k) that vanish where they are fixed."""
-        return self._by_nodes(self.stiffness.product, x)
+        """E^T K E x of unknowns (3 n, k) that vanish where they are fixed."""
+        found = self._by_nodes(self.stiffness.product, x)
+        if self.links is not None:
+            found += self.links.spring_forces(x)
+        return found
 
     def mass_product(self, x: Array) -> Array:
-        """M x, zero where displacements are fixed."""
-        return self._held(self._by_nodes(self.component_mass.product, x))
+        """E^T M E x, zero where displacements are fixed."""
+        found = self._held(self._by_nodes(self.component_mass.product, x))
+        if self.added_mass is not None:
+            found += self.added_mass @ x
+        return found
 
     def _cycle(self, x: Array) -> Array:
-        return self._held(self.mesh_cycle.cycle(x))
+        if self.links is None:
+            return self._held(self.mesh_cycle.cycle(x))
+        return self.links.linked(self._held(self.mesh_cycle.cycle(self.links.without_reactions(x))))
 
     def _held(self, x: Array) -> Array:
         if not self._free:
@@ -200,15 +236,77 @@ class SolidSolver:
     @cached_property
     def _single(self) -> "SolidSolver":
         """Copy with a stiffness of single precision, the precision of the multigrid."""
-        return replace(self, stiffness=self.stiffness.single())
+        given = self.unknowns
+        if given is not None and given.dependence is not None:
+            given = replace(given, dependence=given.dependence.single())
+        return replace(self, stiffness=self.stiffness.single(), unknowns=given)
 
     @cached_property
     def _free(self) -> bool:
         return bool(self.moving.all())
 
     def _by_nodes(self, product: Callable[[Array], Array], x: Array) -> Array:
-        return np.asarray(product(np.ascontiguousarray(x).reshape(len(self.moving), 3, -1))
-                          ).reshape(x.shape)
+        one = None if self.unknowns is None else self.unknowns.dependence
+        u = np.ascontiguousarray(x) if one is None else one.displacements(x)
+        found = np.asarray(product(u.reshape(len(u) // 3, 3, -1))).reshape(u.shape)
+        return found if one is None else one.forces(found)
+
+
+def _unknowns_of_coarse(coarse: ElasticBody) -> SolverUnknowns | None:
+    """Unknowns of the linear elements, whose constraints have warned with the quadratic ones."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)
+        try:
+            return SolverUnknowns.of(coarse)
+        except FecontactError:
+            return None
+
+
+def _linking_rows(body: ElasticBody, unknowns: SolverUnknowns) -> tuple[Any, Array]:
+    """Rows (m, 3 n) of equations and of springs at points, and compliances (m,), 0 of equations."""
+    import scipy.sparse as sp
+
+    springs, stiffness, _ = body.springs
+    springs = sp.csr_array(springs[stiffness > 0.0] @ unknowns.expansion)
+    # Motions of reference points are means of nodes, which leave rounding at other unknowns.
+    least = 1e-12 * abs(springs).max(axis=1).toarray().ravel() if springs.nnz else np.zeros(0)
+    springs.data[np.abs(springs.data) < np.repeat(least, np.diff(springs.indptr))] = 0.0
+    springs.eliminate_zeros()
+    compliance = 1.0 / stiffness[stiffness > 0.0]
+    if unknowns.equations is None:
+        return springs, compliance
+    return (sp.csr_array(sp.vstack([unknowns.equations, springs])),
+            np.concatenate([np.zeros(unknowns.equations.shape[0]), compliance]))
+
+
+def congruent(matrix: Any, dependence: Dependence) -> Any:
+    """E^T A E of blocks, with a positive diagonal where unknowns are fixed."""
+    import scipy.sparse as sp
+
+    E = dependence.blocks
+    found = sp.bsr_array(sp.bsr_array(E.T) @ (matrix @ E))
+    found.sort_indices()
+    own = np.flatnonzero(_rows(found) == found.indices)
+    diagonal = np.einsum("kii->ki", found.data[own])
+    fixed, axis = np.nonzero(diagonal == 0.0)
+    found.data[own[fixed], axis, axis] = diagonal.max(axis=1)[fixed]
+    return found
+
+
+def _coarse_matrix(coarse: ElasticBody, unknowns: SolverUnknowns, shift: float) -> Any:
+    """E^T (K + shift M) E of the linear elements."""
+    K, one = coarse.stiffness_blocks, unknowns.dependence
+    K = held_matrix(K, unknowns.moving) if one is None else K
+    whole = shifted(K, coarse.component_mass, shift)
+    return whole if one is None else congruent(whole, one)
+
+
+def _between(unknowns: SolverUnknowns, between: Any, coarse: SolverUnknowns) -> Any:
+    """Unknowns of quadratic elements from those of linear ones, sparse (3 n, 3 m)."""
+    import scipy.sparse as sp
+
+    spread = sp.kron(between, sp.eye_array(3), format="csr")
+    return sp.csr_array(unknowns.inverse @ (spread @ coarse.expansion))
 
 
 def moving_components(body: ElasticBody) -> Array:

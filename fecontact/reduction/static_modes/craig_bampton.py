@@ -14,6 +14,7 @@ import numpy as np
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.reduction.eigenmodes import FreeSystem
+from fecontact.reduction.solvers.congruence import as_matrix
 from fecontact.reduction.static_modes.flexibility import Flexibility
 from fecontact.reduction.static_modes.residual_vectors import diagonalised, flexibility_of
 
@@ -96,7 +97,7 @@ def _fixed_interface_modes(
     """
     from scipy.sparse.linalg import LinearOperator, eigsh
 
-    K, M = system.stiffness, system.mass
+    K, M = as_matrix(system.stiffness), as_matrix(system.mass)
     size, interface = K.shape[0], held.shape[1]
     if not count:
         return np.zeros((size, 0))

@@ -22,6 +22,7 @@ from fecontact.reduction.eigenmodes import FreeSystem
 from fecontact.reduction.solvers.multigrid import ByNodes
 from fecontact.reduction.solvers.near_solver import NearSolver
 from fecontact.reduction.solvers.solid_solver import WIDTH, SolidSolver
+from fecontact.reduction.solvers.solver_unknowns import SolverUnknowns
 from fecontact.reduction.static_modes.flexibility import Flexibility, Modes, modal_compliance
 
 # Energy norm of the residuals of iterated deflections; the error of compliances is its square.
@@ -63,7 +64,8 @@ class TrialSpace:
         """
         whole = cls.whole(system)
         assert system.body is not None
-        if system.body.degree == 1:
+        if system.body.degree == 1 or whole.unknowns.dependence is not None or (
+                whole.solver.links is not None):
             return whole
         loaded = np.flatnonzero(np.diff(rows.indptr))
         some = rows[loaded[:: -(-len(loaded) // WIDTH)]]
@@ -82,14 +84,14 @@ class TrialSpace:
 
     def gather(self, forces: Any) -> Array:
         """B^T f (s, k) of forces (f, k)."""
-        forces = np.asarray(self._expansion @ forces)
+        forces = np.asarray(self.unknowns.pick.T @ forces)
         return forces if self.near is None else np.asarray(self._restriction @ forces)
 
     def rows(self, rows: Any) -> Any:
         """W B, sparse (k, s), of rows W (k, f)."""
         import scipy.sparse as sp
 
-        found = sp.csr_array(rows @ self._expansion.T)
+        found = sp.csr_array(rows @ self.unknowns.pick)
         if self.near is None:
             return found
         return sp.csr_array(found @ sp.kron(self.near.spread, sp.eye_array(3), format="csr"))
@@ -98,8 +100,7 @@ class TrialSpace:
         """Displacements B v (f, k) from v (s, k)."""
         if self.near is not None:
             coordinates = ByNodes(self.near.spread) @ coordinates
-        E = self._expansion
-        return coordinates if E.shape[0] == E.shape[1] else np.asarray(E.T @ coordinates)
+        return np.asarray(self.unknowns.pick @ coordinates)
 
     def deflections(self, forces: Array, accuracy: float) -> Array | None:
         """Coordinates v (s, k) under balanced forces B^T f (s, k); None if they do not converge."""
@@ -108,19 +109,22 @@ class TrialSpace:
             return found
         if self.near is not None:
             return None
-        return np.asarray(self._expansion @ self.system.deflection(self._expansion.T @ forces))
+        spread = self.unknowns.spread
+        return np.asarray(spread @ self.system.deflection(spread.T @ forces))
 
     def at_followers(self, forces: Array) -> Array:
         """Forces at the nodes that follow, from forces (f, k) at all free unknowns."""
         if self.near is None:
             return forces[:0]
-        whole = np.asarray(self._expansion @ forces).reshape(-1, 3, forces.shape[1])
+        whole = np.asarray(self.unknowns.pick.T @ forces).reshape(-1, 3, forces.shape[1])
         return whole[self.near.followers].reshape(-1, forces.shape[1])
 
     @property
-    def _expansion(self) -> Any:
-        assert self.system.body is not None
-        return self.system.body.expansion
+    def unknowns(self) -> SolverUnknowns:
+        """Unknowns of the solver of the whole body."""
+        assert self.system.iterative is not None
+        assert self.system.iterative.unknowns is not None
+        return self.system.iterative.unknowns
 
     @cached_property
     def _restriction(self) -> ByNodes:
