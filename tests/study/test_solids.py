@@ -433,7 +433,7 @@ def test_the_solver_of_the_modes_is_that_of_the_study(monkeypatch):
     assert found["iterative"] == pytest.approx(found["direct"], rel=1e-8)
     refused(PAD, {"basis.eigensolver": "lobpcg"}, r"eigensolver = .*lobpcg.* must be .*iterative")
     refused(PLANE, {"basis.eigensolver": "iterative"},
-            r"eigensolver = 'iterative' is for solids without hinges")
+            r"eigensolver = 'iterative' is for solids; leave it out")
 
 
 def test_what_nothing_holds_is_named():
