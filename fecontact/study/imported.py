@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -95,31 +96,32 @@ class Imported:
         bodies = [name for name in self.meshes if name in touching]
         if not bodies:
             name = max(self.meshes, key=lambda one: len(self.meshes[one].cells))
-            forces, points = self._loads([name])
+            loads = self._loads([name])
             tables = {"geometry": self._geometry(file, name),
                       "body": self._body(name),
                       "basis": {"modes": 20, "contact": [],
-                                **_loaded(points[name], self.meshes[name])}}
+                                **_loaded(loads.named[name], self.meshes[name])}}
         else:
-            forces, points = self._loads(bodies)
+            loads = self._loads(bodies)
             tables = {"bodies": {_name(name): {
                 "geometry": self._geometry(file, name), "body": self._body(name),
-                "basis": {"modes": 10, "damping": 0.01, 
-                          **_loaded(points[name], self.meshes[name])}}
+                "basis": {"modes": 10, "damping": 0.01,
+                          **_loaded(loads.named[name], self.meshes[name])}}
                 for name in bodies},
                 "interfaces": {f"contact-{number}": self._interface(face, other)
                                for number, (face, other) in enumerate(self.interfaces, start=1)}}
         left = [name for name in self.meshes if bodies and name not in bodies]
-        if forces:
-            tables["load"] = {"forces": forces}
+        if loads.table:
+            tables["load"] = loads.table
         tables["simulation"] = {"t_end": 1e-3, "outputs": 101}
         comments = [f"Written by fecontact import {self.path.name}. Units are SI: m, kg, s, N.",
                     *([f"Bodies without an interface are left out: {listed(left, len(left))}."]
                       if left else []),
-                    *self.notes,
+                    *self.notes, *loads.notes,
                     *([f"Loads and supports of the deck: {', '.join(self.contents.loads)}. Those "
-                       f"of supports at zero and of forces at single points are taken; give others "
-                       f"as fixed in [body] and in [load]."]
+                       f"of supports at zero, forces at single points, pressure, and gravity and "
+                       f"rotation of whole bodies are taken; give others as fixed in [body] and in "
+                       f"[load]."]
                       if self.contents.loads else []),
                     *(["The laws of contact are a stiff normal contact and a coefficient of 0.3; "
                        "put in your own."] if bodies else
@@ -151,12 +153,13 @@ class Imported:
                 fixed[name] = " ".join(held.split())
         return {**({} if mesh.materials else {"material": "steel"}),
                 **({"plane": "strain"} if mesh.dimension == 2 else {}),
-                **({"fixed": fixed} if fixed else {})}
+                **({"fixed": fixed} if fixed else {}),
+                **({"rotation": rotation} if (rotation := self._rotation(body)) else {})}
 
-    def _loads(self, bodies: Sequence[str]) -> tuple[list[dict[str, object]], dict[str, set[str]]]:
-        """Forces and moments at reference points of bodies, and these points."""
-        forces: list[dict[str, object]] = []
-        points: dict[str, set[str]] = {body: set() for body in bodies}
+    def _loads(self, bodies: Sequence[str]) -> "_Loads":
+        """Forces and moments at points, pressure and gravity of the first step."""
+        found = _Loads({body: set() for body in bodies})
+        several = len(bodies) > 1 or bool(self.interfaces)
         for given, component, value in self.contents.forces:
             word = self.contents.single.get(given, given)
             for body in bodies:
@@ -167,13 +170,62 @@ class Imported:
                 if mesh.dimension == 2:
                     component = _in_plane(component)
                 if name and component:
-                    points[body].add(name)
-                    prefix = f"{_name(body)}." if len(bodies) > 1 or self.interfaces else ""
                     moment = component.startswith("phi")
-                    forces.append({"point": prefix + name, "component": component,
-                                   "signal": value * (self.scale if moment else 1.0)})
+                    found.add(body, name, "forces", {
+                        "point": f"{_name(body)}." * several + name, "component": component,
+                        "signal": value * (self.scale if moment else 1.0)})
                     break
-        return forces, points
+        distributed = self.contents.distributed
+        for surface, value in distributed.pressures:
+            held = [(body, name) for body in bodies for name in self.meshes[body].boundaries
+                    if name.upper() == surface.upper()]
+            for body, name in held:
+                found.add(body, name, "boundaries", {
+                    "boundary": f"{_name(body)}." * several + name,
+                    "pressure": value / self.scale**2})
+            if not held:
+                found.notes.append(f"The pressure on {surface} is left out: it is no boundary of "
+                                   f"the bodies.")
+        total = np.zeros(3)
+        for name, acceleration in distributed.gravity:
+            if self._whole(name, bodies):
+                total += self.scale * np.array(acceleration)
+            else:
+                found.notes.append(f"Gravity on {name} is left out: it must act on all cells.")
+        if total.any():
+            d = self.meshes[bodies[0]].dimension
+            found.table["gravity"] = total[:d].tolist()
+            for body in bodies:
+                found.named[body].add("gravity")
+        for name, *_ in distributed.rotations:
+            if not any(self._rotation(body) for body in bodies):
+                found.notes.append(f"Centrifugal force on {name} is left out: it must act on all "
+                                   f"cells.")
+        for what in dict.fromkeys(distributed.unread):
+            found.notes.append(f"{what} is left out: only P, P1 to P6, GRAV and CENTRIF without "
+                               f"other options are read.")
+        return found
+
+    def _rotation(self, body: str) -> dict[str, object] | None:
+        """Table of the rotation of a body by centrifugal force on all its cells."""
+        mesh = self.meshes[body]
+        for name, square, point, axis in self.contents.distributed.rotations:
+            if square > 0.0 and self._whole(name, [body]) and (
+                    mesh.dimension == 3 or not any(axis[:2])):
+                return {"speed": float(np.sqrt(square)),
+                        "centre": [self.scale * x for x in point[:mesh.dimension]],
+                        **({"axis": list(axis)} if mesh.dimension == 3 else {})}
+        return None
+
+    def _whole(self, name: str, bodies: Sequence[str]) -> bool:
+        """True if a set of elements, by name or none for all, holds all cells of some bodies."""
+        for body in bodies:
+            mesh = self.meshes[body]
+            groups = {group.upper(): cells for group, cells in mesh.cell_groups.items()}
+            if name and name.upper() != body.upper() and len(
+                    groups.get(name.upper(), ())) < len(mesh.cells):
+                return False
+        return True
 
     def _interface(self, face: str, other: str) -> dict[str, object]:
         body, _, boundary = face.partition(".")
@@ -186,6 +238,20 @@ class Imported:
                 "normal": {"law": "linear", "stiffness": float(f"{_STIFFNESS * area:.3g}")},
                 "friction": {"law": "constant", "friction_coefficient": 0.3,
                              "smoothing_slope": 1e4}}
+
+
+@dataclass
+class _Loads:
+    """Table of loads, the points and boundaries of bodies that they load, and what is left out."""
+
+    named: dict[str, set[str]]
+    table: dict[str, Any] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def add(self, body: str, name: str, kind: str, row: dict[str, object]) -> None:
+        """Add a row to the forces or boundaries of the table, of a named place of a body."""
+        self.table.setdefault(kind, []).append(row)
+        self.named[body].add(name)
 
 
 def imported(path: str | Path, scale: float = 1.0) -> Imported:
@@ -319,11 +385,13 @@ def _references(mesh: Mesh) -> dict[str, str]:
         "NODE "))}
 
 
-def _loaded(points: set[str], mesh: Mesh) -> dict[str, object]:
-    """Keys of a basis with points at which loads act, and with the temperature of the deck."""
-    names, found = sorted(points), dict[str, object]()
+def _loaded(places: set[str], mesh: Mesh) -> dict[str, object]:
+    """Keys of a basis with places at which loads act, and with the temperature of the deck."""
+    names, found = sorted(places), dict[str, object]()
     if names:
-        found |= {"points": {name: name for name in names}, "loads": names}
+        points = [name for name in names if name not in mesh.boundaries and name != "gravity"]
+        found |= {**({"points": {name: name for name in points}} if points else {}),
+                  "loads": names}
     if mesh.temperature is not None and any(
             getattr(one, "thermal_expansion", 0.0) for one in mesh.materials.values()):
         found["temperature"] = "mesh"

@@ -35,6 +35,7 @@ from fecontact.fem.mesh_files.abaqus_constraints import (
     sections_of,
 )
 from fecontact.fem.mesh_files.abaqus_keywords import Deck, Options
+from fecontact.fem.mesh_files.abaqus_loads import LOADS, DistributedLoads
 from fecontact.fem.mesh_files.abaqus_materials import Given, material, orientation
 from fecontact.fem.mesh_files.abaqus_temperatures import is_temperature, temperature_of
 from fecontact.fem.mesh_files.raw import NODES, PLANE, SOLID, RawMesh
@@ -417,6 +418,7 @@ class _Assembly:
         self.attachments: list[tuple[_Part | None, Block]] = []
         self.unsorted: set[str] = set()
         self.temperatures: list[Block] = []
+        self.loads, self.first_step_ended = DistributedLoads(), False
         self.sections: list[tuple[_Part | None, Options]] = []
         self.materials: dict[str, dict[str, Given]] = {}
         self.orientations: dict[str, Given] = {}
@@ -436,6 +438,11 @@ class _Assembly:
                 self._add_set(keyword, options, lines)
             case "SURFACE" if options.get("TYPE", "ELEMENT").upper() == "ELEMENT":
                 self._add_surface(options["NAME"], lines)
+            case _ if keyword in LOADS and not self.first_step_ended:
+                for name, sides in self.loads.add(keyword, options, lines).items():
+                    self._add_surface(name, [f"{word}, S{side}" for word, side in sides])
+            case "END STEP":
+                self.first_step_ended = True
             case "SURFACE" if options["TYPE"].upper() == "NODE":
                 sets = [",".join(_words(line)[:1]) for line in lines]
                 self._add_set("NSET", {**options, "NSET": options["NAME"]}, sets)

@@ -9,6 +9,7 @@ from fecontact.core.checks import whole_number
 from fecontact.fem.mesh_files.abaqus_attachments import TYPES
 from fecontact.fem.mesh_files.abaqus_constraints import READ
 from fecontact.fem.mesh_files.abaqus_keywords import Deck
+from fecontact.fem.mesh_files.abaqus_loads import LOADS, DistributedLoads
 
 # Keywords of the mesh and its materials, besides those of constraints.
 _MESH = ("", "NODE", "ELEMENT", "SYSTEM", "NSET", "ELSET", "SURFACE", "PART", "END PART",
@@ -16,7 +17,7 @@ _MESH = ("", "NODE", "ELEMENT", "SYSTEM", "NSET", "ELSET", "SURFACE", "PART", "E
          "ELASTIC", "DENSITY", "DAMPING", "EXPANSION", "ORIENTATION", "INCLUDE", "HEADING",
          "PREPRINT")
 # Loads and supports, which a study gives.
-_LOADS = ("BOUNDARY", "CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", "INITIAL CONDITIONS")
+_LOADS = ("BOUNDARY", "CLOAD", *LOADS, "TEMPERATURE", "INITIAL CONDITIONS")
 _CONTACT = ("CONTACT PAIR", "CONTACT", "CONTACT INCLUSIONS", "CONTACT PROPERTY ASSIGNMENT",
             "SURFACE INTERACTION", "SURFACE BEHAVIOR", "FRICTION", "CLEARANCE", "GAP")
 
@@ -40,6 +41,8 @@ class DeckContents:
         Sets on which ``*CLOAD`` acts in the first step, the component and the value.
     single : mapping of str to str
         Sets of one node, by its number.
+    distributed : DistributedLoads
+        Pressure, gravity and centrifugal force of ``*DLOAD`` and ``*DSLOAD`` in the first step.
     """
 
     keywords: Counter[str] = field(default_factory=Counter)
@@ -48,6 +51,7 @@ class DeckContents:
     supports: tuple[tuple[str, str], ...] = ()
     forces: tuple[tuple[str, str, float], ...] = ()
     single: Mapping[str, str] = field(default_factory=dict)
+    distributed: DistributedLoads = field(default_factory=DistributedLoads)
 
     @property
     def loads(self) -> dict[str, int]:
@@ -83,6 +87,7 @@ def deck_contents(path: Path) -> DeckContents:
     supports: dict[str, set[int]] = {}
     forces: list[tuple[str, str, float]] = []
     single: dict[str, str] = {}
+    distributed = DistributedLoads()
     for keyword, options, lines in deck.blocks():
         rows = [[word.strip() for word in line.split(",")] for line in lines] if (
             keyword in ("CONTACT PAIR", "BOUNDARY", "CLOAD", "NSET")
@@ -101,6 +106,8 @@ def deck_contents(path: Path) -> DeckContents:
             for name, *held in rows:
                 known = next((one for one in supports if one.upper() == name.upper()), name)
                 supports.setdefault(known, set()).update(_held(held))
+        elif keyword in LOADS and not deck.keywords["END STEP"]:
+            distributed.add(keyword, options, lines)
         elif keyword == "CLOAD" and not deck.keywords["END STEP"]:
             forces += [(name, COMPONENTS[dof - 1], float(value)) for name, word, value, *_ in (
                 (*row, "", "")[: max(len(row), 3)] for row in rows)
@@ -108,7 +115,8 @@ def deck_contents(path: Path) -> DeckContents:
     return DeckContents(
         deck.keywords, elements, tuple(pairs),
         tuple((name, " ".join(COMPONENTS[dof - 1] for dof in sorted(held)))
-              for name, held in supports.items() if held), tuple(forces), single)
+              for name, held in supports.items() if held), tuple(forces), single,
+        distributed)
 
 
 COMPONENTS = ("x", "y", "z", "phi_x", "phi_y", "phi_z")
