@@ -222,11 +222,15 @@ class Coupling:
         Independent directions in which the nodes of a kinematic coupling follow; by default all.
     name : str
         For messages.
+    weights : sequence of floats, optional
+        Weights above zero of the points ``nodes`` of a distributing coupling, in their order in the
+        mesh; middles of edges between them have none then.
 
     Raises
     ------
     InputError
-        For an unknown kind, a place that is not finite, or dependent axes.
+        For an unknown kind, a place that is not finite, dependent axes, or weights that are not
+        above zero or of another kind.
     """
 
     nodes: str
@@ -235,6 +239,7 @@ class Coupling:
     kind: str = "kinematic"
     axes: Sequence[Sequence[float]] | None = None
     name: str = "a coupling"
+    weights: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
         what = f"Coupling '{self.name}'"
@@ -242,6 +247,15 @@ class Coupling:
         require_choice(what, "kind", self.kind, ("kinematic", "distributing"))
         if self.place is not None:
             object.__setattr__(self, "place", as_place(self.place, f"{what}: place"))
+        if self.weights is not None:
+            weights = as_floats(self.weights, f"{what}: weights")
+            if weights.ndim != 1 or not (np.isfinite(weights) & (weights > 0.0)).all():
+                raise InputError(f"{what}: weights = {shown(self.weights)} must be numbers above "
+                                 f"zero, one for each point.")
+            if self.kind == "kinematic":
+                raise InputError(f"{what}: weights are those of distributing couplings; leave them "
+                                 f"out, or give kind = 'distributing'.")
+            object.__setattr__(self, "weights", tuple(weights.tolist()))
         if self.axes is None:
             return
         axes = as_floats(self.axes, f"{what}: axes")
@@ -317,6 +331,9 @@ def check_constraints(
                 raise InputError(f"{what}: control = '{one.control}' is a name of the mesh; choose "
                                  f"another one.")
             continue
+        if one.weights is not None and len(points.get(one.nodes, ())) != len(one.weights):
+            raise InputError(f"{what}: weights has {len(one.weights)} numbers, but '{one.nodes}' "
+                             f"names {len(points.get(one.nodes, ()))} points; give one for each.")
         if one.axes is not None and np.shape(one.axes)[1] != dimension:
             raise InputError(f"{what}: axes must have {dimension} components each.")
         if one.place is not None and len(one.place) != dimension:

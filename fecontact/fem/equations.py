@@ -205,8 +205,11 @@ class Unknowns:
     def describe(self, unknown: int) -> str:
         """Direction and place of an unknown, for messages."""
         if unknown < self.angles:
-            where = ", ".join(f"{x:g}" for x in self.body.nodes[unknown // self.d])
-            return f"the displacement in {'xyz'[unknown % self.d]} at ({where})"
+            node = unknown // self.d
+            where = ", ".join(f"{x:g}" for x in self.body.nodes[node])
+            which = (f"node {node} of the mesh" if node < len(self.body.mesh.nodes)
+                     else "the node between others")
+            return f"the displacement in {'xyz'[unknown % self.d]} of {which} at ({where})"
         for name, (shift, turns) in self.motions.items():
             if unknown in shift or unknown in turns:
                 kind = "displacement" if unknown in shift else "rotation"
@@ -301,7 +304,7 @@ def _distributing(unknowns: Unknowns, one: Coupling, name: str) -> Equations:
 
     d, body = unknowns.d, unknowns.body
     shift, turns = unknowns.motions[one.reference]
-    nodes, weights = _weighted_nodes(body, one.nodes)
+    nodes, weights = _weighted_nodes(body, one)
     mean, centre = mean_motion(len(body.nodes), nodes, body.nodes[nodes], weights)
     arm = unknowns.place(one.reference) - centre
     swept = (np.array([[-arm[1]], [arm[0]]]) if d == 2
@@ -316,8 +319,11 @@ def _distributing(unknowns: Unknowns, one: Coupling, name: str) -> Equations:
         False)
 
 
-def _weighted_nodes(body: _Body, name: str) -> tuple[Integers, Array]:
-    """Displacement nodes of a group and their shares of its length or area, of points equal."""
+def _weighted_nodes(body: _Body, one: Coupling) -> tuple[Integers, Array]:
+    """Nodes of a coupling and their weights, by default shares of length or area, or equal ones."""
+    name = one.nodes
+    if one.weights is not None:
+        return np.asarray(body.mesh.points[name]), np.array(one.weights)
     nodes = body.group_nodes(name)
     if name not in body.mesh.boundaries:
         return nodes, np.ones(len(nodes))

@@ -69,6 +69,28 @@ def test_constraints_are_those_of_a_deck_of_abaqus(tmp_path, case):
     assert np.abs(found[8:] / free[8:] - 1.0).max() > 1e-3
 
 
+def test_weights_of_a_mean_are_those_of_the_card(tmp_path):
+    """The point has the rigid motion that fits the weighted nodes best, by least squares."""
+    given = {END[0]: 1.0, END[1]: 2.5, END[2]: 2.5, END[3]: 4.0}
+    (tmp_path / "a.bdf").write_text(bulk(
+        f"RBE3,78,,{HUB_AT},123456,4.0,123,{END[3]},2.5\n+,123,{END[2]},{END[1]},1.0,123,{END[0]}\n"))
+    mesh = read_mesh(tmp_path / "a.bdf")
+    one, = mesh.constraints
+    assert dict(zip(mesh.points["RBE3 78"] + 1, one.weights, strict=True)) == given
+    for degree in (1, 2):
+        body = fc.ElasticBody(mesh, STEEL, degree=degree)
+        u = np.random.default_rng(3).standard_normal((len(body.nodes), 3))
+        nodes, weights = np.array(list(given)) - 1, np.array(list(given.values()))
+        arm = body.nodes[nodes] - HUB
+        # Displacements of the nodes under unit displacements and turns of the point.
+        rigid = np.concatenate([np.broadcast_to(np.eye(3), (4, 3, 3)),
+                                -np.cross(arm[:, None], np.eye(3)[None])], axis=1)
+        rigid = np.swapaxes(rigid, 1, 2).reshape(12, 6)
+        root = np.sqrt(np.repeat(weights, 3))
+        expected = np.linalg.lstsq(root[:, None] * rigid, root * u[nodes].ravel(), rcond=None)[0]
+        assert body.motion_rows(one.reference) @ u.ravel() == pytest.approx(expected, rel=1e-9)
+
+
 @pytest.mark.parametrize("cards", [
     "SPC1,9,123," + ",".join(map(str, FOOT[:4])) + "\n+," + ",".join(map(str, FOOT[4:])) + "\n",
     "".join(f"SPC,9,{one},123,0.0,{other},123,0.0\n"
@@ -85,7 +107,8 @@ def test_nodes_of_supports_are_a_group(tmp_path, cards):
     (f"RBE2,77,{HUB_AT},123,999\n", "RBE2 77 of line .* names the point 999, which the file does"),
     (f"RBE2,77,{HUB_AT},456,1\n", "holds the components '456', no displacements"),
     (f"RBE2,77,{HUB_AT},123\n", "RBE2 77 of line .* names no points"),
-    (f"RBE3,78,,{HUB_AT},123,1.0,123,1,2\n+,2.0,123,3\n", "RBE3 78 .* different weights"),
+    (f"RBE3,78,,{HUB_AT},123,-1.0,123,1,2\n+,2.0,123,3\n", "weights = .* above zero, one for"),
+    (f"RBE3,78,,{HUB_AT},123,1.0,123,1,2\n+,UM,1,1\n", "RBE3 78 .* no weight or a list UM"),
     (f"RBE3,78,,{HUB_AT},123,1.0,1,1,2\n", "weights of other components"),
     ("MPC,5,1,1,1.0,2,1,-1.0\nMPC,6,3,1,1.0,2,1,-1.0\n", "sets '5', '6' of MPC"),
     ("MPC,5,1,9,1.0,2,1,-1.0\n", "component 9, which must be 1 to 6"),

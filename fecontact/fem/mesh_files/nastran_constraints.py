@@ -89,23 +89,25 @@ def _means(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constraint
     for line, fields in cards(path, "RBE3"):
         name = f"RBE3 {fields[0]}"
         reference = _reference(line, fields[2], row, raw, name)
-        weights, points = [], []
+        parts: list[tuple[float, list[str]]] = []
         words = [word for word in fields[4:] if word]
         while words and words[0].upper() not in ("UM", "ALPHA"):
             word = words.pop(0)
             if "." in word:
-                weights.append(real(line, word))
+                parts.append((real(line, word), []))
                 if not words or not set("123") <= set(words.pop(0)):
                     raise MeshError(f"The card {name} of line {line} has weights of other "
                                     f"components than 1, 2, 3 together, which are not read.")
-            else:
-                points.append(word)
-        if len(set(weights)) != 1 or "UM" in map(str.upper, words):
-            raise MeshError(f"The card {name} of line {line} has different weights or a list UM, "
-                            f"which are not read; write one weight for all its points.")
-        raw.nodes[name] = _rows(line, points, row, name)
+            elif parts:
+                parts[-1][1].append(word)
+        if not parts or "UM" in map(str.upper, words):
+            raise MeshError(f"The card {name} of line {line} has no weight or a list UM, which is "
+                            f"not read; give a weight such as 1.0, and leave UM out.")
+        rows = [_rows(line, points, row, name) for _, points in parts]
+        weights = np.repeat([weight for weight, _ in parts], [len(one) for one in rows])
+        raw.nodes[name] = np.concatenate(rows)
         yield Coupling(name, reference, tuple(raw.points[raw.nodes[reference][0]]), "distributing",
-                       name=name)
+                       name=name, weights=None if np.ptp(weights) == 0.0 else tuple(weights))
 
 
 def _equations(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constraint]:

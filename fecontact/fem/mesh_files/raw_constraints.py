@@ -73,6 +73,8 @@ def constraints_of_mesh(
                 term for term in terms if term is not None))
         else:
             missing, own = _missing(one, boundaries, points), one.scaled(scale)
+            if isinstance(own, Coupling) and own.weights is not None:
+                own = _weighted(own, raw.nodes[own.nodes], number, middles)
         if not missing:
             found.append(own)
         elif raw.chosen:
@@ -127,6 +129,19 @@ def _attached(
                       f"that belong to no element, coupling or rigid body, and left out; model "
                       f"them as bodies of their own, by point_masses.", ModelWarning, stacklevel=5)
     return found
+
+
+def _weighted(
+    one: Coupling, rows: Integers, number: Integers, middles: Mapping[int, tuple[int, int]]
+) -> Coupling:
+    """Coupling whose weights, of nodes of the file in ``rows``, follow the nodes of the mesh."""
+    if any(int(row) in middles for row in rows):
+        raise MeshError(f"The coupling '{one.name}' has different weights and names nodes in the "
+                        f"middles of edges, which is not read; write one weight for all its "
+                        f"points.")
+    nodes, place = np.unique(number[rows], return_inverse=True)
+    weights = np.bincount(place.ravel(), one.weights)
+    return replace(one, weights=tuple(weights[nodes >= 0].tolist()))
 
 
 def _missing(
