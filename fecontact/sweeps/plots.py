@@ -219,7 +219,8 @@ def _scatter(
         known = table.values[name][np.isfinite(table.values[name])]
         if len(known):
             last.hist(known, bins=int(np.clip(np.sqrt(len(known)), 5, 60)),
-                      range=None if np.ptp(known) else last.get_ylim(), orientation="horizontal", color=COLOURS[0], alpha=0.7)
+                      range=None if np.ptp(known) else last.get_ylim(),
+                      orientation="horizontal", color=COLOURS[0], alpha=0.7)
         last.set_xlabel("cases")
         for k, axes in enumerate(grid):
             if k % columns:
