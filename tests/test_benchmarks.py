@@ -24,6 +24,8 @@ BENCHMARKS = {
     "decks": ((), [(r"^fecontact, .inp +(\d+)", 5324.0, 0.0),
                    (r"^fecontact, .cdb .* (\d+)$", 430.0, 0.0)]),
     "ensemble": (("4", "3"), [(r"1 thread +rtol 1e-05 .* error (\S+)$", 0.0, 1e-3)]),
+    "first_tasks": ((), [(r"^two bodies .* (\S+)$", 2000.0, 1e-3),
+                         (r"^(2601) outputs", 2601.0, 0.0)]),
     "fit_coverage": ((), [(r"^  alpha (\S+),", 5e4, 1e3), (r"^  gamma (\S+),", 0.8, 0.03),
                           (r"^  delta (\S+),", -1.1, 0.05),
                           (r"^swept .* freedom (\S+),", 1.0, 0.2)]),

@@ -22,6 +22,7 @@ from fecontact.fem.finite_strain import LARGE_STRAIN
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.excitation import AXES
 from fecontact.laws.friction.stribeck import ConstantFriction
+from fecontact.laws.normal.linear import PrescribedForce
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.kernels import PENETRATION
@@ -339,6 +340,26 @@ def _unheld(planned: Planned) -> Iterator[str]:
     yield (f"nothing holds {who} against {motion}: no stiffness, contact or stop resists the "
            f"constant load there, under which it will fly off; check supports, and sign and place "
            f"of the loads.")
+
+
+def unresisted_motion(system: ContactSystem) -> str | None:
+    """A sentence about a rigid motion that nothing but friction resists; None if there is none.
+
+    Stiffness, damping and normal forces that depend on the gap resist a motion.
+    """
+    arrays = system.arrays
+    if not system.basis.rigid_modes:
+        return None
+    free = _null_space(arrays.stiffness, arrays.damping)
+    rows = [arrays.rows[nodes, 1] for nodes, _, law in system.law_groups("normal")
+            if not isinstance(law, PrescribedForce)]
+    _, sizes, directions = np.linalg.svd(np.concatenate([*rows, np.zeros_like(free.T)]) @ free)
+    left = free @ directions[sizes <= 1e-9 * max(1.0, sizes.max(initial=0.0))].T
+    if not left.shape[1]:
+        return None
+    who, motion = named_motion(system.basis, left[:, 0])
+    return (f"Nothing but friction resists {motion} of {who}; give it a support, a spring or a "
+            f"damper.")
 
 
 def _gap(planned: Planned) -> Iterator[str]:

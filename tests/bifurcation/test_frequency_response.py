@@ -1,11 +1,23 @@
 """Frequency responses at several levels: closed forms, starts, files and pictures."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from oscillators import duffing, jenkins_amplitude, jenkins_system, unilateral
 from systems import TURN, impact_oscillator
 
-from fecontact import io, plot, simulate
+from fecontact import (
+    Beam,
+    ContactSystem,
+    Drive,
+    ElasticBody,
+    generate,
+    io,
+    modal_basis,
+    plot,
+    simulate,
+)
 from fecontact.bifurcation import (
     Collocation,
     ContinuationOptions,
@@ -15,6 +27,8 @@ from fecontact.bifurcation import (
     orbit_branch,
 )
 from fecontact.core.errors import AnalysisError, InputError
+from fecontact.laws import JenkinsFriction, LinearContact, PrescribedForce
+from fecontact.system.model_limits import unresisted_motion
 
 
 @pytest.fixture(scope="module")
@@ -141,3 +155,23 @@ def test_system_without_excitation_is_refused():
     with pytest.raises((InputError, AnalysisError), match=r"excite|period"):
         frequency_response(system, (10.0, 11.0), observe=("B", "y"))
     assert contact_field(impact_oscillator(), ["drive.frequency_hz"]).dimension == 4
+
+
+def test_a_rigid_motion_that_nothing_resists_is_named(monkeypatch):
+    """A spring at one point lets a beam turn, unless its contact presses back."""
+    body = ElasticBody(generate(Beam(length=0.2, height=0.01)), thickness=0.02)
+    system = ContactSystem(
+        modal_basis(body, 4, contact_nodes=3), normal=PrescribedForce(100.0),
+        friction=JenkinsFriction(stiffness=2e5, friction_coefficient=0.3),
+        drive=Drive(stiffness_x=1e5, stiffness_y=1e7, amplitude_x=1e-3, frequency_hz=60.0))
+    assert unresisted_motion(system) == ("Nothing but friction resists a rotation of the body; "
+                                         "give it a support, a spring or a damper.")
+    assert unresisted_motion(replace(system, normal=LinearContact(1e8))) is None
+
+    def no_orbit(*given):
+        raise AnalysisError("Newton's method does not converge.")
+
+    for name in ("_from_rest", "_raised", "_settled"):
+        monkeypatch.setattr(f"fecontact.bifurcation.harmonic.response.{name}", no_orbit)
+    with pytest.raises(AnalysisError, match="Nothing but friction resists a rotation"):
+        frequency_response(system, (40.0, 160.0))

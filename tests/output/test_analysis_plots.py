@@ -9,6 +9,8 @@ from synthetic import basis, run
 from fecontact import Drive, InputError, simulate, write_case
 from fecontact.analysis import receptance
 from fecontact.cli import execute, plot_kinds
+from fecontact.integrate import Rodas5P
+from fecontact.integrate.rodas5p import driver
 from fecontact.output.plots import analysis
 
 
@@ -120,10 +122,18 @@ def test_phases_do_not_leap_about_180_degrees(trajectory):
     np.testing.assert_allclose(phase, -180.0, atol=1e-3)
 
 
-def test_every_kind_is_drawn_from_a_stored_run(trajectory, tmp_path, capsys):
+def test_every_kind_is_drawn_from_a_stored_run(trajectory, tmp_path, capsys, monkeypatch):
+    """Without integrating again: the run keeps what pictures need."""
     system = trajectory.system.with_(drive=Drive(stiffness_x=1e5, amplitude_x=1e-5,
                                                  frequency_hz=200.0))
     case = write_case(tmp_path / "beam.vtkhdf", simulate(system, 0.06, outputs=2401), frames=0)
+
+    def refused(*given, **named):
+        raise AssertionError("a plot integrates")
+
+    monkeypatch.setattr(driver, "integrate", refused)
+    with pytest.raises(AssertionError, match="integrates"):
+        simulate(system, 0.06, outputs=3, solver=Rodas5P())
     for kind in plot_kinds.KINDS:
         assert execute(["plot", str(case), kind, "--t-start", "0.002"]) == 0
         assert (tmp_path / f"beam-{kind}.png").read_bytes()[:4] == b"\x89PNG"

@@ -56,6 +56,7 @@ from fecontact.integrate.initial_state import initial_state
 from fecontact.integrate.solvers import AUTO
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
+from fecontact.system.model_limits import unresisted_motion
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 from fecontact.system.statics.equilibrium import equilibrium_coordinates
@@ -387,6 +388,8 @@ def _started(
                 return begin, *attempt()
             except FecontactError as error:
                 failure = error
+    if isinstance(field, ContactField) and (free_motion := unresisted_motion(field.system(values))):
+        raise AnalysisError(f"No orbit was found to start from. {free_motion}") from failure
     raise failure
 
 

@@ -15,10 +15,11 @@ from fecontact.bifurcation.nonlinear_modes.resonance_curve import ResonanceCurve
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.core.units import has_prefixes, suitable_unit
-from fecontact.output.diagrams.colours import BEYOND, distinct_colours
-from fecontact.output.diagrams.diagram import Band, Curve, Diagram, Level, Mark
+from fecontact.output.diagrams.colours import distinct_colours
+from fecontact.output.diagrams.diagram import Curve, Diagram, Level, Mark
 from fecontact.output.diagrams.labels import branch_label, name_and_unit
 from fecontact.output.diagrams.special_points import SPECIAL
+from fecontact.output.diagrams.spectra import beyond_band
 from fecontact.system.complex_modes import followed
 from fecontact.system.parameter_labels import parameter_label
 
@@ -157,12 +158,6 @@ def eigenvalue_diagrams(
     label = x_label or branch_label(branch)
     return (Diagram(label, "frequency [Hz]", frequency, levels=hopf, x_limits=ends),
             Diagram(label, "growth rate [1/s]", growth, levels=(Level(0.0), *hopf), x_limits=ends))
-
-
-def beyond_band(x: Array, usable_hz: float) -> tuple[Band, ...]:
-    """The band of frequencies x [Hz] beyond a usable basis; none where all are usable."""
-    low, high = float(np.min(x)), float(np.max(x))
-    return (Band(BEYOND, max(usable_hz, low), high),) if usable_hz < high else ()
 
 
 def response_diagrams(

@@ -1,4 +1,4 @@
-"""Diagrams of spectra over frequency."""
+"""Diagrams of spectra, and bands of frequencies."""
 
 from collections.abc import Sequence
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from fecontact.analysis.spectra import Spectrum
 from fecontact.core.types import Array
-from fecontact.output.diagrams.diagram import Curve, Diagram
+from fecontact.output.diagrams.colours import BEYOND
+from fecontact.output.diagrams.diagram import Band, Curve, Diagram
 
 DECADES = 5.0  # range of the logarithmic axis below the highest value
 _COLUMNS = 1000  # most points of a line
@@ -38,6 +39,12 @@ def end_of_content(frequency: Array, values: Array) -> float:
     heard = np.flatnonzero(values > 2e-3 * values.max(initial=0.0))
     end = 1.1 * frequency[heard[-1]] if len(heard) else frequency[-1]
     return float(min(max(end, 10.0 * frequency[1]), frequency[-1]))
+
+
+def beyond_band(x: Array, usable_hz: float) -> tuple[Band, ...]:
+    """The band of frequencies x [Hz] beyond a usable basis; none where all are usable."""
+    low, high = float(np.min(x)), float(np.max(x))
+    return (Band(BEYOND, max(usable_hz, low), high),) if usable_hz < high else ()
 
 
 def _spectrum_line(frequency: Array, values: Array, end: float) -> tuple[Array, Array]:

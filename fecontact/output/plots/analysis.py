@@ -25,11 +25,10 @@ from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array
 from fecontact.core.units import count, listed, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.output.diagrams.branches import beyond_band
 from fecontact.output.diagrams.colours import COLOURS, distinct_colours
 from fecontact.output.diagrams.diagram import WIDTH, Curve, Diagram
 from fecontact.output.diagrams.runs import phase_diagram
-from fecontact.output.diagrams.spectra import end_of_content, spectrum_diagram
+from fecontact.output.diagrams.spectra import beyond_band, end_of_content, spectrum_diagram
 from fecontact.output.plots.drawing import draw
 from fecontact.output.plots.face_panels import abscissa_unit, face_panels, scale_row
 from fecontact.output.plots.figure import new_figure
