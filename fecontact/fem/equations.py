@@ -207,8 +207,8 @@ class Unknowns:
         if unknown < self.angles:
             node = unknown // self.d
             where = ", ".join(f"{x:g}" for x in self.body.nodes[node])
-            which = (f"node {node} of the mesh" if node < len(self.body.mesh.nodes)
-                     else "the node between others")
+            mesh = self.body.mesh
+            which = mesh.node_name(node) if node < len(mesh.nodes) else "the node between others"
             return f"the displacement in {'xyz'[unknown % self.d]} of {which} at ({where})"
         for name, (shift, turns) in self.motions.items():
             if unknown in shift or unknown in turns:
@@ -501,15 +501,17 @@ def _over_constrained(
     """Error of a displacement that two of supports and constraints determine."""
     unknown, name = int(dependent[row]), found[owner[row]].name
     earlier = owner[np.flatnonzero(dependent == unknown)[0]]
+    alone = bool(unknown not in unknowns.held and earlier == owner[row])
     others = {name, "a support" if unknown in unknowns.held else found[earlier].name}
     if others <= {_HINGE, "a support"}:
         return InputError("Two supports share a node, and one of them is a hinge; separate them.")
     both = " and ".join(sorted(others, reverse=True))
-    if len(others) == 1:
+    if alone:
         both = f"{name}, by itself or in a circle with others,"
-    return InputError(f"{both} determine{'s' * (len(others) == 1)} "
-                      f"{unknowns.describe(unknown)} in different ways; leave the node out of one "
-                      f"of them.")
+    elif len(others) == 1:
+        both = f"{name} and another one of this name"
+    return InputError(f"{both} determine{'s' * alone} {unknowns.describe(unknown)} in different "
+                      f"ways; leave the node out of one of them.")
 
 
 def selects(G: Any) -> bool:

@@ -140,6 +140,8 @@ class Mesh(Summarised):
     temperature : (N,) or (N + E,) array
         Changes of temperature that a file holds [K], for ``temperature="mesh"`` of bodies of this
         mesh: at the nodes, and at the middles of the E edges, by default means; none by default.
+    node_numbers : (N,) integer array
+        Numbers of the nodes in a file of one part, for messages; none by default.
 
     Raises
     ------
@@ -161,6 +163,7 @@ class Mesh(Summarised):
     bricks: Bricks = "full"
     attachments: Sequence[Attachment] = ()
     temperature: Array | None = None
+    node_numbers: Integers | None = None
     _checked: "_Checked" = field(init=False, repr=False, compare=False)
 
     @classmethod
@@ -244,6 +247,12 @@ class Mesh(Summarised):
                 raise MeshError(f"Mesh temperature must be {len(nodes)} finite numbers, one for "
                                 f"each node, not an array of shape {given.shape}.")
             object.__setattr__(self, "temperature", given)
+        if self.node_numbers is not None:
+            numbers = as_integers(self.node_numbers, "Mesh: node_numbers")
+            if numbers.shape != (len(nodes),):
+                raise MeshError(f"Mesh node_numbers must be {len(nodes)} whole numbers, one for "
+                                f"each node, not an array of shape {numbers.shape}.")
+            object.__setattr__(self, "node_numbers", numbers)
         require_kind("Mesh", Mapping, cell_groups=self.cell_groups, materials=self.materials)
         groups = {name: np.unique(as_integers(which, f"The cells of mesh group '{name}'"))
                   for name, which in self.cell_groups.items()}
@@ -381,6 +390,12 @@ class Mesh(Summarised):
                     [one.refined(self.middle_node) for one in self.attachments],
                     None if self.temperature is None else at_second_order(self, self.temperature))
 
+    def node_name(self, node: int) -> str:
+        """A node by its number in its file, or in the mesh, for messages."""
+        if self.node_numbers is None:
+            return f"node {node} of the mesh"
+        return f"node {self.node_numbers[node]} of the file"
+
     def middle_node(self, ends: tuple[int, int]) -> int:
         """Node in the middle of an edge in the refined mesh."""
         pair = np.array([ends])
@@ -434,7 +449,7 @@ class Mesh(Summarised):
                     [one.turned(turn * signs, by) for one in self.constraints], self.cell_groups,
                     {name: one.moved(whole, arm) for name, one in self.materials.items()},
                     self.bricks, [one.turned(turn * signs, by) for one in self.attachments],
-                    self.temperature)
+                    self.temperature, self.node_numbers)
 
     def summary(self) -> list[tuple[str, str]]:
         """Counts, size and named groups."""

@@ -118,3 +118,16 @@ def test_bad_cards(tmp_path, cards, message):
     (tmp_path / "a.bdf").write_text(bulk(cards))
     with pytest.raises((MeshError, fc.InputError), match=message):
         read_mesh(tmp_path / "a.bdf")
+
+
+def test_a_node_of_two_couplings_is_named_by_its_number(tmp_path):
+    """Both couplings are named too; those of Abaqus without names of their own as another one."""
+    twice = (f"RBE2,77,{HUB_AT},123456,{FOLLOW}\nRBE2,78,{FOOT[0]},123,{END[0]}\n",
+             f"{COUPLED}*KINEMATIC\n*SURFACE, TYPE=NODE, NAME=T\n{END[0]}\n"
+             f"*NSET, NSET=FOOT\n{FOOT[0]}\n*COUPLING, REF NODE=FOOT, SURFACE=T\n*KINEMATIC\n")
+    for name, text in zip(("a.bdf", "a.inp"), twice, strict=True):
+        (tmp_path / name).write_text(bulk(text) if name == "a.bdf" else deck(text))
+        with pytest.raises(fc.InputError, match=(
+                r"Coupling .* and (Coupling|another one) .* determine the displacement in x "
+                rf"of node {END[0]} of the file at \(0\.3, ")):
+            frequencies(tmp_path / name)

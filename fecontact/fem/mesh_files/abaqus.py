@@ -822,6 +822,7 @@ class _Instance:
             sets_are_boundaries=True,
             faces={name: blocks for name, blocks in faces.items() if blocks},
             parts={name: cells for name, cells in parts.items() if cells},
+            numbers=mesh.numbers,
         )
 
     def _named(self, of_part: dict[str, _T], of_assembly: dict[str, _T]) -> dict[str, _T]:
@@ -839,7 +840,8 @@ class _NumberedMesh:
         last = _last_of_each(numbers)
         places = np.concatenate([places for _, places in part.node_blocks])
         self.places = places[last]
-        self.nodes = _Index(numbers[last])
+        self.numbers = numbers[last]
+        self.nodes = _Index(self.numbers)
         before = np.flatnonzero(~last)
         elsewhere = (places[before] != self.places[self.nodes(numbers[before])]).any(axis=1)
         self.moved_nodes = np.unique(numbers[before][elsewhere])

@@ -33,6 +33,7 @@ def add_constraints(path: Path, text: str, raw: RawMesh) -> None:
         return
     row = {whole(line, fields[0]): number for number, (line, fields) in enumerate(
         cards(path, "GRID"))}
+    raw.numbers = np.array(list(row), np.int64)
     found = [*_rigid(path, row, raw), *_means(path, row, raw), *_equations(path, row, raw)]
     raw.constraints += found
     raw.apart = raw.apart or bool(found)

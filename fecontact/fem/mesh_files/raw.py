@@ -80,6 +80,8 @@ class RawMesh:
         Kind of the eight-node bricks.
     temperature : (N,) array, optional
         Changes of temperature at the nodes.
+    numbers : (n,) integer array, optional
+        Numbers that the first n points, those of cells among them, have in the file.
     """
 
     points: Array
@@ -99,6 +101,7 @@ class RawMesh:
     materials: dict[str, AnyMaterial] = field(default_factory=dict)
     bricks: Bricks = "full"
     temperature: Array | None = None
+    numbers: Integers | None = None
 
     def part(self, name: str | None) -> "RawMesh":
         """The elements of one part, with the groups of the file; all elements for None.
@@ -230,7 +233,8 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     kept = np.sort(distinct)
     regions = _cell_groups(raw, points, number, cells[kept])
     mesh = Mesh(points[used], cells[kept], {}, {}, ends[once], middles[once],
-                cell_groups=regions, bricks=raw.bricks)
+                cell_groups=regions, bricks=raw.bricks,
+                node_numbers=None if raw.numbers is None else raw.numbers[used])
     if raw.temperature is not None:
         mesh = replace(mesh, temperature=_temperature(raw.temperature, mesh, used, number,
                                                       second_order, orders))
