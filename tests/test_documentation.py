@@ -112,7 +112,7 @@ def check_analysis(names, printed, folder):
     assert len(impacts) == 60
     assert abs(impacts.restitution - 0.945).max() < 1e-3
     assert {path.name for path in folder.iterdir()} == {
-        "spectrum.png", "poincare.png", "receptance.png", "run.csv"}
+        "spectrum.png", "poincare.png", "receptance.png", "run.csv", "history.pdf"}
     # On its spring the mass alone has sqrt(c / m) = 5.22 Hz.
     response = names["response"]
     highest = response.frequency_hz[response.magnitude[:, 0, 0].argmax()]

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 from scripts_for_tests import ROOT, check_numbers, run_script
 
-from fecontact.plot import rendering_problem
-
 # Spring of the drive and elastic mode with the contact held: w^2 of the one motion that is left.
 _w = 2.0 * np.pi * 30.0
 HELD_HZ = np.sqrt((_w**2 + 5610.0 / 5.632 * (0.5 + 0.5) ** 2) / 1.25) / (2.0 * np.pi)
@@ -25,10 +23,10 @@ CASES = {
     "two_bodies": (("out",), [(r"^steel on steel: p_0 = (\S+) GPa", 0.85707, 1e-3),
                               (r"c / b = (\S+) ", 0.70711, 0.01)], {"out/two_bodies.png"}),
     # The closed form of sliding_borders.py at a dashpot of 0.1; the linear response.
-    "sliding_borders": (("out",), [(r"^stick-slip ends at V = (\S+),", 0.5490463, 1e-6),
+    "sliding_borders": ((), [(r"^stick-slip ends at V = (\S+),", 0.5490463, 1e-6),
                                    (r"largest difference (\S+)$", 0.0, 1e-7),
                                    (r"^grazing-sliding at V = (\S+)", 1.191452, 1e-5)],
-                        {"out/sliding_borders.png"}),
+                        set()),
     "stacked_blocks": ((), [(r"^matching meshes: stress to (\S+) of", 0.0, 1e-11),
                             (r"5 segments: stress to (\S+) of", 0.0, 1e-11)], set()),
     "colliding_bars": ((), [(r"^1 m on 1 m: restitution (\S+) ", 0.99793, 2e-3),
@@ -37,27 +35,26 @@ CASES = {
     "clamped_layers": (("out",), [(r"^mu p b h / P = 0.375: (\S+) J", 4.01786, 0.01)],
                        {"out/clamped_layers.png"}),
     # Sextro prints 7.09 and 8.09; the others see the example itself.
-    "disc_and_pads": (("out",), [(r"coefficient of (\S+) on", 0.1988, 2e-4),
+    "disc_and_pads": ((), [(r"coefficient of (\S+) on", 0.1988, 2e-4),
                                  (r"at (\S+) Hz, supercritical", 4688.1, 0.2),
                                  (r"grows by (\S+) 1/s;", 1012.95, 0.5),
                                  (r"; a run by (\S+) 1/s", 1012.95, 1.0),
                                  (r"^limit cycle at (\S+) Hz", 4550.0, 40.0)],
-                      {f"out/{name}.png" for name in ("squeal_of_disc", "contact_of_pad",
-                                                      "disc_and_pad")}),
-    "friction_damper": (("out",), [(r"^free: .* at (\S+) Hz", 92.80, 0.01),
+                      set()),
+    "friction_damper": ((), [(r"^free: .* at (\S+) Hz", 92.80, 0.01),
                                    (r"^stuck: .* at (\S+) Hz", 113.18, 0.02),
-                                   (r"^best load (\S+) N", 5.0, 0.5)], {"out/friction_damper.png"}),
+                                   (r"^best load (\S+) N", 5.0, 0.5)], set()),
     # Frequencies and amplitudes of blades with the best load, and with twice as much.
     "blade_pair": (("out",), [(r"^load   5.24 N: \S+ Hz, (\S+) um", 10.309, 0.02),
                               (r"^load   5.24 N: .* harmonic (\S+) um", 10.472, 1e-3),
                               (r"^load  10.47 N: \S+ Hz, (\S+) um", 13.868, 0.03)],
                    {"out/blade_pair.png"}),
     # Two bolts of 2e8 N/m, shortened by 10 um: at most 4 kN.
-    "lap_joint": (("out",), [(r"^the bolts press with (\S+) N", 3250.0, 2.0),
+    "lap_joint": ((), [(r"^the bolts press with (\S+) N", 3250.0, 2.0),
                              (r"^stuck: (\S+) Hz", 79.206, 0.01),
                              (r"^struck, 0.10 mm: (\S+) Hz", 79.206, 0.01),
                              (r"^struck, 2.01 mm: (\S+) Hz", 78.631, 0.02)],
-                  {"out/lap_joint_loop.png", "out/lap_joint_frequency.png"}),
+                  set()),
     # Shakedown and microslip: the loop and the run, each by itself.
     "bolted_plate": (("out",), [(r"^stuck: (\S+) Hz", 71.2742, 1e-3),
                                 (r"^end 0.976 mm: (\S+) Hz", 71.068, 0.005),
@@ -77,9 +74,9 @@ CASES = {
                                (r"^a run from rest ends (\S+) of", 0.0, 1e-3)],
                     {"out/tipping_pad.png"}),
     # Folds as published for this oscillator.
-    "frequency_response": (("out",), [(r"^  1\.00 +\S+ +(\S+)$", 6.23, 0.03),
+    "frequency_response": ((), [(r"^  1\.00 +\S+ +(\S+)$", 6.23, 0.03),
                                       (r"^  0\.18 .* (\S+)$", 1.115700, 1e-5)],
-                           {"out/friction_damper_response.png", "out/hardening_response.png"}),
+                           set()),
     # A stuck and a sliding damper of 2000 N/m on one mode of the mass m / 4 and 92.806 Hz.
     "nonlinear_modes": (("out",), [(r"^beam: (\S+) Hz sticking", 95.09, 0.1),
                                    (r"sticking, (\S+) Hz sliding", 92.806, 0.03),
@@ -90,18 +87,15 @@ CASES = {
                                    (r"^best load (\S+) N", 0.3927, 0.03),
                                    (r"resonance at (\S+) Hz", 0.2240, 1e-3)],
                         {f"out/{name}.png" for name in (
-                            "damped_beam_mode", "damped_beam_responses", "damper_load",
-                            "internal_resonance")}),
-    "two_mass_friction": (("out",), [(r"Hopf at B = (7\S+)", 7.0865, 1e-4),
+                            "damped_beam_mode", "damped_beam_responses", "internal_resonance")}),
+    "two_mass_friction": ((), [(r"Hopf at B = (7\S+)", 7.0865, 1e-4),
                                      (r"fold at B = (\S+)", 0.890687, 1e-4),
                                      (r"doubling at B = (\S+)", 8.092192, 1e-4)],
-                          {"out/two_masses_over_B.png"}),
+                          set()),
     "friction_oscillator": (("out",), [(r"vibrate at (\S+) Hz", HELD_HZ, 0.006),
                                        (r"^c: three modes .* (\S+) Hz", HELD_HZ, 0.05),
                                        (r"equilibrium: (\S+) N", 14.0, 1e-6)],
-                            {f"out/{name}.png" for name in (
-                                "phase", "irregular", "leaning", "spectrogram", "block-contact",
-                                "block-friction-work")}),
+                            {"out/phase.png", "out/leaning.png"}),
     "impact_oscillator": ((), [(r"\| 2 \| period (\d)", 1.0, 0.0),
                                (r"\| 2 \|.* ([-+][\d.]+) \|$", -6.254, 0.01)], set()),
     "impact_figures": (("out",), [(r"phase.png: (\d+) diagrams", 6.0, 0.0)],
@@ -114,9 +108,8 @@ CASES = {
     "beam_stick_slip": (("out.png",), [(r"stable above (\S+) mm/s", 8.3365, 1e-3),
                                        (r"50.0000 mm/s: (\S+) ms", 55.619, 2e-3),
                                        (r"run at 50 mm/s: (\S+) ms", 55.619, 2e-3)], {"out.png"}),
-    "sliding_beam": (("out",), [(r"off by (\S+)\.$", 0.0, 1e-8), (r"^   10 +(\S+)%", 4.0, 1.0)],
-                     {f"out/{name}" for name in ("energies.png", "contact.png", "history.png",
-                                                 "friction-work.png", "sliding-beam.mp4")}),
+    "sliding_beam": ((), [(r"off by (\S+)\.$", 0.0, 1e-8), (r"^   10 +(\S+)%", 4.0, 1.0)],
+                     set()),
     "sliding_box": (("out",), [(r"^transverse \(1, 1, 1\): (\S+) Hz", 18711.342, 1e-3),
                                (r"^Q2, transverse \(1, 1, 0\): .* h\^(\S+)$", 4.0, 0.05),
                                (r"^Q1, transverse \(1, 1, 0\): .* h\^(\S+)$", 2.0, 0.05),
@@ -147,20 +140,19 @@ CASES = {
                        {"out/pressed_sphere.png", "out/pressed_sphere_displacement.png",
                         "out/pressed_sphere_shear.png"}),
     # A clamped panel whose pull reaches friction; cycles of slip begin at 2^(1/2) times that.
-    "bolted_panel": (("out",), [(r"^400 N: slips at (\S+) mm", 0.821, 0.05),
+    "bolted_panel": ((), [(r"^400 N: slips at (\S+) mm", 0.821, 0.05),
                                 (r"each cycle from (\S+) mm", 1.161, 0.06),
                                 (r"^held: \S+ Hz, (\S+) Hz", 65.1, 0.3)],
-                     {"out/bolted_panel.png"}),
-    "bladed_wheel": (("out",), [(r"^1000.0 N: peak \S+ um at (\S+) Hz", 504.39, 0.02),
+                     set()),
+    "bladed_wheel": ((), [(r"^1000.0 N: peak \S+ um at (\S+) Hz", 504.39, 0.02),
                                 (r"stuck (\S+) Hz", 504.39, 0.01),
                                 (r"^diameter 4 at .* (\S+) Hz backwards", 785.9, 0.5)],
-                     {f"out/{name}.png" for name in ("wheel_diameters", "wheel_modes",
-                                                     "blade_tips")}),
+                     set()),
     # A stuck blade with the springs of both contacts, in closed form.
     "platform_damper": (("out",), [(r"^ 3000.0 N: peak \S+ um at (\S+) Hz", 702.29, 0.03),
                                    (r"^ 3000.0 N: peak (\S+) um", 102.47, 0.1),
                                    (r"stuck: \S+ um at (\S+) Hz", 702.29, 0.02)],
-                        {"out/platform_damper.png", "out/platform_damper.mp4"}),
+                        {"out/platform_damper.png"}),
     # The deck is not part of the package.
     "brake_reuss_beam": ((), [], set()),
 }
@@ -173,8 +165,6 @@ def test_every_case_is_here():
 
 @pytest.mark.parametrize("name", CASES)
 def test_case(name, tmp_path, monkeypatch, capsys):
-    if name in ("sliding_beam", "platform_damper") and (reason := rendering_problem()) is not None:
-        pytest.skip(reason)
     arguments, numbers, files = CASES[name]
     printed, left = run_script(f"docs/validation/cases/{name}.py", arguments, tmp_path, monkeypatch,
                                capsys)

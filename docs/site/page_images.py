@@ -151,7 +151,7 @@ def orbits(folder: Path) -> dict[str, Path]:
 
 def two_masses(folder: Path) -> dict[str, Path]:
     """Branches of two masses on a belt."""
-    case(folder, "two_mass_friction", ".")
+    example(folder, "two_mass_friction")
     return {"two_masses_over_B": folder / "two_masses_over_B.png"}
 
 
@@ -196,7 +196,8 @@ MAKERS: dict[Callable[[Path], dict[str, Path]], tuple[str, ...]] = {
     block: ("block_over_speed",), sweep: ("sweep_map",), stick_slip: ("beam_stick_slip",),
     orbits: ("impact_orbits", "impact_doublings"), two_masses: ("two_masses_over_B",),
     responses: ("friction_damper_response", "hardening_response"),
-    blades: ("blade_pair",), many_runs: ("million_starts", "hundred_thousand_frequencies"),
+    blades: ("blade_pair", "platform_damper"),
+    many_runs: ("million_starts", "hundred_thousand_frequencies"),
     panel: ("bolted_panel",),
     modes: ("damped_beam_mode", "damped_beam_responses", "internal_resonance")}
 

@@ -9,11 +9,10 @@ stick: each mode of a blade feels the springs k_t of both contacts,
 
 and between slip and stick friction takes most. One blade stands for the wheel.
 
-Usage: python bladed_wheel.py [FOLDER] [--quick]
+Usage: python bladed_wheel.py [--quick]
 """
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
@@ -26,7 +25,6 @@ from fecontact.bifurcation import (
 )
 from fecontact.fem import CyclicSymmetry, Rotation
 from fecontact.laws import Harmonic, JenkinsFriction, PrescribedForce
-from fecontact.plot import COLOURS, new_figure, plot_diameters, plot_wheel
 from fecontact.reduction import (
     CyclicBasis,
     PointPairing,
@@ -88,9 +86,8 @@ def stuck_hz(basis: fc.ModalBasis) -> float:
     return float(np.sqrt(np.linalg.eigvalsh(stiffness)[0])) / (2.0 * np.pi)
 
 
-def main(folder: Path = Path(), quick: bool = False) -> None:
-    """Prints frequencies and peaks; pictures in the folder."""
-    folder.mkdir(parents=True, exist_ok=True)
+def main(quick: bool = False) -> None:
+    """Prints frequencies and peaks."""
     symmetry, diameters = CyclicSymmetry("low", "high", N), range(2, N // 2 + 1)
     wheel = sector_modes(sector(), symmetry, 3)
     print("first modes of 2 diameters and more:",
@@ -99,8 +96,6 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
     forward, backward = turning.frequencies_hz(SPEED)
     print(f"diameter {ORDER} at {SPEED:g} rad/s: {forward[ORDER, 0]:.1f} Hz forwards, "
           f"{backward[ORDER, 0]:.1f} Hz backwards")
-    plot_diameters(wheel, speed=SPEED, path=folder / "wheel_diameters.png")
-    plot_wheel(wheel, [(2, 0), (4, 0), (6, 1)], path=folder / "wheel_modes.png")
 
     tips = blades()
     free, stuck = tips.basis.frequencies_hz.min(), stuck_hz(tips.basis)
@@ -110,22 +105,14 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
     name = "load.forces.0.signal.frequency_hz"
     loads = np.array([1.0, 4.0, 1000.0]) if quick else np.array(
         [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 1000.0])
-    with new_figure(7.0, 4.5, folder / "blade_tips.png") as figure:
-        axes = figure.subplots()
-        for load, colour in zip(loads, COLOURS, strict=False):
-            found = frequency_response(
-                system(tips, load, bounds[0]), bounds, name, observe=("blade.tip", "y"),
-                method=method, options=ContinuationOptions(points=1000, largest_step=0.03))
-            peak = found.peak()
-            print(f"{load:6.1f} N: peak {1e6 * found.amplitude().max():.2f} um at "
-                  f"{peak.parameter:.2f} Hz")
-            axes.semilogy(found.branches[0].parameter, 1e6 * found.amplitude(), color=colour,
-                          label=f"{load:g} N")
-        axes.set(xlabel="frequency [Hz]", ylabel="amplitude of a tip [µm]")
-        axes.legend(title="normal load")
+    for load in loads:
+        found = frequency_response(
+            system(tips, load, bounds[0]), bounds, name, observe=("blade.tip", "y"),
+            method=method, options=ContinuationOptions(points=1000, largest_step=0.03))
+        print(f"{load:6.1f} N: peak {1e6 * found.amplitude().max():.2f} um at "
+              f"{found.peak().parameter:.2f} Hz")
     print(f"free {free:.2f} Hz, stuck {stuck:.2f} Hz")
 
 
 if __name__ == "__main__":
-    main(*(Path(given) for given in sys.argv[1:] if given != "--quick"),
-         quick="--quick" in sys.argv)
+    main(quick="--quick" in sys.argv)

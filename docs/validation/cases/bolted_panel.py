@@ -13,15 +13,13 @@ stretches it by 2.439 (a / L)^2, so that slip begins at
 The script takes one half of the strip, whose middle moves along y alone. The washers hold the end
 along y; along x friction acts, of Jenkins elements with the bolt's force. It
 
-1. reduces the strip with forces of large deflections of its first mode;
-2. follows the first mode over its amplitude for several forces of the bolts; and
-3. draws frequency and damping.
+1. reduces the strip with forces of large deflections of its first mode; and
+2. follows the first mode over its amplitude for several forces of the bolts.
 
-Usage: python bolted_panel.py [FOLDER] [--quick]
+Usage: python bolted_panel.py [--quick]
 """
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
@@ -33,7 +31,6 @@ from fecontact.bifurcation import (
     nonlinear_mode,
 )
 from fecontact.laws import JenkinsFriction, PrescribedForce
-from fecontact.plot import COLOURS, new_figure
 from fecontact.reduction import LargeDeflections
 
 LENGTH, THICKNESS, WIDTH, WASHER = 0.3, 1e-3, 0.05, 0.02  # m
@@ -97,22 +94,8 @@ def seen_slip(mode: NonlinearMode, held: NonlinearMode) -> tuple[float, float]:
     return found[0], found[1]
 
 
-def draw(modes: dict[str, NonlinearMode], path: Path) -> None:
-    """Frequency and damping ratio over the amplitude in thicknesses."""
-    with new_figure(9.0, 3.6, path) as figure:
-        frequency, damping = figure.subplots(1, 2)
-        for colour, (name, mode) in zip(COLOURS, modes.items(), strict=False):
-            at = mode.amplitude / THICKNESS
-            frequency.plot(at, mode.frequency_hz, color=colour, label=name)
-            damping.plot(at, 100.0 * mode.damping_ratio, color=colour, label=name)
-        frequency.set(xlabel="amplitude by thickness", ylabel="frequency [Hz]")
-        damping.set(xlabel="amplitude by thickness", ylabel="damping ratio [%]")
-        frequency.legend(title="force of a bolt")
-
-
-def main(folder: Path, quick: bool) -> None:
-    """Prints frequency and damping at one thickness; a picture in the folder."""
-    folder.mkdir(parents=True, exist_ok=True)
+def main(quick: bool) -> None:
+    """Prints frequency and damping at one thickness."""
     basis = panel(10 if quick else 24)
     print(basis.large_deflections[0])
     modes = {}
@@ -130,9 +113,7 @@ def main(folder: Path, quick: bool) -> None:
             print(f"{name}: slips at {1e3 * first:.3f} mm (closed form {1e3 * expected:.3f} mm), "
                   f"in each cycle from {1e3 * loss:.3f} mm; at {1e3 * LARGEST:g} mm {hertz:.2f} Hz "
                   f"and a damping ratio of {100.0 * ratio:.2f} %")
-    draw(modes, folder / "bolted_panel.png")
 
 
 if __name__ == "__main__":
-    given = [word for word in sys.argv[1:] if not word.startswith("--")]
-    main(Path(given[0] if given else "."), quick="--quick" in sys.argv)
+    main(quick="--quick" in sys.argv)

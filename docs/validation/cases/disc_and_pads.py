@@ -5,11 +5,10 @@ and press. Friction has a constant coefficient, so nothing falls with slip veloc
 about steady sliding tell from which coefficient on the disc squeals and at which frequency; a run
 from a small disturbance grows as they say, until the pad lifts off, and keeps a limit cycle.
 
-Usage: python disc_and_pads.py [FOLDER] [--quick]
+Usage: python disc_and_pads.py [--quick]
 """
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
@@ -19,7 +18,6 @@ from fecontact.bifurcation import contact_field, equilibrium_branch
 from fecontact.fem import pair_faces
 from fecontact.integrate import initial_state
 from fecontact.laws import ConstantFriction, RoughSurface, SlidingRotation
-from fecontact.plot import COLOURS, new_figure, picture, plot_contact_map, rendering_problem
 from fecontact.reduction import Spring, reduce_bodies
 
 HUB, RIM, BACK = 0.05, 0.15, 0.18  # radii of hub, rim and back of the pad [m]
@@ -117,35 +115,14 @@ def squeal(system: fc.ContactSystem, end: float) -> tuple[fc.Trajectory, float]:
     return run, amplitude_spectrum(late.time, velocity).peaks(1)[0].frequency_hz
 
 
-def plot_map(system: fc.ContactSystem, frictions: np.ndarray, path: Path) -> None:
-    """Frequencies and damping ratios of the modes below 8 kHz over the friction coefficient."""
-    with new_figure(8.0, 6.0, path) as figure:
-        above, below = figure.subplots(2, 1, sharex=True)
-        for friction in frictions:
-            modes = complex_modes(with_friction(system, friction), "sliding")
-            low = modes.frequencies_hz < 8e3
-            for axes, values in ((above, modes.frequencies_hz[low] / 1e3),
-                                 (below, 100.0 * modes.damping_ratios[low])):
-                for grows, colour in enumerate(COLOURS[:2]):  # growing modes on top
-                    chosen = values[modes.grows[low] == grows]
-                    axes.plot(np.full(len(chosen), friction), chosen, ".", color=colour, ms=5.0,
-                              zorder=2.0 + grows, label="grows" if grows else "decays")
-        entries = dict(zip(*reversed(above.get_legend_handles_labels()), strict=True))
-        figure.legend(entries.values(), entries, loc="outside upper right", ncols=2)
-        above.set(ylabel="frequency [kHz]")
-        below.set(ylabel="damping ratio [%]", xlabel="friction coefficient")
-
-
-def main(folder: Path = Path(), quick: bool = False) -> None:
-    """Prints flutter and limit cycle; pictures in the folder."""
-    folder.mkdir(parents=True, exist_ok=True)
+def main(quick: bool = False) -> None:
+    """Prints flutter and limit cycle."""
     system = brake()
     branch = equilibrium_branch(contact_field(brake(0.0), [FRICTION]), parameter=FRICTION,
                                 bounds=(0.0, 0.6))
     hopf = branch.of_kind("Hopf")[0]
     print(f"flutter from a friction coefficient of {hopf.parameter:.4f} on, "
           f"at {hopf.frequency_hz:.1f} Hz, {hopf.criticality}")
-    plot_map(system, np.linspace(0.0, 0.6, 7 if quick else 61), folder / "squeal_of_disc.png")
 
     modes = complex_modes(system, "sliding")
     mode = flutter_mode(modes)
@@ -157,12 +134,7 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
     opened, stuck, _ = state / state.sum()
     print(f"limit cycle at {cycle:.1f} Hz, nodes open {100.0 * opened:.0f}% and stuck "
           f"{100.0 * stuck:.0f}% of the time")
-    end = run.time[-1]
-    plot_contact_map(run.between(end - 2e-3), path=folder / "contact_of_pad.png")
-    if rendering_problem() is None:
-        picture(run, folder / "disc_and_pad.png")
 
 
 if __name__ == "__main__":
-    main(*(Path(given) for given in sys.argv[1:] if given != "--quick"),
-         quick="--quick" in sys.argv)
+    main(quick="--quick" in sys.argv)

@@ -4,11 +4,10 @@ Left alone, the mass would resonate at 0.159 Hz; while its Jenkins element stick
 between lies a force level at which the element damps best. The spring that hardens bends its
 resonance over: two stable responses at the same frequency, an unstable one between them.
 
-Usage: python frequency_response.py [FOLDER] [--quick]
+Usage: python frequency_response.py [--quick]
 """
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
@@ -50,11 +49,8 @@ def responses(quick: bool) -> tuple[FrequencyResponse, FrequencyResponse]:
 
 
 def main() -> None:
-    """Print the peaks and draw both responses."""
+    """Print the peaks of both responses."""
     quick = "--quick" in sys.argv
-    given = [word for word in sys.argv[1:] if not word.startswith("--")]
-    folder = Path(given[0] if given else ".")
-    folder.mkdir(parents=True, exist_ok=True)
     friction, spring = responses(quick)
     print("friction damper: force, frequency [Hz] and amplitude of the peak over the force")
     for level, force in enumerate(friction.levels):
@@ -65,8 +61,6 @@ def main() -> None:
         folds = ", ".join(f"{point.parameter:.5f}" for point in spring.branches[level].special)
         print(f"{force:6.2f} {spring.peak(level).parameter:7.4f} "
               f"{spring.amplitude(level).max():7.4f}  {folds}")
-    fc.plot.plot_response(friction, path=folder / "friction_damper_response.png")
-    fc.plot.plot_response(spring, path=folder / "hardening_response.png")
 
 
 if __name__ == "__main__":

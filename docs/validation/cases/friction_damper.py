@@ -9,11 +9,10 @@ and its spring k, one harmonic and no other damping give at resonance
 
 with the friction S = mu N: A is least, pi F / k, at S = pi F / 2.
 
-Usage: python friction_damper.py [FOLDER] [--quick]
+Usage: python friction_damper.py [--quick]
 """
 
 import sys
-from pathlib import Path
 
 import numpy as np
 
@@ -22,7 +21,6 @@ from fecontact.analysis import receptance
 from fecontact.fem import pair_faces
 from fecontact.integrate import strobe
 from fecontact.laws import ConstantFriction, Harmonic, LinearContact
-from fecontact.plot import COLOURS, new_figure
 from fecontact.reduction import Spring, reduce_bodies
 
 LENGTH, HEIGHT = 0.3, 0.01
@@ -112,9 +110,8 @@ def best(loads: np.ndarray, amplitude: np.ndarray) -> float:
     return float(loads[k] * np.exp(-0.5 * b / a))
 
 
-def main(folder: Path = Path(), quick: bool = False) -> None:
-    """Prints limits and optimum; a picture in the folder."""
-    folder.mkdir(parents=True, exist_ok=True)
+def main(quick: bool = False) -> None:
+    """Prints limits and optimum."""
     free, stuck = limit(0.0), limit(100.0 * BEST)
     for name, (frequency, amplitude) in (("free", free), ("stuck", stuck)):
         print(f"{name}: resonance at {frequency:.2f} Hz, {1e6 * amplitude:.1f} um")
@@ -128,18 +125,7 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
         print(f"{ratio * BEST:6.3f} N: {frequency:.2f} Hz, {1e6 * amplitude:.1f} um, "
               f"estimate {1e6 * estimate(ratio * BEST, loss):.1f} um")
     print(f"best load {best(ratios * BEST, found[:, 1]):.2f} N, estimate {BEST:.2f} N")
-    loads = BEST * np.geomspace(0.4, 4.0, 200)
-    with new_figure(7.0, 4.5, folder / "friction_damper.png") as figure:
-        axes = figure.subplots()
-        axes.loglog(loads, 1e6 * estimate(loads, loss), color=COLOURS[6], label="one harmonic")
-        axes.loglog(ratios * BEST, 1e6 * found[:, 1], "o", color=COLOURS[0], label="runs")
-        for (_, amplitude), name, colour in ((free, "free", COLOURS[1]),
-                                             (stuck, "stuck", COLOURS[2])):
-            axes.axhline(1e6 * amplitude, color=colour, ls="--", label=name)
-        axes.set(xlabel="normal load [N]", ylabel="amplitude at resonance [µm]")
-        axes.legend(loc="center right")
 
 
 if __name__ == "__main__":
-    main(*(Path(given) for given in sys.argv[1:] if given != "--quick"),
-         quick="--quick" in sys.argv)
+    main(quick="--quick" in sys.argv)

@@ -30,7 +30,6 @@ from fecontact.laws import (
     RandomRoughness,
     RoughSurface,
 )
-from fecontact.plot import plot_contact_map, plot_friction_work, plot_spectrogram
 
 MASS, BELT_SPEED, NORMAL_FORCE = 5.632, 1e-3, 14.0  # kg, m/s, N
 DRIVE_HZ = 13.8 / (2.0 * math.pi)  # 13.8 rad/s in the source
@@ -241,10 +240,7 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
     names = list(runs)
     shown = {name: run.between(run.time[-1] - 20 * PERIOD) for name, run in runs.items()}
     figure({n: shown[n] for n in names[:3]}, folder / "phase.png")
-    figure({n: shown[n] for n in names[4:]}, folder / "irregular.png")
     side_by_side({"vertical": shown[names[2]], "leaning": shown[names[3]]}, folder / "leaning.png")
-    plot_spectrogram(shown[names[1]], piece=1.0, highest_hz=60.0,
-                     path=folder / "spectrogram.png")
 
     block = soft_block()
     print(f"Soft block: {block.basis.contact_nodes} contact nodes, elastic modes from "
@@ -253,8 +249,6 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
     parts = (run.contact_state == fc.ContactState.SLIP).mean(axis=1)
     print(f"Part of the time in which only a part of its face slips: "
           f"{((parts > 0.0) & (parts < 1.0)).mean():.0%}")
-    plot_contact_map(run.between(0.8 * end), path=folder / "block-contact.png")
-    plot_friction_work(run, path=folder / "block-friction-work.png")
 
 
 if __name__ == "__main__":

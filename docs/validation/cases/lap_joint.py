@@ -5,11 +5,10 @@ beam is clamped, the other is pulled at its end. Pulled slowly to and fro the en
 slip first: the loop of force and displacement follows Masing's rules as long as the pressure stays.
 Small vibrations are those with stuck contacts; large ones slip, are softer and die out faster.
 
-Usage: python lap_joint.py [FOLDER] [--quick]
+Usage: python lap_joint.py [--quick]
 """
 
 import sys
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -18,7 +17,6 @@ import fecontact as fc
 from fecontact.fem import pair_faces
 from fecontact.integrate import initial_state
 from fecontact.laws import JenkinsFriction, LinearContact
-from fecontact.plot import COLOURS, new_figure, plot_loop
 from fecontact.reduction import Spring, reduce_bodies
 
 LENGTH, HEIGHT, OVERLAP = 0.2, 0.01, 0.08  # of each beam [m]
@@ -81,9 +79,8 @@ def struck(system: fc.ContactSystem, amplitude: float) -> tuple[float, float]:
     return float(1.0 / crossings[1]), float(0.5 * np.ptp(y))
 
 
-def main(folder: Path = Path(), quick: bool = False) -> None:
-    """Prints loops and frequencies; pictures in the folder."""
-    folder.mkdir(parents=True, exist_ok=True)
+def main(quick: bool = False) -> None:
+    """Prints loops and frequencies."""
     along = joint()
     rest = bolted(along)
     limit = COEFFICIENT * rest.normal_force[-1].sum()
@@ -94,7 +91,6 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
         slipping = (history.contact_state[history.row(1)] == fc.ContactState.SLIP).sum()
         print(f"{force:.0f} N: {slipping} of {along.basis.contact_nodes} nodes slip, "
               f"{1e6 * loop.loss:.3f} uJ in a cycle")
-    plot_loop(history, path=folder / "lap_joint_loop.png")
 
     across = joint(component="y")
     stuck = fc.analysis.prestressed_modes(across, bolted(across)).frequencies_hz[0]
@@ -104,14 +100,7 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
     print(f"stuck: {stuck:.4f} Hz")
     for frequency, amplitude in found:
         print(f"struck, {1e3 * amplitude:.2f} mm: {frequency:.4f} Hz")
-    with new_figure(6.0, 4.0, folder / "lap_joint_frequency.png") as figure:
-        axes = figure.subplots()
-        axes.axhline(stuck, color=COLOURS[6], ls="--", label="stuck contacts")
-        axes.plot(1e3 * found[:, 1], found[:, 0], "o-", color=COLOURS[0], label="runs")
-        axes.set(xlabel="amplitude of the end [mm]", ylabel="frequency [Hz]")
-        axes.legend()
 
 
 if __name__ == "__main__":
-    main(*(Path(given) for given in sys.argv[1:] if given != "--quick"),
-         quick="--quick" in sys.argv)
+    main(quick="--quick" in sys.argv)

@@ -132,7 +132,6 @@ def main() -> None:
         condition="phase", method=method, options=ContinuationOptions(points=80))
     print(f"best load {curve.optimum().parameter:.4f} N, classical estimate "
           f"{0.5 * np.pi * FORCES[1] / COEFFICIENT:.4f} N")
-    fc.plot.plot_resonance_curve(curve, path=folder / "damper_load.png")
     masses = nonlinear_mode(two_masses(), (1e-2, 200.0), observe=("b.p", "y"),
                             method=HarmonicBalance(15 if quick else 25))
     third = np.abs(masses.coordinates(3)[:, 0] / masses.coordinates(1)[:, 0])

@@ -27,14 +27,12 @@ from fecontact.bifurcation import (
     ContinuationOptions,
     EngineOrder,
     HarmonicBalance,
-    contact_field,
     frequency_response,
-    wheel_motion,
     wheel_system,
 )
 from fecontact.fem import CyclicSymmetry, pair_faces
 from fecontact.laws import Harmonic, JenkinsFriction, LinearContact
-from fecontact.plot import COLOURS, new_figure, render_wheel
+from fecontact.plot import COLOURS, new_figure
 from fecontact.reduction import CyclicBasis, WholeWheel, cyclic_basis
 
 N, ORDER = 12, 3  # sectors, engine order
@@ -187,7 +185,7 @@ def _shares(basis: CyclicBasis) -> np.ndarray:
 
 
 def main(folder: Path = Path(), quick: bool = False) -> None:
-    """Prints peaks over the load; a picture and a movie of the wheel in the folder."""
+    """Prints peaks over the load; a picture in the folder."""
     folder.mkdir(parents=True, exist_ok=True)
     basis = wheel()
     (free, without), (stuck, sticking) = (linear(basis, stuck=one) for one in (False, True))
@@ -217,9 +215,6 @@ def main(folder: Path = Path(), quick: bool = False) -> None:
             right.axhline(1e6 * amplitude, color=COLOURS[5], linewidth=0.8, linestyle=":")
             right.annotate(name, (loads[0], 1e6 * amplitude), va="bottom")
         right.set(xlabel="load of a damper [N]", ylabel="largest amplitude of a tip [µm]")
-    field = wave.field(contact_field(system(basis, loads[-1], bounds[0]), [NAME]))
-    render_wheel(wheel_motion(field, found.peak()), folder / "platform_damper.mp4",
-                 frames=8 if quick else 50)
 
 
 if __name__ == "__main__":

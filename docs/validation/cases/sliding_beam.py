@@ -5,11 +5,10 @@ Contact nodes stand for equal lengths of the face, so that errors fall with the 
 number. Modes carry the bending that the waves force upon the beam; residual vectors add what the
 contact presses into it locally.
 
-Usage: python sliding_beam.py [FOLDER] [--quick]   (half a minute; prints, draws, films)
+Usage: python sliding_beam.py [--quick]   (half a minute)
 """
 
 import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,12 +16,6 @@ from numpy.typing import NDArray
 
 import fecontact as fc
 from fecontact.laws import ArchardWear, ExponentialFriction, RoughSurface
-from fecontact.plot import (
-    plot_contact_map,
-    plot_energies,
-    plot_friction_work,
-    plot_history,
-)
 
 Array = NDArray[np.float64]
 
@@ -79,9 +72,8 @@ def error(one: fc.Trajectory, reference: fc.Trajectory) -> tuple[float, float]:
     return float(off.max()), float(np.abs(wear(one) - expected).mean() / expected.mean())
 
 
-def main(folder: Path = Path("sliding-beam"), quick: bool = False) -> None:
-    """Print the convergence, draw energies, contact and wear, and film the beam."""
-    folder.mkdir(parents=True, exist_ok=True)
+def main(quick: bool = False) -> None:
+    """Print the convergence, energies and wear."""
     beam = body(5e-3 if quick else 2.5e-3)
     finest = run(system(beam, 20 if quick else 160))
     print("nodes   error of motion   of wear along the face")
@@ -109,14 +101,7 @@ def main(folder: Path = Path("sliding-beam"), quick: bool = False) -> None:
     # Steel on steel in mild wear.
     depth = complete.wear_depth(ArchardWear(1e-14), THICKNESS)[-1]
     print(f"In mild wear this takes off {1e9 * depth.min():.3f} to {1e9 * depth.max():.3f} nm.")
-    plot_energies(complete, path=folder / "energies.png")
-    plot_contact_map(complete, path=folder / "contact.png")
-    plot_friction_work(complete, path=folder / "friction-work.png")
-    plot_history(complete, ("B", "C", "end"), path=folder / "history.png")
-    fc.render(complete, folder / "sliding-beam.mp4", frames=2 if quick else 90, colour="von_mises",
-              title="Steel beam sliding over waves")
 
 
 if __name__ == "__main__":
-    main(*(Path(given) for given in sys.argv[1:] if given != "--quick"),
-         quick="--quick" in sys.argv)
+    main(quick="--quick" in sys.argv)

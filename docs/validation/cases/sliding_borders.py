@@ -10,11 +10,10 @@ as the belt becomes faster: from slip to both sides without stick, by crossing-s
 switching-sliding to slip to one side, by grazing-sliding to slip that never ends. There the
 greatest speed of the linear response is that of the belt.
 
-Usage: python sliding_borders.py [OUTPUT_FOLDER] [--quick]
+Usage: python sliding_borders.py [--quick]
 """
 
 import sys
-from pathlib import Path
 
 import numpy as np
 from scipy.linalg import expm
@@ -96,40 +95,8 @@ def driven(quick: bool) -> tuple[ContactField, Branch]:
                                bounds=(0.7 if quick else 0.1, 1.4), both=True)
 
 
-def figure(branch: Branch, curve: Branch, field: ContactField, forced: Branch, path: Path) -> None:
-    """Draw the border with its closed form, and phase planes on both sides of three borders."""
-    from fecontact.plot import COLOURS, new_figure
-
-    with new_figure(9.6, 4.2, path) as drawn:
-        border, plane = drawn.subplots(1, 2)
-        dashpots = curve.column("dashpot")
-        border.plot(dashpots, curve.parameter, color=COLOURS[0], label="end of stick-slip")
-        some = np.linspace(dashpots.min(), dashpots.max(), 9)
-        border.plot(some, [closed_form(c) for c in some], "o", color=COLOURS[1],
-                    label="closed form")
-        border.plot(DASHPOT, branch.points[-1].parameter, "kd", label="found on a branch")
-        border.set(xlabel="dashpot c / √(k m)", ylabel="speed V of the belt / (F$_N$/√(k m))")
-        border.legend()
-        regular = [point for point in forced.points if point.kind is None]
-        borders = [point.parameter for point in forced.special]
-        edges = [forced.parameter.min(), *borders, forced.parameter.max()]
-        names = ["slip to both sides", "with stick", "stick, slip to one side", "slip alone"]
-        for low, high, name, colour in zip(edges[:-1], edges[1:], names, COLOURS, strict=False):
-            inside = [point for point in regular if low < point.parameter < high]
-            if not inside:
-                continue
-            point = min(inside, key=lambda one: abs(one.parameter - 0.5 * (low + high)))
-            states = point.orbit(field, 2000).states
-            plane.plot(states[:, 0], states[:, 1], color=colour,
-                       label=f"V = {point.parameter:.2f}: {name}")
-            plane.axhline(point.parameter, color=colour, linewidth=0.8, linestyle=":")
-        plane.set(xlabel="displacement / (F$_N$/k)",
-                  ylabel="velocity (dotted: V) / (F$_N$/√(k m))")
-        plane.legend(fontsize="small", loc="center", bbox_to_anchor=(0.48, 0.45))
-
-
-def main(folder: Path = Path("."), quick: bool = False) -> None:
-    """Print the borders beside their closed forms; draw them."""
+def main(quick: bool = False) -> None:
+    """Print the borders beside their closed forms."""
     branch, curve = end_of_stick_slip(quick)
     end = branch.points[-1]
     print(f"stick-slip ends at V = {end.parameter:.7f}, by {end.kind} "
@@ -138,15 +105,12 @@ def main(folder: Path = Path("."), quick: bool = False) -> None:
                    for point in curve.points]
     print(f"over speed and dashpot: {len(differences)} points, largest difference "
           f"{max(differences):.1e}")
-    field, forced = driven(quick)
+    _, forced = driven(quick)
     for point in forced.special:
         print(f"{point.kind} at V = {point.parameter:.6f}")
     response = 1.5 / abs(1.0 - 1.5**2 + 1.5j * DASHPOT)
     print(f"greatest speed of the linear response: {response:.6f}")
-    folder.mkdir(parents=True, exist_ok=True)
-    figure(branch, curve, field, forced, folder / "sliding_borders.png")
 
 
 if __name__ == "__main__":
-    given = [value for value in sys.argv[1:] if value != "--quick"]
-    main(Path(given[0]) if given else Path("."), "--quick" in sys.argv)
+    main(quick="--quick" in sys.argv)

@@ -5,7 +5,7 @@ sliding loses its stability at Hopf points, the vibrations that begin there turn
 double their period again and again. Unstable orbits are part of the picture: the one between the
 fold T1 and the Hopf point H1 parts the starts that come to rest from those that go on vibrating.
 
-Usage: python two_mass_friction.py [FOLDER] [--quick]   (pictures, a table; two minutes)
+Usage: python two_mass_friction.py [--quick]   (a table; two minutes)
 
 Time is scaled by sqrt(m2 / c2), B = F_N / c2 and D = d2 / (2 sqrt(c2 m2)). The equations are those
 of the book with the constants that reproduce its figures: masses 2.5 and 1, stiffnesses 2 and 1,
@@ -36,7 +36,7 @@ from fecontact.bifurcation import (
 )
 from fecontact.integrate import Crossing
 from fecontact.laws import PrescribedForce, ProductFriction
-from fecontact.plot import COLOURS, new_figure, plot_basins, plot_branches
+from fecontact.plot import COLOURS, new_figure
 from fecontact.reduction import point_masses
 
 if TYPE_CHECKING:
@@ -219,36 +219,21 @@ def shares(found: Basins) -> str:
                      for one in found.attractors)
 
 
-def quick_diagram(folder: Path) -> None:
+def quick_diagram() -> None:
     """The first branch over B, and its special points."""
-    folder.mkdir(parents=True, exist_ok=True)
     field, bounds = oscillator(B=0.3), (0.3, 10.0)
     sliding = equilibrium_branch(field, parameter="B", bounds=bounds)
     orbits = orbit_branch(field, sliding.of_kind("Hopf")[0], bounds=bounds,
                           options=ContinuationOptions(step=0.01, largest_step=0.1), scales=SMALL)
-    plot_branches([sliding, orbits], amplitude(field.displacement_row(1)), x_label="B [m]",
-                  y_label="amplitude of x3 [m]", names=["steady sliding", "orbits"],
-                  path=folder / "two_masses_over_B.png")
     for point in (*sliding.special, *orbits.special):
         print(f"{point.kind} at B = {point.parameter:.4f}")
 
 
-def main(folder: Path = Path()) -> None:
-    """Compute, draw and print everything."""
-    folder.mkdir(parents=True, exist_ok=True)
-    x3 = amplitude(oscillator().displacement_row(1))
+def main() -> None:
+    """Compute and print everything."""
     over_B, over_speed = diagram_over_B(), diagram_over_speed()
-    diagrams = {"over_B": (over_B, "B [m]"), "over_v0": (over_speed, "v0 [m/s]"),
-                "over_D_B10": (diagram_over_damping(10.0), "D (B = 10 m)"),
-                "over_D_B20": (diagram_over_damping(20.0), "D (B = 20 m)")}
-    for name, (branches, label) in diagrams.items():
-        plot_branches(list(branches.values()), x3, x_label=label, y_label="amplitude of x3 [m]",
-                      names=list(branches), path=folder / f"two_masses_{name}.png")
     motions = attractors(3.8, over_speed)
-    phase_figure(motions, 3.8, folder / "two_masses_attractors.png")
-    found, rows = basins_of_attraction(3.8)
-    plot_basins(found, x_label="x3 at the start [m]", y_label="x3' at the start [m/s]", rows=rows,
-                path=folder / "two_masses_basins.png")
+    found, _ = basins_of_attraction(3.8)
     print(f"{'':48} printed  computed")
     for what, printed, value in table(over_B, over_speed):
         print(f"{what:48} {printed:>7}  {value:.4f}")
@@ -257,5 +242,4 @@ def main(folder: Path = Path()) -> None:
 
 
 if __name__ == "__main__":
-    chosen = quick_diagram if "--quick" in sys.argv else main
-    chosen(Path(next((given for given in sys.argv[1:] if given != "--quick"), ".")))
+    (quick_diagram if "--quick" in sys.argv else main)()
