@@ -40,7 +40,7 @@ def usual_point(basis: ModalBasis) -> str | int:
     """Default point: B; the middle contact node if no mode moves B, and C without contact."""
     if basis.T[0].any():
         return "B"
-    return basis.interface_nodes // 2 if basis.interface_nodes else "C"
+    return basis.contact_nodes // 2 if basis.contact_nodes else "C"
 
 
 def duration(trajectory: Trajectory) -> float:
@@ -142,9 +142,9 @@ def peak_friction_force(trajectory: Trajectory, face: str | None = None) -> floa
 
 
 def _nodes(trajectory: Trajectory, face: str | None) -> slice:
-    """Contact nodes of an interface by its name; by default all but those of large deflections."""
+    """Contact nodes of an interface by its name; by default all of them."""
     if face is None:
-        return slice(trajectory.system.basis.interface_nodes)
+        return slice(None)
     faces = {one.name: one.nodes for one in contact_faces(trajectory.system.basis) if one.name}
     if face not in faces:
         raise InputError(f"There is no interface '{face}'; " + (

@@ -16,7 +16,15 @@ from fecontact.core.constants import constants
 from fecontact.core.records import Size, shapes
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state
 from fecontact.integrate.rodas5p.blocks import Blocks, one_block
-from fecontact.system.nodes import AXES, MEMORY, MODES, NODES, SystemArrays
+from fecontact.system.nodes import (
+    AXES,
+    COMBINATIONS,
+    MEMORY,
+    MODES,
+    NODES,
+    PRODUCTS,
+    SystemArrays,
+)
 
 # Modes and nodes.
 SIZES = tuple((modes, nodes) for modes in (1, 2, 3, 4) for nodes in (1, 2))
@@ -27,8 +35,12 @@ Values = dict[Any, dict[str, Any]]
 
 
 def sizes_of(modes: int, nodes: int) -> dict[Size, int]:
-    """Sizes of the records of small systems: plane ones without internal variables."""
-    return {MODES: modes, NODES: nodes, AXES: 2, MEMORY: 0, dynamics.FRICTION_ENTRIES: 3}
+    """Sizes of the records of small systems: plane ones without internal variables.
+
+    They have no polynomial forces.
+    """
+    return {MODES: modes, NODES: nodes, AXES: 2, MEMORY: 0, dynamics.FRICTION_ENTRIES: 3,
+            COMBINATIONS: 0, PRODUCTS: 0}
 
 
 def _same_values(modes: int, nodes: int) -> Values:
@@ -60,6 +72,8 @@ def not_small(system: SystemArrays) -> str | None:
         return f"{m} modes and {n} nodes are not among them"
     if system.memory.any():
         return "there is friction with memory"
+    if len(system.polynomial_pairs):
+        return "there are large deflections"
     return "two motions are prescribed" if system.second_motion != 0 else None
 
 

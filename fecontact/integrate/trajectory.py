@@ -17,6 +17,7 @@ from fecontact.integrate.events import Events
 from fecontact.integrate.kept_steps import KeptSteps
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.loads import load_rows
+from fecontact.system.polynomial_forces import polynomial_energy
 from fecontact.system.powers import POWERS
 
 
@@ -332,7 +333,8 @@ class Trajectory(ContactWorks, Summarised):
         put = dict(zip(POWERS, self.work.T, strict=True))
         return Energies(
             kinetic=0.5 * (rate**2).sum(axis=1),
-            elastic=0.5 * ((q @ basis.stiffness_matrix) * q).sum(axis=1),
+            elastic=(0.5 * ((q @ basis.stiffness_matrix) * q).sum(axis=1)
+                     + polynomial_energy(q, system.arrays)),
             drive_spring=spring,
             contact=system.stored_energy(self.penetration),
             bristles=bristles,

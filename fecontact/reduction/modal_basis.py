@@ -98,8 +98,7 @@ class ModalBasis(Summarised):
     first_passes : tuple of (str, int)
         Interfaces of two passes, and how many of the nodes belong to the first one.
     large_deflections : tuple of LargeDeflectionForces
-        Forces of large deflections, of each body that has them; their springs are the last groups
-        of contact nodes, and systems add their laws.
+        Forces of large deflections, of each body that has them.
 
     Raises
     ------
@@ -151,8 +150,6 @@ class ModalBasis(Summarised):
         diagonal = (self.damping == np.diag(np.diag(self.damping))).all()
         full = "full matrix" + _skew(self.damping, ", in part gyroscopic")
         groups = [f"{count} {name}" for name, count in self.groups if name not in self.springs]
-        own = [one.group for one in self.large_deflections]
-        springs = [name for name in self.springs if name not in own]
         return [
             ("modes", f"{self.modes}, {self.rigid_modes} rigid"),
             ("frequencies", f"{', '.join(middle)} Hz" if hertz else "none"),
@@ -167,7 +164,7 @@ class ModalBasis(Summarised):
                 for part in self.parts]))] if self.parts else []),
             ("contact nodes", f"{np.count_nonzero(~self.spring_nodes)}"
              + (f" ({listed(groups)})" if len(groups) > 1 or (groups and self.parts) else "")),
-            *([("nonlinear springs", listed(springs))] if springs else []),
+            *([("nonlinear springs", listed(self.springs))] if self.springs else []),
             *(line for one in self.large_deflections for line in one.summary()),
             ("points", listed(["B", "C", *self.extra])),
             ("shapes over the body", "none" if self.mode_shapes is None
@@ -245,16 +242,6 @@ class ModalBasis(Summarised):
         found = np.array(np.abs(self.T).any(axis=(1, 2)))
         found[2 : 2 + self.contact_nodes] &= ~self.spring_nodes
         return found
-
-    @property
-    def interface_groups(self) -> tuple[tuple[str, int], ...]:
-        """Names and sizes of the groups whose laws a system gives: all but large deflections."""
-        return self.groups[: len(self.groups) - len(self.large_deflections)]
-
-    @property
-    def interface_nodes(self) -> int:
-        """Number of contact nodes without the springs of large deflections, which follow them."""
-        return sum(count for _, count in self.interface_groups)
 
     @property
     def stiffness_matrix(self) -> Array:
@@ -457,7 +444,8 @@ class ModalBasis(Summarised):
                              f"{self.modes - 1}, at least one.")
         given, quality, turning = self.mode_shapes, self.quality, self.rotation
         dropped = np.setdiff1d(np.arange(self.modes), chosen)
-        if self.large_deflections and self.contact_T[self.spring_nodes][..., dropped].any():
+        if any(one.coordinates[:, dropped].any() or one.cubic[:, dropped].any()
+               for one in self.large_deflections):
             raise InputError("select would leave out coordinates on which forces of large "
                              "deflections act; make the basis with fewer modes instead.")
         below = np.searchsorted(chosen, np.arange(self.modes + 1))
@@ -478,7 +466,7 @@ class ModalBasis(Summarised):
                     given.nonlinear_stress,
                     coordinates=given.nonlinear_stress.coordinates[:, chosen])),
             constant_load=None if self.constant_load is None else self.constant_load[chosen],
-            large_deflections=tuple(replace(one, coordinates=one.coordinates[:, chosen])
+            large_deflections=tuple(one.in_modes(np.eye(self.modes)[:, chosen])
                                     for one in self.large_deflections),
             parts=tuple(replace(part, modes=(int(below[first]), int(below[end] - below[first])))
                         for part in self.parts

@@ -45,8 +45,8 @@ from fecontact.reduction.eigenmodes import (
     frequencies_of,
 )
 from fecontact.reduction.large_deflections.fit import condensed_body
-from fecontact.reduction.large_deflections.nodes import with_large_deflections
 from fecontact.reduction.large_deflections.options import LargeDeflections
+from fecontact.reduction.large_deflections.with_forces import with_large_deflections
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes, NonlinearStress, ReductionQuality
 from fecontact.reduction.prestress import (
@@ -190,7 +190,8 @@ def modal_basis(
     forces = np.stack([inertia_forces(body), *(boundary_forces(body, name) for name in names)])
     rows = np.asarray(forces.transpose(0, 2, 1) @ shapes)
     elements = body_elements(body)
-    turning = None if rotation is None else modal_rotation(body, system, rotation, shapes)
+    turning = None if rotation is None else modal_rotation(
+        body, system, rotation, shapes, () if condensed is None else condensed.modes)
     springs, _, dashpots = body.springs
     rates = springs @ shapes
     basis = ModalBasis(
@@ -229,7 +230,7 @@ def modal_basis(
     if condensed is not None:
         assert large_deflections is not None
         projected = np.einsum("fk,fij->kij", system.mass @ free_shapes, condensed.fields)
-        return with_large_deflections(basis, condensed, projected, large_deflections, own)
+        basis = with_large_deflections(basis, condensed, projected, large_deflections, own)
     return basis if turning is None else basis.with_rotation_speed(turning.speed)
 
 
@@ -250,10 +251,9 @@ def _check_large_deflections(
     if reduction == "craig-bampton":
         raise InputError("large_deflections are those of vibration modes; choose reduction = "
                          "'vibration' or 'residual'.")
-    if rotation is not None:
-        raise InputError("large_deflections and rotation do not go together, as Coriolis and "
-                         "centrifugal forces would need the quadratic displacement too; leave one "
-                         "of them out, or give the stress of the rotation as prestress.")
+    if rotation is not None and rotation.frame == "standing":
+        raise InputError("large_deflections go with a rotation in the rotating frame only; choose "
+                         "frame = 'rotating', or leave one of them out.")
     if temperature is not None:
         raise InputError("large_deflections and temperature do not go together; leave one of them "
                          "out, or give the static solution with the temperature as prestress.")

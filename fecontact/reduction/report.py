@@ -90,7 +90,7 @@ class BasisReport:
     @property
     def contact_error(self) -> Array:
         """:attr:`compliance_error` (n, d) of the contact nodes."""
-        return self.compliance_error[2 : 2 + self.basis.interface_nodes]
+        return self.compliance_error[2 : 2 + self.basis.contact_nodes]
 
     @property
     def orthogonality(self) -> float:

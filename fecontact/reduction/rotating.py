@@ -1,12 +1,13 @@
 """Rotation of a body in its modes: Coriolis, centrifugal and stress terms of the reduced body."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fecontact.core.errors import InputError
 from fecontact.core.read_only import read_only_arrays
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.rotation import (
     Rotation,
@@ -67,12 +68,14 @@ class ModalRotation:
 
 
 def modal_rotation(
-    body: ElasticBody, system: FreeSystem, rotation: Rotation, shapes: Array
+    body: ElasticBody, system: FreeSystem, rotation: Rotation, shapes: Array,
+    deflected: Sequence[int] | Integers = (),
 ) -> ModalRotation:
     """The terms of a rotation in mass-normalised shapes (d N, m) of the body at rest.
 
     The stress is that of the linear static response to the centrifugal force; where supports do
-    not balance it, the inertia of the rigid motion does.
+    not balance it, the inertia of the rigid motion does. ``deflected`` are modes with forces of
+    large deflections, by which the load stiffens them: their stretching is a coordinate.
 
     Raises
     ------
@@ -95,7 +98,9 @@ def modal_rotation(
         softening = shapes.T @ (softening_matrix(body, rotation) @ shapes)
         stiffening -= 0.5 * (softening + softening.T)
     if rotation.stress_stiffening:
-        stiffening += _stress_stiffening(body, system, force, shapes)
+        stressed = _stress_stiffening(body, system, force, shapes)
+        stressed[np.ix_(deflected, deflected)] = 0.0
+        stiffening += stressed
     return ModalRotation(rotation.speed, coriolis, stiffening, load, rotation.axis,
                          (*rotation.centre, 0.0)[:3], rotation.stress_stiffening,
                          rotation.frame == "standing")

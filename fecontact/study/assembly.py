@@ -80,7 +80,7 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
     require_dimension(study, basis, title)
     springs = {name: one for name, one in study.links.items()
                if isinstance(one, NonlinearSpring)}
-    groups = {name: count for name, count in basis.interface_groups if name not in springs}
+    groups = {name: count for name, count in basis.groups if name not in springs}
     if not groups and not springs:
         for section in LAWS:
             if getattr(study, section) is not None:
@@ -114,7 +114,7 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
         gap = _gaps(study, reduced, title)
     else:
         with located(f"{title}: [gap]:" if isinstance(study.gap, Crown) else f"{title}:", "Crown"):
-            gap = gap_values(study.gap, basis.contact_places[: basis.interface_nodes])
+            gap = gap_values(study.gap, basis.contact_places)
     parts: dict[str, Any] = {part: getattr(study, part) for part in PART_CLASSES}
     parts |= {part: usual.get(part) for part in LAWS}
     for part in LAWS:
@@ -146,7 +146,7 @@ def _gaps(study: Described, reduced: Reduced, title: str) -> Any:
         raise InputError(f"{title}: gap = {shown(plain(study.gap))} is for a single body; give it "
                          f"in [interfaces.NAME].")
     gaps, first = np.array(reduced.gaps), 0
-    for name, count in reduced.basis.interface_groups:
+    for name, count in reduced.basis.groups:
         nodes = slice(first, first + count)
         first += count
         if name in reduced.basis.springs:

@@ -122,7 +122,7 @@ def read_reduced(path: Path) -> Reduced:
     """Read what :func:`write_reduced` wrote; InputError for a damaged file."""
     with open_file(path, "basis") as file:
         basis = stored_basis(member(file, "basis"))
-        return Reduced(basis, array(file, "gaps", (basis.interface_nodes,))
+        return Reduced(basis, array(file, "gaps", (basis.contact_nodes,))
                        if "gaps" in file else None)
 
 

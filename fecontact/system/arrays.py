@@ -65,6 +65,7 @@ def system_arrays(
         wave_direction=np.array(ground.wave_direction) if d == 3 else np.zeros(0),
         sides=np.zeros((0, SIDES)),
         bristle_stiffness=_bristles(friction_groups, n, d - 1),
+        **_polynomial_arrays(basis),
         normal_parameters=normal_parameters,
         friction_parameters=friction_parameters,
         profile_parameters=ground.profile_parameters(),
@@ -85,6 +86,21 @@ def system_arrays(
         follows_surface=int(ground.normal == "surface"),
         space_node=0,
     ))
+
+
+def _polynomial_arrays(basis: ModalBasis) -> dict[str, Any]:
+    """Entries of :class:`SystemArrays` of large deflections, those of one body after the other."""
+    from scipy.linalg import block_diag
+
+    given, m = basis.large_deflections, basis.modes
+    first = np.cumsum([0, *(len(one.coordinates) for one in given)])
+    return {
+        "polynomial_rows": np.concatenate([np.zeros((0, m)), *(one.coordinates for one in given)]),
+        "polynomial_pairs": np.concatenate([np.zeros((0, 2), dtype=np.int64), *(
+            one.pairs + start for one, start in zip(given, first, strict=False))]),
+        "polynomial_cubic": np.concatenate([np.zeros((0, m)), *(one.cubic for one in given)]),
+        "polynomial_quartic": block_diag(*(one.quartic for one in given)) if given else (
+            np.zeros((0, 0)))}
 
 
 def drive_arrays(basis: ModalBasis, drive: Drive) -> dict[str, Any]:

@@ -155,7 +155,7 @@ class ContactSystem(Summarised):
 
     def _check(self) -> None:
         """Check all parts and bring them into their stored form."""
-        if isinstance(self.basis, ModalBasis) and not self.basis.interface_nodes:
+        if isinstance(self.basis, ModalBasis) and not self.basis.contact_nodes:
             self._without_contact()
         for name, laws in zip(NO_LAWS, separated(self.normal, self.friction, "ContactSystem"),
                               strict=True):
@@ -176,7 +176,7 @@ class ContactSystem(Summarised):
                 if not isinstance(one, law):
                     raise InputError(f"ContactSystem: {name} = {one!r} must be a {law.__name__}.")
         object.__setattr__(self, "gap", gap_values(
-            self.gap, self.basis.contact_places[: self.basis.interface_nodes]))
+            self.gap, self.basis.contact_places))
         object.__setattr__(self, "sliding", checked_sliding(self.basis, self.ground, self.sliding))
         _ = self.prescribed_motion
         for part in (self.law_groups("normal"), self.law_groups("friction")):
@@ -224,7 +224,7 @@ class ContactSystem(Summarised):
         return excited(self.arrays, self.basis, self.drive, parts)
 
     def _require_groups(self, name: str, given: Mapping[str, Any]) -> None:
-        names = [group for group, _ in self.basis.interface_groups]
+        names = [group for group, _ in self.basis.groups]
         for group in given:
             if group not in names:
                 raise InputError(f"ContactSystem: {name} has a law for the interface "
@@ -265,12 +265,8 @@ class ContactSystem(Summarised):
         for the law of an interface.
         """
         given, basis = getattr(self, kind), self.basis
-        groups = [(count, given[name]) for name, count in basis.interface_groups] if isinstance(
-            given, Mapping) else [(basis.interface_nodes, given)]
-        # Springs of large deflections follow all interfaces.
-        counts = dict(basis.groups)
-        groups += [(counts[one.group], one.law if kind == "normal" else NO_LAWS["friction"])
-                   for one in basis.large_deflections]
+        groups = [(count, given[name]) for name, count in basis.groups] if isinstance(
+            given, Mapping) else [(basis.contact_nodes, given)]
         return groups_of_laws(
             [one for one in groups if one[0] or len(groups) == 1], basis.tributary)
 
@@ -371,14 +367,7 @@ class ContactSystem(Summarised):
         """
         return system_arrays(
             self.basis, self.law_groups("normal"), self.law_groups("friction"), self.ground,
-            self.drive, self.load, self._gaps, self.prescribed_motion)
-
-    @property
-    def _gaps(self) -> Array:
-        """Gap (n,) of each contact node; zero at springs of large deflections."""
-        found = np.zeros(self.basis.contact_nodes)
-        found[: self.basis.interface_nodes] = np.asarray(self.gap, dtype=float)
-        return found
+            self.drive, self.load, np.asarray(self.gap, dtype=float), self.prescribed_motion)
 
     def rhs(self, t: float, y: Array) -> Array:
         """Rate y' (2 m + n s,) of the state y = [q, q', z].

@@ -124,7 +124,7 @@ def system_fields(
     friction: dict[str, FrictionLaw] = {}
     gaps: list[Array] = []
     first = 0
-    for name, count in basis.interface_groups:
+    for name, count in basis.groups:
         nodes = slice(first, first + count)
         first += count
         if name in springs:

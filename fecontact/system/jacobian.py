@@ -5,9 +5,9 @@ import numpy as np
 from fecontact.core.compiled import borrowing, helper, kernel, routine
 from fecontact.core.records import Block, Matrix, Vector
 from fecontact.system.kernels import (
-    body_rates,
     friction_across,
     given_at,
+    linear_rates,
     node_gradients,
     rates_under,
 )
@@ -28,6 +28,12 @@ from fecontact.system.parameter_derivatives import (
     moves,
     node_rates,
     set_shifts,
+)
+from fecontact.system.polynomial_forces import (
+    add_polynomial,
+    add_polynomial_stiffness,
+    has_polynomial,
+    set_polynomial_gradient,
 )
 
 
@@ -119,6 +125,10 @@ def jacobian(t: float, y: Vector, s: SystemArrays, out: Matrix) -> None:
     out[:] = 0.0
     count = _contact_gradients(t, y, s, gradients, active, out)
     _body_jacobian(s, out)
+    if has_polynomial(s):
+        gradient = np.empty_like(s.polynomial_rows)
+        set_polynomial_gradient(y, s, gradient)
+        add_polynomial_stiffness(-1.0, gradient, s, out[m:])
     if count:
         out[m : 2 * m, : 2 * m] += np.dot(active[:count].reshape((count * d, m)).T,
                                           gradients[:count].reshape((count * d, 2 * m)))
@@ -166,7 +176,7 @@ def _add_contact(j, pushes, s, partial, gradient, rate, out):
 def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
     # Counting references to what is made for it costs as much as the laws.
     load, load_p, force, room, memory, shifts, pushes, pushes_p = vectors
-    rates, room_rates, partial, gradient = matrices
+    rates, room_rates, partial, gradient, stiffening = matrices
     n, d, m = s.rows.shape
     states = len(rates)
     differs = len(P) > 0
@@ -180,12 +190,15 @@ def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
             if differs:
                 moved_p = given_rates(t[c], s, r, laws, load_p)
         A[:, :] = 0.0
-        body_rates(load, y, s, out)
+        linear_rates(load, y, s, out)
         _body_jacobian(s, A)
+        if has_polynomial(s):
+            add_polynomial(y, s, stiffening, out[m : 2 * m])
+            add_polynomial_stiffness(-1.0, stiffening, s, A[m:])
         if differs:
             P[c, :] = 0.0
             if body_moves:
-                body_rates(load_p, y, r, P[c])
+                linear_rates(load_p, y, r, P[c])
                 P[c, :m] = 0.0
             else:
                 P[c, m : 2 * m] = load_p
@@ -242,5 +255,6 @@ def batch_derivatives(
     _fill_derivatives(t, x, s, r, laws_beside(s, r, step),
                       (np.empty(m), np.empty(m), force, beside, np.empty(states),
                        np.empty(2 * d), np.empty(d), np.empty(d)),
-                      (rates, rates_beside, np.empty((d + 1, 2 * d)), np.empty((d, 2 * m))),
+                      (rates, rates_beside, np.empty((d + 1, 2 * d)), np.empty((d, 2 * m)),
+                       np.empty_like(s.polynomial_rows)),
                       f, J, P)

@@ -5,11 +5,12 @@ With x, y = T q at the n contact nodes, per node j
 
     xi = X_j + x_j - travel_j(t)    u_j = y_R(xi) - y_j - g_j      v_j = u_j'
     F_j = normal(u_j, v_j)          R_j = friction(x_j' - V_j, s(xi) |F_j|, z_j)
-    q'' = -K q - C q' + T^T f,      f_j = [-T_j, F_j]
+    q'' = -K q - C q' - V'(q) + T^T f,      f_j = [-T_j, F_j]
     T_j = R_j + F_j y_R'(xi)
 
 where K and C hold the modes' own stiffness and damping and the springs and dashpots at B, and s is
-the variation of friction along the ground. T has no second part where contact forces stay vertical.
+the variation of friction along the ground. V is the potential of large deflections, see
+:mod:`fecontact.system.polynomial_forces`. T has no second part where contact forces stay vertical.
 Rows of nodes between two bodies are those of their relative motion; y_R is zero there. One motion
 moves all other sides, by a factor each: travel_j = c_j travel, V_j = c_j V.
 
@@ -35,6 +36,7 @@ from fecontact.system.nodes import (
     pressing_force,
     tangent_force,
 )
+from fecontact.system.polynomial_forces import add_polynomial_forces, has_polynomial
 from fecontact.system.space_nodes import tell, told_gradients
 
 # Columns of the per-node results of `contact_state`; the last two in space only.
@@ -197,8 +199,8 @@ def given_at(t, s, load):
 
 
 @helper
-def body_acceleration(load, y, s, out):
-    """Fill out (m,) with q'' without contact, under modal forces ``load``, which may be out."""
+def linear_acceleration(load, y, s, out):
+    """Fill out (m,) with q'' by matrices and modal forces ``load``, which may be out."""
     m = len(load)
     for i in range(m):
         total = load[i]
@@ -208,12 +210,20 @@ def body_acceleration(load, y, s, out):
 
 
 @helper
-def body_rates(load, y, s, out):
-    """Fill out (2 m + n s,) with y' as it is without contact, under modal forces ``load``."""
+def body_acceleration(load, y, s, out):
+    """Fill out (m,) with q'' without contact, under modal forces ``load``, which may be out."""
+    linear_acceleration(load, y, s, out)
+    if has_polynomial(s):
+        add_polynomial_forces(y, s, out)
+
+
+@helper
+def linear_rates(load, y, s, out):
+    """Fill out (2 m + n s,) with y' by matrices and modal forces ``load``."""
     m = len(load)
     for i in range(m):
         out[i] = y[m + i]
-    body_acceleration(load, y, s, out[m : 2 * m])
+    linear_acceleration(load, y, s, out[m : 2 * m])
     for i in range(2 * m, len(out)):
         out[i] = 0.0
 
@@ -223,7 +233,9 @@ def rates_under(load, moved, y, s, force, rates, out):
     """Fill out (2 m + n s,) with y'; ``force`` and ``rates`` are work arrays of friction."""
     n, _, m = s.rows.shape
     states = len(rates)
-    body_rates(load, y, s, out)
+    linear_rates(load, y, s, out)
+    if has_polynomial(s):
+        add_polynomial_forces(y, s, out[m : 2 * m])
     for j in range(n):
         F, R, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force,
                                     rates)

@@ -15,6 +15,8 @@ from fecontact.laws.signatures import ground_at, signal_at
 
 # Modes, contact nodes, dimensions of space, internal variables of a node; length of a state.
 MODES, NODES, AXES, MEMORY = map(Size, ("modes", "nodes", "axes", "memory"))
+# Combinations of coordinates on which polynomial forces depend, and their products.
+COMBINATIONS, PRODUCTS = map(Size, ("combinations", "products"))
 SIZE = 2 * MODES + NODES * MEMORY
 
 
@@ -27,6 +29,9 @@ class SystemArrays(NamedTuple):
 
     ``rows`` (n, d, m) are those of the displacements of the nodes along their axes: the first
     tangent, the normal and, in space, the second tangent.
+
+    ``polynomial_rows`` (D, m), ``polynomial_pairs`` (P, 2), ``polynomial_cubic`` (P, m) and
+    ``polynomial_quartic`` (P, P) are those of :mod:`fecontact.system.polynomial_forces`.
 
     In space, else of length zero: reference places ``ordinate`` (n,) along the second tangent;
     ``sliding_across`` (3, n), factors of the first motion for the second
@@ -53,6 +58,10 @@ class SystemArrays(NamedTuple):
     wave_direction: Vector
     sides: Matrix
     bristle_stiffness: Annotated[Array, 2, NODES, ANY]
+    polynomial_rows: Annotated[Array, COMBINATIONS, MODES]
+    polynomial_pairs: Annotated[Integers, PRODUCTS, 2]
+    polynomial_cubic: Annotated[Array, PRODUCTS, MODES]
+    polynomial_quartic: Annotated[Array, PRODUCTS, PRODUCTS]
     normal_parameters: Annotated[Array, NODES, ANY]
     friction_parameters: Annotated[Array, NODES, ANY]
     profile_parameters: Vector

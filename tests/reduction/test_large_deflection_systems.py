@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import test_large_deflections as beams
 from meshes_for_tests import rectangle
+from scipy.integrate import solve_bvp
 from scipy.sparse.linalg import eigsh
 
 from fecontact import (
@@ -26,17 +27,17 @@ from fecontact import (
 from fecontact.analysis import DeflectionSteps, complex_modes, deflection_path, prestressed_modes
 from fecontact.analysis.summaries import largest_displacement, peak_normal_force
 from fecontact.bifurcation import HarmonicBalance, frequency_response, nonlinear_mode
-from fecontact.fem import Coupling, PointSpring
+from fecontact.fem import Coupling, PointSpring, Rotation
 from fecontact.fem.finite_strain import FiniteStrainModel
-from fecontact.integrate import CVODE, EventDriven, Rodas5P, TimeStepping
+from fecontact.integrate import CVODE, EventDriven, PowerSeries, Rodas5P, Scipy, TimeStepping
 from fecontact.laws import Harmonic, JenkinsFriction, PrescribedForce
-from fecontact.reduction import LargeDeflections
+from fecontact.reduction import LargeDeflections, eigenfrequencies_hz
 
 H = beams.H
 
 
-@pytest.mark.parametrize("solver", [Rodas5P(), EventDriven(), CVODE(), TimeStepping()],
-                         ids=lambda one: type(one).__name__)
+@pytest.mark.parametrize("solver", [Rodas5P(), PowerSeries(), EventDriven(), CVODE(), Scipy(),
+                                    TimeStepping()], ids=lambda one: type(one).__name__)
 def test_runs_by_all_methods(solver):
     basis = beams.bent("hinged", 0.6 * H, damping=0.01)
     system = ContactSystem(basis)
@@ -165,6 +166,55 @@ def test_study(tmp_path):
     assert 1.2 * first < second < 0.98 * 30.0 / 9.81 * first
     with pytest.raises(InputError, match="would stress the body twice"):
         Study.from_toml(STUDY.replace("modes = 1", "modes = 1\nprestress = true"))
+
+
+def rotating_elastica(speed, force):
+    """Tip (x, y) of the cantilever that turns about its root and bears a dead force at its tip."""
+    area, bending = beams.B * H, beams.E * beams.B * H**3 / 12.0
+    spun = 7800.0 * area * speed**2
+
+    def rates(s, z):
+        x, y, angle, moment, along, across = z
+        return np.array([np.cos(angle), np.sin(angle), moment / bending,
+                         along * np.sin(angle) - across * np.cos(angle), -spun * x, -spun * y])
+
+    s = np.linspace(0.0, beams.L, 101)
+    start = np.zeros((6, len(s)))
+    start[0], start[4] = s, 0.5 * spun * (beams.L**2 - s**2)
+    found = solve_bvp(rates, lambda a, b: np.array(
+        [a[0], a[1], a[2], b[3], b[4], b[5] - force]), s, start, tol=1e-6, max_nodes=20000)
+    assert found.success
+    return found.sol(beams.L)[:2]
+
+
+def test_rotating_cantilever():
+    """Extension and bending frequency in rotation, then a large deflection of the elastica.
+
+    rho W^2 L^3 / (3 E), and sqrt(7.3604^2 - 36) / 3.5160 in the plane of rotation (Wright, Smith,
+    Thresher and Wang, J. Appl. Mech. 49, 1982), which the linear basis has by the geometric
+    stiffness and the one of large deflections by its stretching.
+    """
+    body = beams.beam("cantilever")
+    w = 2.0 * np.pi * eigenfrequencies_hz(body, 1)[0]
+    speed = 6.0 / 3.5160 * w
+    options = {"contact": (), "points": {"tip": "last"}, "reduction": "residual",
+               "loads": ("right",), "rotation": Rotation(speed, (0.0, 0.5 * H))}
+    basis = modal_basis(body, 4, large_deflections=LargeDeflections(0.1 * beams.L, 3), **options)
+    system = ContactSystem(basis)
+    rest = equilibrium(system).modal_coordinates
+    extension = 7800.0 * speed**2 * beams.L**3 / (3.0 * beams.E)
+    assert basis.point_row("tip", "x") @ rest == pytest.approx(extension, rel=1e-3)
+    linear = ContactSystem(modal_basis(body, 4, **options))
+    for one, q, error in ((system, rest, 5e-3), (linear, np.zeros(linear.basis.modes), 1e-3)):
+        found = complex_modes(one, np.append(q, 0.0 * q)).frequencies_hz[0] * 2.0 * np.pi
+        assert found / w == pytest.approx(np.sqrt(7.3604**2 - 36.0) / 3.5160, rel=error)
+    force = 0.45 * beams.E * beams.B * H**3 / 12.0 / beams.L**2
+    loaded = ContactSystem(basis, load=Load(forces=(PointLoad("tip", "y", signal=force),)))
+    q = equilibrium(loaded).modal_coordinates
+    x, y = rotating_elastica(speed, force)
+    assert y > 0.08 * beams.L
+    assert basis.point_row("tip", "y") @ q == pytest.approx(y, rel=0.01)
+    assert -(basis.point_row("tip", "x") @ q) == pytest.approx(beams.L - x, rel=0.03)
 
 
 STUCK = 3e6  # tangential stiffness below the washer [N/m]

@@ -1,6 +1,7 @@
 """Forces of large deflections in modal bases, against beam theory and the whole body."""
 
 import warnings
+from dataclasses import replace
 from functools import cache
 from itertools import permutations
 
@@ -40,6 +41,7 @@ from fecontact.reduction.large_deflections.forces import (
     large_deflection_forces,
     static_response,
 )
+from fecontact.system.polynomial_forces import polynomial_energy, polynomial_stiffness_at
 
 E, L, H, B = 2e11, 1.0, 0.004, 0.01
 STEEL = Material(E, 0.0, 7800.0)
@@ -71,8 +73,8 @@ def backbone(system, largest, observe, at, harmonics=4):
 
 
 @pytest.mark.parametrize(("d", "m"), [(1, 3), (2, 5), (3, 8)])
-def test_springs_have_the_potential(d, m):
-    """V_3 + V_4 - sum w^2 y y^ + sum w^2 y^2 / 2, by central differences."""
+def test_forces_have_the_potential(d, m):
+    """V_3 + V_4 - sum w^2 y y^ + sum w^2 y^2 / 2; forces and their Jacobian by differences."""
     rng = np.random.default_rng(1)
 
     def symmetric(indices):
@@ -88,7 +90,7 @@ def test_springs_have_the_potential(d, m):
                            np.zeros((1, 4, 0)), ranges, 0.0, 0.0, 0.0, 0.0, 0.0, 1)
     R = static_response(fitted, R, w)
     assert not R[modes].any()
-    forces, rows = large_deflection_forces(fitted, R, w, rng.uniform(0.5, 2.0, d), 1.0)
+    forces = large_deflection_forces(fitted, R, w, 1.0)
 
     def potential(x):
         q = x[modes]
@@ -97,11 +99,25 @@ def test_springs_have_the_potential(d, m):
                 + np.einsum("ijkl,i,j,k,l", C, q, q, q, q) / 4.0
                 + (w**2 * (0.5 * y**2 - x * y)).sum())
 
-    x, h = rng.normal(size=m), 1e-6
-    e = rows @ x
-    found = rows.T @ (forces.quadratic * e**2 + forces.cubic * e**3)
-    slope = [(potential(x + h * v) - potential(x - h * v)) / (2.0 * h) for v in np.eye(m)]
-    assert found == pytest.approx(slope, abs=1e-8 * np.abs(slope).max())
+    # In other coordinates, as links make them, no combination is a coordinate.
+    linear = fc.ModalBasis(w, np.zeros((m, m)), np.ones((2, 3, m)), np.zeros((2, 2)), np.zeros(0))
+    turn = np.linalg.qr(rng.normal(size=(m, m)))[0]
+    for way in (np.eye(m), turn):
+        basis = replace(linear, large_deflections=(forces.in_modes(way),))
+        system = ContactSystem(basis)
+        x, h = rng.normal(size=m), 1e-6
+        assert polynomial_energy(x, system.arrays) == pytest.approx(potential(way @ x), rel=1e-12)
+        slope = [(potential(way @ (x + h * v)) - potential(way @ (x - h * v))) / (2.0 * h)
+                 for v in np.eye(m)]
+        found = -system.rhs(0.0, np.append(x, 0.0 * x))[m:] - basis.stiffness_matrix @ x
+        assert found == pytest.approx(slope, abs=1e-7 * np.abs(slope).max())
+        steps = [[system.rhs(0.0, np.append(x + sign * h * v, 0.0 * x))[m:] for sign in (1.0, -1.0)]
+                 for v in np.eye(m)]
+        exact = np.array([(ahead - behind) / (2.0 * h) for ahead, behind in steps]).T
+        J = system.jacobian(0.0, np.append(x, 0.0 * x))[m:, :m]
+        assert pytest.approx(exact, abs=1e-7 * np.abs(exact).max()) == J
+        assert -polynomial_stiffness_at(x, system.arrays) - basis.stiffness_matrix == pytest.approx(
+            J, abs=1e-12 * np.abs(J).max())
 
 
 @pytest.mark.parametrize(("ends", "modes", "exact"), [
@@ -313,14 +329,7 @@ def test_run_keeps_its_energy_and_watches_its_range():
     start = np.zeros(system.size)
     start[0] = 0.8 * basis.large_deflections[0].ranges[0, 1]
     run = simulate(system, 2.0 / basis.frequencies_hz[0], initial=start, outputs=101)
-    stored = system.stored_energy(np.zeros(basis.contact_nodes))
-    assert not stored
-    total = np.array([
-        0.5 * y[basis.modes :] @ y[basis.modes :]
-        + 0.5 * (basis.angular_frequencies * y[: basis.modes]) @ (
-            basis.angular_frequencies * y[: basis.modes])
-        + system.stored_energy(-(basis.contact_T[:, 1] @ y[: basis.modes]))
-        for y in run.states])
+    total = run.energies.kinetic + run.energies.elastic
     assert total == pytest.approx(np.full(len(total), total[0]), rel=1e-2)
     with pytest.warns(ModelWarning, match="times the range in which its forces were fitted"):
         simulate(system, 0.5 / basis.frequencies_hz[0], initial=1.5 * start)
@@ -429,7 +438,8 @@ def test_limits_are_said():
     body = beam("hinged", 8)
     given = LargeDeflections(0.5 * H)
     for options, told in (({"reduction": "craig-bampton"}, "vibration modes"),
-                          ({"rotation": fc.fem.Rotation(1.0)}, "rotation do not go together"),
+                          ({"rotation": fc.fem.Rotation(1.0, frame="standing")},
+                           "in the rotating frame only"),
                           ({"temperature": 1.0, "reduction": "residual"}, "as prestress")):
         with pytest.raises(InputError, match=told):
             modal_basis(body, 2, contact=(), large_deflections=given, **options)

@@ -64,13 +64,14 @@ def kind_of(system: ContactSystem, begin: float, end: float) -> Kind | None:
     """The kind of a system; None if it does not go side by side with others.
 
     It does if it is plane and of a usual size, on level ground that moves as one, without
-    friction with memory, without breaks of what is given in time, and if there are functions for
-    lanes of all its laws and signals.
+    friction with memory and large deflections, without breaks of what is given in time, and if
+    there are functions for lanes of all its laws and signals.
     """
     s = system.arrays
     n, _, m = s.rows.shape
     if ((m, n) not in FEW or s.rows.shape[1] > 2 or s.memory.any() or s.second_motion
-            or s.friction_scale or system.ground.wavy or system.breakpoints(begin, end)):
+            or s.friction_scale or len(s.polynomial_pairs) or system.ground.wavy
+            or system.breakpoints(begin, end)):
         return None
     acts = (s.drive_stiffness != 0.0) | (s.drive_damping != 0.0)
     drive = np.where(acts, s.drive, 0)

@@ -284,6 +284,9 @@ def nonsmooth_problem(
         raise InputError(f"SetValued: restitution puts rigid stops in place of all normal laws, "
                          f"but the system has nonlinear springs, {choices(system.basis.springs)}; "
                          f"leave restitution out.")
+    if restitution is not None and system.basis.large_deflections:
+        raise InputError("SetValued: impacts with a coefficient of restitution are those of linear "
+                         "bodies, but the basis has large deflections; leave restitution out.")
     if restitution is not None:
         rough = _rough_nodes(groups, problem.static)
         rubbing &= np.array([rough[cluster == c].any() for c in range(len(rows))])

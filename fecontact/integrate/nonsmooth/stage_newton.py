@@ -32,6 +32,11 @@ from fecontact.integrate.nonsmooth.problem import CREEP, NonsmoothProblem
 from fecontact.laws.signatures import friction_at
 from fecontact.system.kernels import normal_gradients
 from fecontact.system.nodes import GroundMotion, in_space, node_contact, node_motion, tangent_force
+from fecontact.system.polynomial_forces import (
+    add_polynomial_stiffness,
+    has_polynomial,
+    set_polynomial_gradient,
+)
 
 # Stiffness that holds a sticking node during Newton's iteration, relative to its inertia.
 GRIP = 1e6
@@ -77,7 +82,8 @@ class NewtonRoom(NamedTuple):
     Rows ``active`` (n, d, m) of the nodes under force, and their ``gradients`` (n, d, m), minus
     the derivatives of the forces along the axes to V;
     ``partial`` (3, 4) of one node; ``linear`` (m, m) is 1 + g C + g^2 K, ``matrix`` the whole
-    matrix; ``balance`` and ``residual`` (m,).
+    matrix; ``balance`` and ``residual`` (m,); ``polynomial`` (D, m) is G of
+    :mod:`fecontact.system.polynomial_forces` where the matrix was made last.
     """
 
     gradients: Block
@@ -87,6 +93,7 @@ class NewtonRoom(NamedTuple):
     matrix: Matrix
     balance: Vector
     residual: Vector
+    polynomial: Matrix
 
 
 # Evaluates the contact of a stage in space: number of nodes under force, and creep velocity.
@@ -96,12 +103,15 @@ LINEARISE = Callable[[
 _linearise_at = function_at(LINEARISE)
 
 
-def newton_room_for(nodes: int, modes: int, tangents: int = 1) -> NewtonRoom:
-    """Workspace for so many nodes and modes."""
+def newton_room_for(
+    nodes: int, modes: int, tangents: int = 1, combinations: int = 0
+) -> NewtonRoom:
+    """Workspace for so many nodes and modes, and combinations D of polynomial forces."""
     linear, whole = np.zeros((2, modes, modes))
     balance, residual = np.zeros((2, modes))
     gradients, active = np.zeros((2, nodes, 1 + tangents, modes))
-    return NewtonRoom(gradients, active, np.zeros((3, 4)), linear, whole, balance, residual)
+    return NewtonRoom(gradients, active, np.zeros((3, 4)), linear, whole, balance, residual,
+                      np.zeros((combinations, modes)))
 
 
 @helper
@@ -214,6 +224,9 @@ def solve_stage(stage, p, hold, limits, finest, room, force):
         count, _ = _evaluate(stage, p, hold, turning, room, force)
         turning = HESITANT if iteration < _HASTY else FREE
         whole[:] = room.linear
+        if has_polynomial(p.system):
+            set_polynomial_gradient(Y, p.system, room.polynomial)
+            add_polynomial_stiffness(stage.g * stage.g, room.polynomial, p.system, whole)
         if count:
             size = count * room.active.shape[1]
             whole += stage.g * np.dot(room.active[:count].reshape((size, m)).T,

@@ -102,7 +102,7 @@ def room_for(problem: NonsmoothProblem, space: InSpace = IN_PLANE) -> Room:
     size, k = m + POWER_COUNT + n, tangents(problem)
     start, known = np.zeros((2, m))
     before, after = np.zeros((2, size))
-    return Room(newton_room_for(n, m, k),
+    return Room(newton_room_for(n, m, k, len(problem.system.polynomial_rows)),
                 Hold(np.zeros(n), np.zeros(k * n), np.zeros(k * n), space.linearise), space,
                 np.zeros((STAGES, 2 * m)), np.zeros((STAGES, m)), np.zeros((STAGES, k * n)),
                 np.zeros((STAGES, size - m)), start, known, np.zeros(m + size), before, after,

@@ -62,6 +62,7 @@ from fecontact.integrate.step_loop import (
     step_loop,
 )
 from fecontact.system.nodes import ground_motion, in_space, moved_across, moved_along
+from fecontact.system.polynomial_forces import add_polynomial_product, has_polynomial
 from fecontact.system.powers import body_powers
 
 _observe_at, _powers_at = function_at(OBSERVE), function_at(POWERS)
@@ -106,10 +107,11 @@ def _observe(moved, Y, p, nodes, room):
 @helper
 def _fastest_side(moved, p):
     """Largest speed of what slides under the nodes."""
-    s = p.system
+    s, fastest = p.system, 0.0
     if not in_space(s):
-        return np.abs(p.sliding).max() * abs(moved.speed)
-    fastest = 0.0
+        for c in range(len(p.sliding)):
+            fastest = max(fastest, abs(p.sliding[c] * moved.speed))
+        return fastest
     for j in range(len(s.gap)):
         fastest = max(fastest, math.hypot(moved_along(j, moved.speed, moved.second_speed, s),
                                           moved_across(j, moved.speed, moved.second_speed, s)))
@@ -302,6 +304,8 @@ def _error(step, p, limits, Y, room):
     for i in range(m):
         for k in range(m):
             known[i] -= g * s.stiffness[i, k] * start[k]
+    if has_polynomial(s):
+        add_polynomial_product(-g, room.newton.polynomial, start, s, known)
     filtered = np.linalg.solve(room.newton.matrix, known)
     worst = 0.0
     for i in range(m):

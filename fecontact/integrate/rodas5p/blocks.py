@@ -17,6 +17,7 @@ from fecontact.core.records import IntegerBlock, IntegerMatrix, IntegerVector, M
 from fecontact.core.types import Array, Integers
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.nodes import SystemArrays
+from fecontact.system.polynomial_forces import coupled_by_polynomial
 
 
 class Blocks(NamedTuple):
@@ -86,7 +87,9 @@ def blocks_of(basis: ModalBasis, arrays: SystemArrays) -> Blocks:
                          for one in (arrays.stiffness, arrays.damping, arrays.modal_damping))
                      for k in modes] for i in modes])
     own |= np.eye(len(modes), dtype=bool)
-    coupled = own | own.T | (moved.T.astype(int) @ moved.astype(int) > 0)
+    joined = coupled_by_polynomial(arrays)
+    coupled = own | own.T | (moved.T.astype(int) @ moved.astype(int) > 0) | np.array(
+        [[joined[slice(*i), slice(*k)].any() for k in modes] for i in modes])
     shapes = arrays.rows.swapaxes(0, 1).reshape(-1, m).T.copy()
     if coupled.all():
         return one_block(shapes, n)

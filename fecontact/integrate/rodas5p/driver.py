@@ -119,6 +119,7 @@ def start(
     require_state(state, np.inf)
     basis = system.basis
     m, n, states = basis.modes, basis.contact_nodes, system.memory
+    combinations = len(system.arrays.polynomial_rows)
     times = np.array(times, dtype=float)
     control = control_for(system, state, times, rtol=rtol, max_step=max_step, work=work)
     above, below, width, columns = system, system, 0.0, 0
@@ -150,14 +151,15 @@ def start(
     return Run(
         problem,
         _progress(system, control, times, state),
-        room_for(m, n, states, basis.dimension, blocks),
+        room_for(m, n, states, basis.dimension, blocks, combinations),
         output_for(times, len(state), n),
         output_for(np.zeros(room_for_rows(keep_steps, len(state) + POWER_COUNT + NODE_POWERS * n)),
                    len(state), n),
         Vary(exact_arrays(above.arrays, counts), exact_arrays(below.arrays, counts), width,
              _moved_both_ways(system, above, below),
              variation_for(columns, m, n, states, basis.dimension, width,
-                           float(vary_rtol or looser * rtol), 1.0 if vary_rtol else _FADED),
+                           float(vary_rtol or looser * rtol), 1.0 if vary_rtol else _FADED,
+                           combinations),
              np.zeros((len(times) if vary else 0, columns, len(state))),
              propagate),
         watch_for(system, events, bool(vary)),
@@ -197,7 +199,8 @@ def _progress(system: ContactSystem, control: Control, times: Array, state: Arra
         acceleration = np.abs(system.rhs(time, state)[m : 2 * m]) * control.largest
     first = min(0.1 * control.speed_scale / max(float(acceleration.max()), 1e-300),
                 0.01 * control.longest)
-    progress = progress_for(state, time, first, m, basis.contact_nodes, basis.dimension)
+    progress = progress_for(state, time, first, m, basis.contact_nodes, basis.dimension,
+                            len(system.arrays.polynomial_rows))
     if control.work:
         progress.work[DRIVE] = work_of_jump(system, float(times[0]),
                                             float(np.nextafter(time, times[-1])), state)

@@ -13,7 +13,13 @@ from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.laws.signatures import normal_at, signal_at
 from fecontact.system import kernels, nodes
-from fecontact.system.nodes import AXES, MEMORY, NODES
+from fecontact.system.nodes import AXES, COMBINATIONS, MEMORY, MODES, NODES
+from fecontact.system.polynomial_forces import (
+    add_polynomial,
+    add_polynomial_forces,
+    has_polynomial,
+    set_polynomial_gradient,
+)
 
 # Entries of what is given in time: pulls of the drive along each axis, and their rates, travel and
 # speed of the ground's two motions.
@@ -29,15 +35,19 @@ FRICTION_ENTRIES = Size("entries of friction")
 class Gradients(NamedTuple):
     """Derivatives of the node forces, as :func:`fecontact.system.kernels.node_gradients` gives.
 
+    And of the polynomial forces, G of :mod:`fecontact.system.polynomial_forces`.
+
     partial : (n, d + 1, 2 d), derivatives of the forces on a node along its axes and of the
     pressing force, to displacements and velocities along the axes
     force : (n, 3 + s), rates : (n, s, 3 + s), of friction with memory; in space (n, 2 (4 + s)) and
     (n, s, 4 + s), of friction in two directions
+    polynomial : (D, m), G
     """
 
     partial: Annotated[Array, NODES, AXES + 1, 2 * AXES]
     force: Annotated[Array, NODES, FRICTION_ENTRIES]
     rates: Annotated[Array, NODES, MEMORY, AXES + 1 + MEMORY]
+    polynomial: Annotated[Array, COMBINATIONS, MODES]
 
 
 @routine
@@ -163,7 +173,10 @@ def push_block(ends, shapes, forces, out):
 
 @helper
 def gather(y, s, blocks, load, forces, rate):
-    """Fill the first 2 m entries of ``rate`` from the node forces (d n,) of :func:`push`."""
+    """Fill the first 2 m entries of ``rate`` from the node forces (d n,) of :func:`push`.
+
+    Without polynomial forces.
+    """
     m = len(load)
     v = y[m : 2 * m]
     for i in range(m):
@@ -212,6 +225,8 @@ def set_rate(y, s, blocks, given, load, w, scratch, rate):
     project(blocks, y, w[0], w[1])
     set_forces(y, s, blocks, motion_given(given), w, scratch, rate)
     gather(y, s, blocks, load, w[2], rate)
+    if has_polynomial(s):
+        add_polynomial_forces(y, s, rate[len(load) : 2 * len(load)])
 
 
 @helper
@@ -220,6 +235,14 @@ def set_gradients(y, s, blocks, moved, w, out):
 
     The node forces go to w[2], in the order of :func:`push`.
     """
+    set_node_gradients(y, s, blocks, moved, w, out)
+    if has_polynomial(s):
+        set_polynomial_gradient(y, s, out.polynomial)
+
+
+@helper
+def set_node_gradients(y, s, blocks, moved, w, out):
+    """Body of :func:`set_gradients` without polynomial forces."""
     project(blocks, y, w[0], w[1])
     m, n = len(blocks.position), len(s.gap)
     states = out.rates.shape[1]
@@ -240,12 +263,14 @@ def set_gradients(y, s, blocks, moved, w, out):
 @routine
 def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
     """Fill ``rate`` as :func:`set_rate`, and the :class:`Gradients` ``out``."""
-    set_gradients(y, s, blocks, motion_given(given), w, out)
+    set_node_gradients(y, s, blocks, motion_given(given), w, out)
     m, states = len(load), out.rates.shape[1]
     for j in range(len(s.gap)):
         for k in range(states):
             rate[2 * m + j * states + k] = out.rates[j, k, 0] if k < s.memory[j] else 0.0
     gather(y, s, blocks, load, w[2], rate)
+    if has_polynomial(s):
+        add_polynomial(y, s, out.polynomial, rate[m : 2 * m])
 
 
 @helper
@@ -258,6 +283,9 @@ def friction_length(g):
 @helper
 def copy_gradients(there, here, blocks):
     """Make the derivatives ``here`` those ``there``, at the nodes of ``blocks``."""
+    for a in range(len(here.polynomial)):
+        for k in range(here.polynomial.shape[1]):
+            here.polynomial[a, k] = there.polynomial[a, k]
     states, width = here.rates.shape[1:]
     for at in range(blocks.used[0]):
         j = blocks.nodes[at]

@@ -25,6 +25,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.dynamics import change_of, project
 from fecontact.system.nodes import AXES, MEMORY, MODES, NODES, friction_entry, slip_entry
+from fecontact.system.polynomial_forces import add_polynomial_stiffness, has_polynomial
 
 
 class Reduced(NamedTuple):
@@ -252,7 +253,10 @@ def _add_memory(at, j, g, w):
 
 @routine
 def assemble(s, blocks, g, w):
-    """Fill J = [Jq, Jv] as shapes applied to what the modes' motion does to the node forces."""
+    """Fill J = [Jq, Jv] by the matrices, polynomial forces, and node forces.
+
+    The latter by shapes applied to what the modes' motion does to the node forces.
+    """
     set_answers(blocks, g, w, w.answers)
     m = len(w.J)
     for part in range(len(blocks.coupled)):
@@ -262,6 +266,8 @@ def assemble(s, blocks, g, w):
             for k in range(left, right):
                 by_place[k] = -s.stiffness[i, k]
                 by_speed[k] = -s.damping[i, k]
+    if has_polynomial(s):
+        add_polynomial_stiffness(-1.0, g.polynomial, s, w.J)
     for pair in range(len(blocks.pairs)):
         add_products(blocks.shapes, w.answers, block_at(blocks.pairs, pair),
                      (np.uint64(blocks.pairs[pair, 4]), np.uint64(blocks.pairs[pair, 5])), w.J)

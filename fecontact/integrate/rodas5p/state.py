@@ -219,28 +219,36 @@ class Room(NamedTuple):
 
 
 def gradients_for(
-    nodes: int, states: int, dimension: int, *, told: int = TOLD
+    nodes: int, states: int, dimension: int, *, told: int = TOLD,
+    polynomial: tuple[int, int] = (0, 0),
 ) -> motion.Gradients:
     """Zeros for so many contact nodes with so many internal variables each.
 
-    ``told`` is the number of entries for the contact of a node in space. Derivatives are not
-    computed if it leaves no entries for them.
+    ``polynomial`` is the shape (D, m) of G in :mod:`fecontact.system.polynomial_forces`. ``told``
+    is the number of entries for the contact of a node in space. Derivatives are not computed if it
+    leaves no entries for them.
     """
     length = 2 * (4 + states) + told if dimension == 3 else 3 + states
     return allocate(motion.Gradients, {NODES: nodes, MEMORY: states, AXES: dimension,
-                                       motion.FRICTION_ENTRIES: length})
+                                       motion.FRICTION_ENTRIES: length},
+                    polynomial=np.zeros(polynomial))
 
 
 def room_for(
-    modes: int, nodes: int, states: int, dimension: int, blocks: Blocks,
+    modes: int, nodes: int, states: int, dimension: int, blocks: Blocks, combinations: int = 0,
 ) -> Room:
-    """Workspace for a system of so many modes, contact nodes and internal variables per node."""
+    """Workspace for a system of so many modes, contact nodes and internal variables per node.
+
+    ``combinations`` is the number D of :mod:`fecontact.system.polynomial_forces`.
+    """
+    polynomial = combinations, modes
     return allocate(
         Room, {MODES: modes, NODES: nodes, MEMORY: states, AXES: dimension},
         near=near_blocks(blocks),
         reduced=stage_solver.reduced_for(modes, nodes, states, dimension),
-        scratch=gradients_for(nodes, states, dimension, told=CONTACT_FIELDS + 1),
-        gradients_after=gradients_for(nodes, states, dimension))
+        scratch=gradients_for(nodes, states, dimension, told=CONTACT_FIELDS + 1,
+                              polynomial=polynomial),
+        gradients_after=gradients_for(nodes, states, dimension, polynomial=polynomial))
 
 
 def output_for(times: Array, size: int, nodes: int) -> Output:
@@ -250,12 +258,14 @@ def output_for(times: Array, size: int, nodes: int) -> Output:
 
 
 def progress_for(
-    state: Array, time: float, step: float, modes: int, nodes: int, dimension: int
+    state: Array, time: float, step: float, modes: int, nodes: int, dimension: int,
+    combinations: int = 0,
 ) -> Progress:
     """A run that is about to start."""
     states = (len(state) - 2 * modes) // max(nodes, 1)
     made = allocate(Progress, {MODES: modes, NODES: nodes, MEMORY: states},
                     state=np.array(state, dtype=float),
-                    gradients=gradients_for(nodes, states, dimension))
+                    gradients=gradients_for(nodes, states, dimension,
+                                            polynomial=(combinations, modes)))
     made.numbers[TIME], made.numbers[STEP] = time, step
     return made

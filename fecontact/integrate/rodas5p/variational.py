@@ -136,15 +136,17 @@ class Vary(NamedTuple):
 
 def variation_for(
     columns: int, modes: int, nodes: int, states: int, dimension: int, width: float,
-    tolerance: float, faded: float,
+    tolerance: float, faded: float, combinations: int = 0,
 ) -> Variation:
     """Workspace for so many columns; the first ``size`` of them are the unit matrix.
 
-    ``width`` is that of the parameter whose column comes last: 2e-5 of its value; zero without.
+    ``combinations`` is the number D of :mod:`fecontact.system.polynomial_forces`. ``width`` is that
+    of the parameter whose column comes last: 2e-5 of its value; zero without.
     """
     directions = 2 * dimension + states if columns else 1
+    polynomial = combinations, modes
     gradients = {
-        name: run_arrays.gradients_for(nodes, states, dimension)
+        name: run_arrays.gradients_for(nodes, states, dimension, polynomial=polynomial)
         for name in ("inside", "ahead", "behind", "usual", "between")}
     made = allocate(
         Variation, {COLUMNS: columns, DIRECTIONS: directions, MODES: modes, NODES: nodes,
@@ -325,7 +327,7 @@ def propagate(
             columns.learn(v.inside, v.usual)
         if varies:
             _set_forced(tableau.TIME[i] * step.h, Y, stages[i], blocks, vary, forced)
-        columns.set_ahead(i, v)
+        columns.set_ahead(i, state, s, stages, v)
         if size > 2 * m:
             columns.one_by_one(i, step.h, G, s, blocks, gradients, reduced, forced, varies, v)
         else:

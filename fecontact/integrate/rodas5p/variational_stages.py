@@ -25,6 +25,12 @@ from fecontact.system.nodes import (
     node_contact,
     slip_entry,
 )
+from fecontact.system.polynomial_forces import (
+    add_polynomial_product,
+    add_polynomial_stiffness,
+    has_polynomial,
+    set_polynomial_change,
+)
 from fecontact.system.space_nodes import contact_in_space, laws_of
 
 # Products of matrices with more multiplications than these go to BLAS.
@@ -223,9 +229,11 @@ def set_bends(step, acceleration, problem, progress, room, v):
 
 
 @helper
-def set_ahead(i, v):
-    """Fill v.ahead with the change of the gradients along stage i."""
+def set_ahead(i, y, s, stages, v):
+    """Fill v.ahead with the change of the gradients along stage i of a step from y."""
     g, bends, paths = v.ahead, v.bends, v.paths
+    if has_polynomial(s):
+        set_polynomial_change(y, stages[i], s, g.polynomial)
     states, width = g.rates.shape[1], g.rates.shape[2]
     n, entries = paths.shape[2], g.partial.shape[1] * g.partial.shape[2]
     partial = g.partial.reshape((n, entries))
@@ -300,11 +308,16 @@ def set_derivatives(s, blocks, g, reduced, answers, out):
         for k in range(m):
             out[row, k] -= s.stiffness[row, k]
             out[row, m + k] -= s.damping[row, k]
+    if has_polynomial(s):
+        add_polynomial_stiffness(-1.0, g.polynomial, s, out)
 
 
 @helper
 def all_at_once(i, h, G, s, blocks, reduced, forced, varies, v):
-    """Solve stage i of all columns; systems without internal variables."""
+    """Solve stage i of all columns; systems without internal variables and polynomial forces.
+
+    Columns of those with polynomial forces go in parts of the step.
+    """
     count, size = v.columns.shape
     m = len(v.none)
     stage_solver.set_answers(blocks, v.inside, reduced, v.answers)
@@ -386,6 +399,9 @@ def one_by_one(i, h, G, s, blocks, gradients, reduced, forced, varies, v):
         push(v.ahead, s, blocks, v.columns[c], w, rate)
         push(v.inside, s, blocks, X, w, rate)
         dynamics.gather(X, s, blocks, v.none, w[2], rate)
+        if has_polynomial(s):
+            add_polynomial_product(-1.0, v.inside.polynomial, X, s, rate[m : 2 * m])
+            add_polynomial_product(-1.0, v.ahead.polynomial, v.columns[c], s, rate[m : 2 * m])
         if varies and c == count - 1:
             for k in range(size):
                 rate[k] += forced[k]

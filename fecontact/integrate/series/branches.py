@@ -17,7 +17,7 @@ from fecontact.laws.pieces import PIECE, UPPER
 from fecontact.laws.signals.base import Signal
 from fecontact.laws.signals.harmonic import Constant, Harmonic, Harmonics
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.nodes import MODES, NODES
+from fecontact.system.nodes import COMBINATIONS, MODES, NODES, PRODUCTS
 
 # Sizes up to which series are taken unasked; their cost grows with the square of the modes.
 MOST_MODES, MOST_NODES = 4, 4
@@ -60,6 +60,9 @@ class Series(NamedTuple):
         Coefficients of the signals; (0, n + 1) where no powers are integrated.
     u, F, square, cube : (n, n + 1) arrays
         Coefficients of the penetrations, forces, and of u^2 and u^3.
+    combined, products, slopes, pull : (D, n + 1), (P, n + 1), (P, n + 1), (m, n + 1) arrays
+        Coefficients of c, p, ``Q p + L x`` of :mod:`fecontact.system.polynomial_forces` and of
+        these forces.
     powers : (5, n + 1) array
         Coefficients of the powers, then of their integrals.
     line, room : (3, l), (d, n + 1) arrays
@@ -83,6 +86,10 @@ class Series(NamedTuple):
     F: Annotated[Array, NODES, COEFFICIENTS]
     square: Annotated[Array, NODES, COEFFICIENTS]
     cube: Annotated[Array, NODES, COEFFICIENTS]
+    combined: Annotated[Array, COMBINATIONS, COEFFICIENTS]
+    products: Annotated[Array, PRODUCTS, COEFFICIENTS]
+    slopes: Annotated[Array, PRODUCTS, COEFFICIENTS]
+    pull: Annotated[Array, MODES, COEFFICIENTS]
     powers: Annotated[Array, SERIES_POWERS, COEFFICIENTS]
     line: Matrix
     room: Matrix
@@ -123,7 +130,9 @@ def _tables(
     number, amplitude, w = sines[:, 0].astype(int), sines[:, 1:2], sines[:, 2:3]
     m, n = system.basis.modes, system.basis.contact_nodes
     return allocate(
-        Series, {MODES: m, NODES: n}, pieces=pieces, constants=constants, sines=sines,
+        Series, {MODES: m, NODES: n, COMBINATIONS: len(arrays.polynomial_rows),
+                 PRODUCTS: len(arrays.polynomial_pairs)},
+        pieces=pieces, constants=constants, sines=sines,
         constant_force=arrays.constant_load + constants @ of_value,
         sine_force=amplitude * of_value[number],
         cosine_force=amplitude * w * of_rate[number],
@@ -140,9 +149,9 @@ def from_state(series: Series, system: ContactSystem, state: Array) -> Series:
 
 def law_pieces(system: ContactSystem) -> Array:
     """Pieces (n, p, 11) of the normal laws of all nodes, which must have some."""
-    found = [law.pieces(share) for _, share, law in system.law_groups("normal")]
-    most = max(table.shape[1] for table in found)
-    rows = []
+    found = [law.pieces(share) for _, share, law in system.law_groups("normal") if len(share)]
+    most = max((table.shape[1] for table in found), default=1)
+    rows = [np.zeros((0, most, PIECE))]
     for table in found:
         # Pieces that a law lacks begin and end at infinity.
         full = np.zeros((len(table), most, PIECE))
@@ -203,7 +212,7 @@ def obstacle(
                 and not np.any(law.viscous_coefficient)):
             return "there is friction"
     for _, share, law in system.law_groups("normal"):
-        if law.pieces(share) is None:
+        if len(share) and law.pieces(share) is None:
             return f"{type(law).__name__} is not piecewise polynomial"
     for signal in _signals(system):
         if sines_of(signal) is None:
@@ -226,7 +235,7 @@ def series_pay(system: ContactSystem, begin: float, end: float) -> bool:
 def worthwhile(system: ContactSystem, pieces: Array) -> bool:
     """Whether series are the faster way: few modes, none of them fast and much damped."""
     m, n = system.basis.modes, system.basis.contact_nodes
-    if m > MOST_MODES or n > MOST_NODES:
+    if m > MOST_MODES or n > MOST_NODES or not (n or system.basis.large_deflections):
         return False
     slow = [w for signal in _signals(system) for _, w, _ in (sines_of(signal) or (0.0, []))[1]
             if w > 0.0]

@@ -5,11 +5,12 @@ series in x. Their coefficients obey the equations of motion power by power:
 
 .. math::
 
-    (k + 1)(k + 2)\, q_{k+2} = h_0^2\, (f_k - K q_k - D v_k + T_y^T F_k), \qquad
+    (k + 1)(k + 2)\, q_{k+2} = h_0^2\, (f_k - K q_k - D v_k - V'_k + T_y^T F_k), \qquad
     v_k = (k + 1)\, q_{k+1} / h_0
 
-Sines have known coefficients, and products of series are sums of products. The series of the piece
-of a law that acts goes on beyond its ends, so that where it ends can be found on it.
+V is the potential of :mod:`fecontact.system.polynomial_forces`. Sines have known coefficients, and
+products of series are sums of products. The series of the piece of a law that acts goes on beyond
+its ends, so that where it ends can be found on it.
 """
 
 import math
@@ -20,6 +21,7 @@ from fecontact.core.compiled import helper, routine
 from fecontact.integrate.series.branches import ACTS, PLACE
 from fecontact.integrate.series.polynomials import COEFFICIENTS, DEGREE
 from fecontact.laws.pieces import DAMPING, ELASTIC
+from fecontact.system.polynomial_forces import has_polynomial
 
 _INVERSE = np.array([0.0] + [1.0 / k for k in range(1, COEFFICIENTS + 1)])
 # Rows of `Series.powers`.
@@ -102,6 +104,37 @@ def _force(j, k, h, series):
     return total
 
 
+@helper
+def _add_polynomial_forces(k, s, series):
+    """Fill coefficient k of ``series.pull``, the polynomial forces, and of what they depend on."""
+    rows, pairs, L, Q = (s.polynomial_rows, s.polynomial_pairs, s.polynomial_cubic,
+                         s.polynomial_quartic)
+    c, p, slopes, q, pull = (series.combined, series.products, series.slopes, series.q,
+                             series.pull)
+    m = len(q)
+    for a in range(len(rows)):
+        total = 0.0
+        for i in range(m):
+            total += rows[a, i] * q[i, k]
+        c[a, k] = total
+    for r in range(len(pairs)):
+        p[r, k] = _product(c[pairs[r, 0]], c[pairs[r, 1]], k)
+    for i in range(m):
+        pull[i, k] = 0.0
+    for r in range(len(pairs)):
+        total = 0.0
+        for other in range(len(pairs)):
+            total += Q[r, other] * p[other, k]
+        for i in range(m):
+            total += L[r, i] * q[i, k]
+            pull[i, k] -= p[r, k] * L[r, i]
+        slopes[r, k] = total
+        first, second = _product(slopes[r], c[pairs[r, 1]], k), _product(
+            slopes[r], c[pairs[r, 0]], k)
+        for i in range(m):
+            pull[i, k] -= first * rows[pairs[r, 0], i] + second * rows[pairs[r, 1], i]
+
+
 @routine
 def expand(y, h, s, series):
     """Fill the coefficients of displacements, velocities and forces from the state y on."""
@@ -119,9 +152,13 @@ def expand(y, h, s, series):
             break
         ahead = h * _INVERSE[k + 2]
         factor = h * _INVERSE[k + 1] * ahead
+        if has_polynomial(s):
+            _add_polynomial_forces(k, s, series)
         for i in range(m):
             # The newest coefficients come last: other terms do not wait for them.
             total, damped = series.forcing[i, k], 0.0
+            if has_polynomial(s):
+                total += series.pull[i, k]
             for j in range(n):
                 total += s.rows[j, 1, i] * series.F[j, k]
             for other in range(m):

@@ -387,6 +387,7 @@ SMALL = Sized(partial(step_loop, METHOD),
 def advance_for(problem: state.Problem) -> Any:
     """The loop for a system of this size, or for all."""
     nodes, _, modes = problem.system.rows.shape
-    if (modes, nodes) in FEW and problem.system.second_motion == 0:
+    if ((modes, nodes) in FEW and problem.system.second_motion == 0
+            and not len(problem.system.polynomial_pairs)):
         return SMALL.of(modes, nodes)
     return advance

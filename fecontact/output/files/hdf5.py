@@ -264,14 +264,15 @@ def _read_large_deflections(group: Any, modes: int) -> tuple[LargeDeflectionForc
     found = []
     for number in range(len(group)):
         one = member(group, str(number))
-        quadratic = bounded(one, "quadratic", (None,))
         coordinates = bounded(one, "coordinates", (None, modes))
+        d = len(coordinates)
+        pairs = indices(one, "pairs", (None, 2), d)
         numbers = {name: float(one.attrs[name]) for name in (
             "largest_displacement", "largest_strain", "force_error", "displacement_error",
             "stress_error", "other_load_error")}
         found.append(LargeDeflectionForces(
-            str(one.attrs["group"]), quadratic, bounded(one, "cubic", (len(quadratic),)),
-            coordinates, bounded(one, "ranges", (len(coordinates), 2)),
+            coordinates, pairs, bounded(one, "cubic", (len(pairs), modes)),
+            bounded(one, "quartic", (len(pairs), len(pairs))), bounded(one, "ranges", (d, 2)),
             states=int(one.attrs["states"]), **numbers))
     return tuple(found)
 

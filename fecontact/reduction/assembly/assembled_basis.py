@@ -21,7 +21,6 @@ from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.reduction.assembly.links import Links, NonlinearSpring, linked
 from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs, spring_row
 from fecontact.reduction.assembly.point_pairing import PointPairing
-from fecontact.reduction.large_deflections.nodes import with_springs
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, NonlinearStress
 from fecontact.reduction.rotating import ModalRotation
@@ -176,9 +175,10 @@ def assembled_basis(
         first_passes=tuple(halves),
         rotation=_rotation(bases, places),
         constant_load=_constant_loads(bases),
+        large_deflections=tuple(
+            forces.in_modes(np.eye(basis.modes, places.modes, places.columns(name).start))
+            for name, basis in bases.items() for forces in basis.large_deflections),
     )
-    for name, basis in bases.items():
-        whole = _with_large_deflections(whole, name, basis, places.columns(name))
     joints = [link for link in (links.values() if isinstance(links, Mapping) else links)
               if not isinstance(link, NonlinearSpring)]
     return linked(whole, joints) if joints else whole
@@ -190,23 +190,6 @@ def _constant_loads(bases: Mapping[str, ModalBasis]) -> Array | None:
         return None
     return np.concatenate([np.zeros(one.modes) if one.constant_load is None else one.constant_load
                            for one in bases.values()])
-
-
-def _with_large_deflections(
-    whole: ModalBasis, name: str, basis: ModalBasis, columns: slice
-) -> ModalBasis:
-    """The whole basis with the springs of large deflections of one body."""
-    groups, first = dict(basis.groups), basis.interface_nodes
-    for forces in basis.large_deflections:
-        count = groups[forces.group]
-        rows = np.zeros((count, whole.modes))
-        rows[:, columns] = basis.contact_T[first : first + count, basis.dimension - 1]
-        coordinates = np.zeros((len(forces.ranges), whole.modes))
-        coordinates[:, columns] = forces.coordinates
-        whole = with_springs(whole, replace(forces, group=f"{forces.group} of {name}",
-                                            coordinates=coordinates), rows)
-        first += count
-    return whole
 
 
 def _rotation(bases: Mapping[str, ModalBasis], places: "_Places") -> ModalRotation | None:

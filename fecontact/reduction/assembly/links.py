@@ -285,8 +285,7 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
         parts=tuple(replace(part, modes=(0, 0)) for part in basis.parts),
         rotation=None if basis.rotation is None else basis.rotation.in_modes(modes),
         constant_load=load @ modes if load.any() else None,
-        large_deflections=tuple(replace(one, coordinates=one.coordinates @ modes)
-                                for one in basis.large_deflections),
+        large_deflections=tuple(one.in_modes(modes) for one in basis.large_deflections),
     )
 
 

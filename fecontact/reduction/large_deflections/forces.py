@@ -1,4 +1,4 @@
-r"""Forces of large deflections in a modal basis, as springs along sums of its coordinates.
+r"""Forces of large deflections in a modal basis, by one potential of its coordinates.
 
 Beside the coordinates q of modes with large deflections a basis has linear ones y: other modes and
 vectors of stretching, which take the displacement fields theta. With the static response of each
@@ -16,26 +16,22 @@ linear basis, so that what is added are terms of the degrees three and four,
     V_3(q) + V_4(q) - \sum_k w_k^2 y_k \hat y_k(q) + \tfrac12 \sum_k w_k^2 \hat y_k(q)^2 .
 
 The kinetic energy stays quadratic: y moves as the fields theta do, with their inertia (Nicolaidou,
-Hill and Neild, Proc. R. Soc. A 476, 2020, of y = y^), and contact nodes follow. Each term is a sum
-of powers of linear combinations of coordinates, the potentials of springs.
+Hill and Neild, Proc. R. Soc. A 476, 2020, of y = y^), and contact nodes follow. Over the products
+p of two of the q all of this is ``p . L x + p . Q p / 2``, where x are all coordinates; see
+:mod:`fecontact.system.polynomial_forces`.
 """
 
-from dataclasses import dataclass
-from itertools import combinations, permutations
+from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement, permutations
 
 import numpy as np
 
 from fecontact.core.read_only import read_only_arrays
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised
-from fecontact.laws.normal.bilateral import BilateralPolynomial
-from fecontact.reduction.large_deflections.fit import CondensedBody, scaled
+from fecontact.reduction.large_deflections.fit import CondensedBody
 from fecontact.reduction.mode_shapes import NonlinearStress
-from fecontact.reduction.polynomial_stiffness import polynomial_stiffness
 
-GROUP = "large deflections"
-# Part of the potential in the fitted range below which a spring is left out.
-_NO_SPRING = 1e-10
 # Part of the energy of all linear coordinates below which one does not take part.
 _NO_PART = 1e-12
 
@@ -43,18 +39,28 @@ _NO_PART = 1e-12
 @read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
 class LargeDeflectionForces(Summarised):
-    """Forces of large deflections in a modal basis with m coordinates.
+    r"""Forces of large deflections in a modal basis with m coordinates x.
+
+    They have the potential
+
+    .. math::
+
+        V = p \cdot L x + \tfrac12\, p \cdot Q p, \qquad p_r = c_{i_r} c_{j_r}, \quad c = R x
+
+    beside that of the linear stiffness, and are minus its derivative [N kg^(-1/2)].
 
     Attributes
     ----------
-    group : str
-        Name of the group of nodes whose normal motions are the elongations of the springs.
-    quadratic, cubic : (n,) arrays
-        Stiffness of the springs: tension ``quadratic e^2 + cubic e^3`` [N/m^2], [N/m^3].
     coordinates : (d, m) array
-        Rows of the coordinates of the modes with large deflections.
+        R, rows of the coordinates of the modes with large deflections.
+    pairs : (P, 2) integer array
+        i and j of each product, ``P = d (d + 1) / 2``.
+    cubic : (P, m) array
+        L, coefficients of the third degree.
+    quartic : (P, P) array
+        Q, those of the fourth degree, from a symmetric tensor.
     ranges : (d, 2) array
-        Least and largest value of each of them in the states that were fitted.
+        Least and largest value of each coordinate in the states that were fitted.
     largest_displacement, largest_strain : float
         Displacement up to which they were fitted [m], and the strain there.
     force_error, displacement_error, stress_error : float
@@ -67,10 +73,10 @@ class LargeDeflectionForces(Summarised):
         Number of static solutions that were fitted.
     """
 
-    group: str
-    quadratic: Array
-    cubic: Array
     coordinates: Array
+    pairs: Integers
+    cubic: Array
+    quartic: Array
     ranges: Array
     largest_displacement: float
     largest_strain: float
@@ -90,15 +96,11 @@ class LargeDeflectionForces(Summarised):
             ("error of displacements", f"{100.0 * self.displacement_error:.2g} %"),
             ("error of stresses", f"{100.0 * self.stress_error:.2g} %"),
             ("error beside another load", f"{100.0 * self.other_load_error:.2g} %"),
-            ("springs", f"{len(self.quadratic)}"),
         ]
 
-    @property
-    def law(self) -> BilateralPolynomial:
-        """Normal law of the nodes."""
-        return BilateralPolynomial(
-            stiffness=0.0, quadratic_stiffness=tuple(self.quadratic.tolist()),
-            cubic_stiffness=tuple(self.cubic.tolist()))
+    def in_modes(self, modes: Array) -> "LargeDeflectionForces":
+        """The same forces in other coordinates z, of which x = ``modes`` (m, k) z."""
+        return replace(self, coordinates=self.coordinates @ modes, cubic=self.cubic @ modes)
 
     def reach(self, coordinates: Array) -> float:
         """Largest coordinate in states (N, m), by the end of its fitted range, which is 1."""
@@ -139,9 +141,9 @@ def nonlinear_stress(fitted: CondensedBody, response: Array, stress: Array) -> N
 
 
 def large_deflection_forces(
-    fitted: CondensedBody, response: Array, w: Array, largest: Array, size: float
-) -> tuple[LargeDeflectionForces, Array]:
-    """Forces in a basis with the frequencies w (m,), and rows (n, m) of their springs.
+    fitted: CondensedBody, response: Array, w: Array, size: float
+) -> LargeDeflectionForces:
+    """Forces in a basis with the frequencies w (m,).
 
     Parameters
     ----------
@@ -151,85 +153,24 @@ def large_deflection_forces(
         Static response, see :func:`static_response`.
     w : (m,) array
         Angular frequencies [rad/s].
-    largest : (d,) array
-        Largest displacement of each mode's shape, which makes its coordinate one in metres.
     size : float
         Displacement up to which the forces were fitted [m].
     """
     modes, d, m = fitted.modes, len(fitted.modes), len(w)
-    reach = np.abs(fitted.ranges).max(axis=1)
     stiff = w[:, None, None] ** 2 * response
     quartic = fitted.quartic + 4.0 * _symmetric(
         0.125 * np.einsum("kij,kln->ijln", response, stiff))
-    rows, law = polynomial_stiffness(
-        scaled(fitted.cubic, 1.0 / largest), scaled(quartic, 1.0 / largest))
-    own = np.zeros((d, m))
-    own[np.arange(d), modes] = largest
-    springs = [(row, second, third) for row, second, third in zip(
-        rows[:, 1] @ own, np.asarray(law.quadratic_stiffness), np.asarray(law.cubic_stiffness),
-        strict=True)]
-    for i in range(d):
-        springs += _square_times(own[i], stiff[:, i, i] / largest[i] ** 2,
-                                 response[:, i, i] * reach[i] ** 2, reach[i] * largest[i])
-    for i, j in combinations(range(d), 2):
-        pull = stiff[:, i, j] / (largest[i] * largest[j])
-        moved, far = response[:, i, j] * reach[i] * reach[j], reach[i] * largest[i]
-        springs += _product(own[i], own[j], pull, moved, far)
-    reached = _reached(springs, fitted, response, reach)
-    kept = [one for one, size_of in zip(springs, reached, strict=True)
-            if size_of > _NO_SPRING * max(reached)]
-    found = LargeDeflectionForces(
-        GROUP, np.array([one[1] for one in kept]), np.array([one[2] for one in kept]),
-        np.eye(m)[modes], fitted.ranges, size, fitted.largest_strain, fitted.force_error,
+    pairs = np.array(list(combinations_with_replacement(range(d), 2)))
+    i, j = pairs.T
+    # A product of two coordinates stands for both orders.
+    orders = np.where(i == j, 1.0, 2.0)
+    cubic = -0.5 * orders[:, None] * stiff[:, i, j].T
+    cubic[:, modes] += orders[:, None] * fitted.cubic[i, j] / 3.0
+    return LargeDeflectionForces(
+        np.eye(m)[modes], pairs, cubic,
+        0.5 * np.outer(orders, orders) * quartic[i[:, None], j[:, None], i, j],
+        fitted.ranges, size, fitted.largest_strain, fitted.force_error,
         fitted.displacement_error, fitted.stress_error, fitted.other_load_error, fitted.states)
-    return found, np.array([one[0] for one in kept])
-
-
-def _square_times(
-    row: Array, pull: Array, moved: Array, far: float
-) -> list[tuple[Array, float, float]]:
-    """Springs with the potential ``-(row . x)^2 (pull . x) / 2``.
-
-    ``s^2 z = ((s + c z)^3 - (s - c z)^3 - 2 (c z)^3) / (6 c)``, where c makes both comparable:
-    ``moved`` is a displacement x that belongs to s = ``far``.
-    """
-    c = _comparable(pull, moved, far)
-    # A spring with the potential g e^3 has the tension 3 g e^2.
-    size = -0.25 / c if c else 0.0
-    return [(row + c * pull, size, 0.0), (row - c * pull, -size, 0.0),
-            (c * pull, -2.0 * size, 0.0)] if c else []
-
-
-def _product(
-    first: Array, second: Array, pull: Array, moved: Array, far: float
-) -> list[tuple[Array, float, float]]:
-    """Springs with the potential ``-(first . x) (second . x) (pull . x)``.
-
-    ``24 a b c z = (a + b + c z)^3 - (-a + b + c z)^3 - (a - b + c z)^3 - (a + b - c z)^3``;
-    ``moved`` and ``far`` are those of :func:`_square_times`.
-    """
-    c = _comparable(pull, moved, far)
-    size = -0.125 / c if c else 0.0
-    return [(row, sign * size, 0.0) for row, sign in (
-        (first + second + c * pull, 1.0), (second - first + c * pull, -1.0),
-        (first - second + c * pull, -1.0), (first + second - c * pull, -1.0))] if c else []
-
-
-def _comparable(pull: Array, moved: Array, far: float) -> float:
-    """Factor that makes ``pull . x`` as long as ``far`` under the displacement ``moved``, or 0."""
-    along = abs(float(pull @ moved))
-    return far / along if along else 0.0
-
-
-def _reached(
-    springs: list[tuple[Array, float, float]], fitted: CondensedBody, response: Array, reach: Array
-) -> list[float]:
-    """Largest energy of each spring in the fitted range."""
-    state = 0.5 * np.abs(np.einsum("kij,i,j->k", np.abs(response), reach, reach))
-    state[fitted.modes] = reach
-    lengths = [float(np.abs(row) @ state) for row, _, _ in springs]
-    return [abs(second) * e**3 / 3.0 + 0.25 * abs(third) * e**4
-            for e, (_, second, third) in zip(lengths, springs, strict=True)]
 
 
 def _symmetric(tensor: Array) -> Array:

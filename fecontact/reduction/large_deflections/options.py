@@ -6,8 +6,8 @@ from typing import Annotated
 from fecontact.core.errors import InputError, require_not_negative, require_positive
 from fecontact.core.units import Unit
 
-# Most modes: the numbers of loads and springs grow with their third and fourth power.
-MOST = 6
+# Most modes: the numbers of loads and of coefficients grow with their third and fourth power.
+MOST = 10
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class LargeDeflections:
         arch [m]. Other modes are deflected with the same energy at most.
     modes : int or sequence of int
         Number of modes with large deflections, lowest elastic one first, or their numbers from 0,
-        rigid ones counted; six at most.
+        rigid ones counted; ten at most.
         All other coordinates of the basis stay linear beside them.
     stretching_damping : float
         Least damping ratio of the vectors that complete the modes, from zero to below 1. Without

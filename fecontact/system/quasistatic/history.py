@@ -11,6 +11,7 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.polynomial_forces import polynomial_energy
 from fecontact.system.quasistatic.given import actions_of, travel_forces
 from fecontact.system.quasistatic.path import LoadPath
 from fecontact.system.quasistatic.pose import (
@@ -23,6 +24,7 @@ from fecontact.system.quasistatic.pose import (
     Sliders,
 )
 from fecontact.system.quasistatic.rest_state import STATES, RestState, total_friction
+from fecontact.system.quasistatic.sliders import components
 
 
 @read_only_arrays
@@ -169,7 +171,7 @@ class LoadHistory(Summarised):
     @property
     def friction_forces(self) -> Array:
         """Friction forces (N, n, 1), in space (N, n, 2), against the tangents [N]."""
-        return self.slider_force.reshape(len(self), *self.sliders.limit.shape, -1).sum(axis=2)
+        return components(self.slider_force, 1).sum(axis=2)
 
     @property
     def friction_limit(self) -> Array:
@@ -227,9 +229,9 @@ class LoadHistory(Summarised):
         pulled = ((0.5 * ends - q @ arrays.drive_shapes.T) * springs * ends).sum(axis=1)
         compliance = np.where(self.sliders.rigid > 0.0, 0.0, 1.0 / np.where(
             self.sliders.stiffness > 0.0, self.sliders.stiffness, np.inf))
-        squares = (self.slider_force.reshape(len(self), *compliance.shape, -1) ** 2).sum(axis=-1)
+        squares = (components(self.slider_force, 1) ** 2).sum(axis=-1)
         friction = 0.5 * (squares * compliance).sum(axis=(1, 2))
-        return np.asarray(body + pulled + friction
+        return np.asarray(body + polynomial_energy(q, arrays) + pulled + friction
                           + self.system.stored_energy(self.node[..., PENETRATION]))
 
     @property

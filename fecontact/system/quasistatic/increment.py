@@ -34,6 +34,11 @@ from fecontact.system.nodes import (
     node_contact,
     tangent_force,
 )
+from fecontact.system.polynomial_forces import (
+    add_polynomial,
+    add_polynomial_stiffness,
+    has_polynomial,
+)
 from fecontact.system.quasistatic.pose import (
     AGAINST,
     FORCE,
@@ -214,6 +219,13 @@ def evaluate(
             size += abs(part)
         residual[i] = total
         room.before[i] = room.acting[i] = size
+    gradient, force = np.empty_like(s.polynomial_rows), np.zeros(m)
+    if has_polynomial(s):
+        add_polynomial(q, s, gradient, force)
+        for i in range(m):
+            residual[i] += force[i]
+            room.before[i] += abs(force[i])
+            room.acting[i] += abs(force[i])
     for j in range(n):
         x, across, contact = _node(j, q, moved, s)
         F, pressing = _press(j, contact, s, out)
@@ -253,6 +265,8 @@ def evaluate(
         terms += room.before[i] ** 2 / room.scale[i]
     if derive:
         room.matrix[:] = s.stiffness
+        if has_polynomial(s):
+            add_polynomial_stiffness(1.0, gradient, s, room.matrix)
         room.matrix[:] += np.dot(s.rows.reshape((n * d, m)).T, room.answers.reshape((n * d, m)))
     return np.sqrt(terms)
 

@@ -27,7 +27,7 @@ from fecontact.system.quasistatic.pose import (
     room_for,
 )
 from fecontact.system.quasistatic.rest_state import RestState
-from fecontact.system.quasistatic.sliders import require_sliders, sliders_of
+from fecontact.system.quasistatic.sliders import components, require_sliders, sliders_of
 from fecontact.system.statics.balance import Balance
 from fecontact.system.statics.equilibrium import resting
 
@@ -119,7 +119,7 @@ def _loaded(
     kept = slice(skipped, reached)
     complete = reached == len(given)
     # Vectors of sliders in space.
-    shape = (-1, *sliders.limit.shape, *([2] if system.basis.dimension == 3 else []))
+    shape = (reached - skipped, *sliders.limit.shape, *([2] if system.basis.dimension == 3 else []))
     history = LoadHistory(
         system, path, given[kept], found.q[kept], found.node[kept],
         found.force[kept].reshape(shape), found.left[kept].reshape(shape),
@@ -171,10 +171,11 @@ def _begin(system: ContactSystem, q: Array, given: Array, sliders: Sliders) -> P
 def _pose(q: Array, sliders: Sliders, left: Array, force: Array | None = None) -> Pose:
     """A pose with places of the sliders (n, e), in space (n, e, 2), and forces likewise."""
     n, e = sliders.limit.shape
-    pose = pose_for(len(q), n, e, left.size // (n * e))
-    pose.q[:], pose.left[:] = q, left.reshape(n, -1)
+    tangents = components(left).shape[-1]
+    pose = pose_for(len(q), n, e, tangents)
+    pose.q[:], pose.left[:] = q, left.reshape(n, e * tangents)
     if force is not None:
-        pose.force[:] = force.reshape(n, -1)
+        pose.force[:] = force.reshape(n, e * tangents)
     return pose
 
 
@@ -193,7 +194,7 @@ def _slope_under_preload(
     scale = np.abs(path.at_points(path.load_scale))
     preload = int(np.argmax(scale >= scale.max() * (1.0 - 1e-12)))
     slope = balance.normal(_penetration(balance.arrays, q))[1]
-    if preload == 0:
+    if preload == 0 or not len(slope):
         return slope
     stuck = np.full((len(arrays.gap), 1), max(float(np.max(slope)), float(np.mean(
         balance.face_stiffness)), 1.0))

@@ -13,10 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.core.compiled import helper, kernel
+from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Block, IntegerVector, Matrix, Vector
 from fecontact.laws.signatures import normal_at
 from fecontact.system.nodes import GroundMotion, SystemArrays, in_space, moved_across, moved_along
+from fecontact.system.polynomial_forces import (
+    add_polynomial_forces,
+    has_polynomial,
+    polynomial_potential,
+)
 from fecontact.system.quasistatic.increment import find_equilibrium
 from fecontact.system.quasistatic.pose import (
     AGAINST,
@@ -192,6 +197,18 @@ def _works(old, new, given, s, out):
             out[_TRAVEL] += _moving(j, 1, moved_across(j, travelled, second, s), old, new, s)
 
 
+@routine
+def _polynomial_work(old, new, s):
+    """Change of the potential of large deflections, and its work by the trapezoidal rule."""
+    forces = np.zeros((2, len(old)))
+    add_polynomial_forces(old, s, forces[0])
+    add_polynomial_forces(new, s, forces[1])
+    work = 0.0
+    for i in range(len(old)):
+        work -= 0.5 * (forces[0, i] + forces[1, i]) * (new[i] - old[i])
+    return polynomial_potential(new, s) - polynomial_potential(old, s), work
+
+
 @kernel
 def _measure(
     s: SystemArrays, sliders: Sliders, old: Pose, new: Pose, given: Matrix,
@@ -222,6 +239,10 @@ def _measure(
         before, after = old.node[j, PENETRATION], new.node[j, PENETRATION]
         gap += _pressed_energy(j, before, after, s) - along - across + F * lifted
         pressed += abs(F * (after - before)) + abs(along) + abs(across)
+    if has_polynomial(s):
+        kept, work = _polynomial_work(old.q, new.q, s)
+        gap += kept - work
+        pressed += abs(work)
     turnover[ERROR], turnover[TURNED] = error, turned
     turnover[GAP], turnover[PRESSED] = abs(gap), pressed
 

@@ -14,6 +14,7 @@ from fecontact.system.jacobian import jacobian
 from fecontact.system.quasistatic.given import travelling
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
+from fecontact.system.quasistatic.sliders import components
 from fecontact.system.statics.equilibrium import at_rest, follower, planar_follower
 
 # Part of the largest eigenvalue below which rounding hides rigid modes, which are double roots.
@@ -62,7 +63,7 @@ def prestressed_modes(
     tangents = system.basis.contact_T[:, : system.basis.dimension - 1]
     closed = (rest.normal_force != 0.0)[:, None] & (sliders.limit > 0.0)
     sliding = closed & rest.at_limit & (at_limit == "slip")
-    force = rest.slider_force.reshape(*sliders.limit.shape, -1)
+    force = components(rest.slider_force)
     size = np.linalg.norm(force, axis=-1, keepdims=True)
     along = np.where(sliding[..., None] & (size > 0.0), force / np.where(size > 0.0, size, 1.0),
                      0.0)

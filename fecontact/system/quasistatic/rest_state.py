@@ -17,6 +17,7 @@ from fecontact.system.quasistatic.pose import (
     PRESSING,
     Sliders,
 )
+from fecontact.system.quasistatic.sliders import components
 
 STATES = ("open", "stick", "slip")
 OPEN, STICK, SLIP = range(len(STATES))
@@ -79,7 +80,7 @@ class RestState(Summarised):
     @property
     def friction_forces(self) -> Array:
         """Friction forces (n, 1), in space (n, 2), against the tangents [N]."""
-        return self.slider_force.reshape(*self.sliders.limit.shape, -1).sum(axis=1)
+        return components(self.slider_force).sum(axis=1)
 
     @property
     def travel(self) -> float:
@@ -106,7 +107,7 @@ class RestState(Summarised):
     def at_limit(self) -> Any:
         """Whether each slider (n, e) is at its limit."""
         limit = self.sliders.limit * self.node[:, PRESSING, None]
-        size = np.linalg.norm(self.slider_force.reshape(*limit.shape, -1), axis=-1)
+        size = np.linalg.norm(components(self.slider_force), axis=-1)
         return size >= (1.0 - _AT_LIMIT) * limit
 
     @property

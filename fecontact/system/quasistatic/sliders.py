@@ -87,6 +87,14 @@ def sliders_of(
     return Sliders(stiffness, limit, rigid)
 
 
+def components(values: Array, before: int = 0) -> Array:
+    """Forces or places (..., n, e, k) of sliders along the k tangents of their nodes.
+
+    From (..., n, e) in the plane and (..., n, e, 2) in space, with so many axes ``before`` n.
+    """
+    return values if values.ndim > before + 2 else values[..., None]
+
+
 def _given(
     ratio: float, stiffness: float | Sequence[float] | None, n: int, share: Array
 ) -> Array | None:
@@ -120,4 +128,5 @@ def _penalty(system: ContactSystem, slope: Array) -> Array:
         moves = size > 1e-24 * size.max(initial=0.0)
         along = np.where(moves, (rows**2) @ np.abs(np.diag(system.arrays.stiffness)), 0.0)
         body = np.maximum(body, along / np.where(moves, size, 1.0) ** 2)
-    return _PENALTY * np.maximum(np.maximum(slope, body), 1e-6 * max(body.max(), slope.max(), 1.0))
+    return _PENALTY * np.maximum(np.maximum(slope, body), 1e-6 * max(
+        body.max(initial=0.0), slope.max(initial=0.0), 1.0))

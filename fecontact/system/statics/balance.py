@@ -9,6 +9,7 @@ from fecontact.system import kernels
 from fecontact.system.friction_memory import settled
 from fecontact.system.jacobian import jacobian
 from fecontact.system.nodes import SystemArrays
+from fecontact.system.polynomial_forces import polynomial_energy, polynomial_stiffness_at
 
 # Largest out-of-balance fraction of the load, regardless of the rounding of other forces.
 _UNBALANCED = 1e-6
@@ -19,9 +20,16 @@ _SLIDES = 3000
 
 
 class Balance:
-    """Out-of-balance modal forces of a resting or steadily sliding body."""
+    """Out-of-balance modal forces of a resting or steadily sliding body.
 
-    def __init__(self, arrays: SystemArrays, time: float, scale: float) -> None:
+    ``reach`` (D,) bounds the steps of the combinations of coordinates on which polynomial forces
+    depend, where :meth:`slide` goes down.
+    """
+
+    def __init__(
+        self, arrays: SystemArrays, time: float, scale: float, reach: Array | None = None
+    ) -> None:
+        self._reach = np.full(len(arrays.polynomial_rows), np.inf) if reach is None else reach
         self.arrays = arrays = _without_free_motion(arrays)
         self.load = arrays.constant_load
         self._time = time
@@ -178,11 +186,11 @@ class Balance:
                 if curvatures[0] >= -1e-9:
                     return q
                 # Balanced on a crest: off it.
-                q = q + self._limited(shapes[:, 0], 0.01 * longest, exactly=True)
+                q = q + self._limited(shapes[:, 0], longest, 0.01, exactly=True)
                 energy = self._energy(q, stored)
                 continue
             step = shapes @ ((shapes.T @ force) / np.maximum(np.abs(curvatures), 1e-10))
-            trial = self._pressed(q + self._limited(step, reach))
+            trial = self._pressed(q + self._limited(step, longest, reach / longest))
             found = self._energy(trial, stored)
             closer = self._size(self.force(trial, 1.0)) < self._size(force)
             if found < energy or (closer and found <= energy + 1e-13 * abs(energy)):
@@ -211,16 +219,23 @@ class Balance:
             q = q + shapes[:, stiff] @ ((shapes[:, stiff].T @ force) / curvatures[stiff])
         return q
 
-    def _limited(self, step: Array, longest: float, exactly: bool = False) -> Array:
-        """A step in which no contact node moves farther than ``longest``."""
-        moved = max(float(np.abs(self.arrays.rows[:, 0] @ step).max(initial=0.0)),
-                    float(np.abs(self.arrays.rows[:, 1] @ step).max(initial=0.0)), 1e-300)
-        return step * (longest / moved if exactly else min(1.0, longest / moved))
+    def _limited(
+        self, step: Array, longest: float, part: float, exactly: bool = False
+    ) -> Array:
+        """A step by which contact nodes move a ``part`` of ``longest``, combinations of the reach.
+
+        Or less, where it need not be ``exactly`` so.
+        """
+        turned = np.abs(self.arrays.polynomial_rows @ step) / self._reach
+        moved = np.abs(self.arrays.rows[:, :2] @ step) / longest
+        factor = part / max(float(moved.max(initial=0.0)), float(turned.max(initial=0.0)), 1e-300)
+        return step * (factor if exactly else min(1.0, factor))
 
     def _energy(self, q: Array, stored: Callable[[Array], Array]) -> float:
         state = np.empty((len(self.arrays.gap), kernels.state_columns(self.arrays)))
         kernels.contact_state(self._time, self._settled(q), self.arrays, state)
-        elastic = 0.5 * q @ self.arrays.stiffness @ q - self.load @ q
+        elastic = (0.5 * q @ self.arrays.stiffness @ q - self.load @ q
+                   + polynomial_energy(q, self.arrays))
         return float(elastic + stored(state[:, kernels.PENETRATION]))
 
     def _upright(self, q: Array) -> Array:
@@ -231,7 +246,8 @@ class Balance:
         kernels.contact_state(self._time, self._state, arrays, state)
         slope = self.normal(state[:, kernels.PENETRATION].copy())[1]
         normal = arrays.rows[:, 1]
-        return np.asarray(arrays.stiffness + (normal.T * slope) @ normal)
+        return np.asarray(arrays.stiffness + polynomial_stiffness_at(q, arrays)
+                          + (normal.T * slope) @ normal)
 
     def loose(self, q: Array) -> Array | None:
         """Direction (m,) of an unbalanced force at q without any stiffness, or None."""

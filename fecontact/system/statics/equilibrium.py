@@ -31,6 +31,8 @@ Kind = Literal["rest", "sliding"]
 
 # Longest step down the slope of waves, as a fraction of a wavelength.
 _LONGEST_SLIDE = 0.125
+# Longest step on the way to a stable state, in parts of the fitted range of large deflections.
+_PART_OF_RANGE = 0.1
 
 
 @friction_law
@@ -179,10 +181,13 @@ def equilibrium_coordinates(
     slides = bool(arrays.follows_surface and ground.wavy and arrays.rows[:, ::2].any()
                   and not standing)
     upright = with_sides(arrays._replace(follows_surface=0))
-    problem = Balance(upright, time, system.penetration_scale)
+    reach = [_PART_OF_RANGE * np.abs(one.ranges).max(axis=1)
+             for one in system.basis.large_deflections]
+    problem = Balance(upright, time, system.penetration_scale,
+                      np.concatenate([np.zeros(0), *reach]))
     solution = problem.equilibrium()
-    if system.basis.springs:
-        solution = _among_springs(system, problem, solution, friction)
+    if system.basis.springs or system.basis.large_deflections:
+        solution = _that_is_stable(system, problem, solution, friction)
     if solution is None:
         raise AnalysisError(_reason(system, problem, friction))
     if not slides:
@@ -197,10 +202,10 @@ def equilibrium_coordinates(
     return found
 
 
-def _among_springs(
+def _that_is_stable(
     system: ContactSystem, problem: Balance, solution: Array | None, friction: bool
 ) -> Array | None:
-    """A stable equilibrium beside springs that may soften, whose energy is not convex."""
+    """A stable equilibrium beside springs or large deflections, whose energy is not convex."""
     if solution is not None and (friction or problem.stable(solution)):
         return solution
     # From a crest it may go down on the side on which a softening spring never holds.

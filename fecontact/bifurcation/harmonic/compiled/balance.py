@@ -168,7 +168,7 @@ class CompiledBalance:
         system = self.contact_field.system()
         return needs_friction(system.basis) or not all(
             isinstance(law, BilateralPolynomial)
-            for _, _, law in system.law_groups("normal"))
+            for nodes, _, law in system.law_groups("normal") if nodes.stop > nodes.start)
 
 
 def _contact_alone(system: SystemArrays) -> SystemArrays:

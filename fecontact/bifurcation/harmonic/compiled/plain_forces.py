@@ -5,10 +5,18 @@ motion, forces and derivatives are rows over the samples, so that laws are calle
 other and all else is done on whole rows.
 """
 
+import numpy as np
+
 from fecontact.bifurcation.harmonic.compiled.kinks import is_near, kink_change
 from fecontact.core.compiled import helper, routine
 from fecontact.laws.signatures import friction_at, ground_at, normal_at
 from fecontact.system.nodes import ground_motion
+from fecontact.system.polynomial_forces import (
+    add_polynomial,
+    add_polynomial_forces,
+    add_polynomial_stiffness,
+    has_polynomial,
+)
 
 
 @helper
@@ -91,6 +99,29 @@ def _near_kinks(j, level, h, e):
 
 
 @routine
+def _add_polynomial(derivatives, e):
+    """Add polynomial forces to ``pushes`` (m, N), and their derivatives to ``rows``."""
+    room, s = e.room, e.contact
+    m, N = e.springs.shape[1], len(e.tau)
+    x, force = np.empty(m), np.empty(m)
+    gradient, stiffness = np.empty_like(s.polynomial_rows), np.empty((m, m))
+    for n in range(N):
+        for i in range(m):
+            x[i], force[i] = room.motion[i, n], 0.0
+        if not derivatives:
+            add_polynomial_forces(x, s, force)
+        else:
+            add_polynomial(x, s, gradient, force)
+            stiffness[:] = 0.0
+            add_polynomial_stiffness(-1.0, gradient, s, stiffness)
+            for i in range(m):
+                for k in range(m):
+                    room.rows[i * m + k, n] += stiffness[i, k]
+        for i in range(m):
+            room.pushes[i, n] += force[i]
+
+
+@routine
 def plain_forces(derivatives, h, e):
     """Fill ``pushes`` (m, N) from ``motion``, and the ``rows`` of their derivatives if asked for.
 
@@ -110,6 +141,8 @@ def plain_forces(derivatives, h, e):
         for p in range(2 * m * m):
             for n in range(N):
                 rows[p, n] = 0.0
+    if has_polynomial(s):
+        _add_polynomial(derivatives, e)
     for j in range(len(s.rows)):
         _node_motion(j, e)
         level = -s.gap[j]
