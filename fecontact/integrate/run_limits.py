@@ -45,8 +45,15 @@ def work_of_jump(system: ContactSystem, before: float, after: float, y: Array) -
 
 
 def largest_motions(system: ContactSystem) -> Array:
-    """Largest motion (m,) of each mode at any point; 1 for one that moves none."""
-    largest = np.abs(system.basis.T[:, : system.basis.dimension]).max(axis=(0, 1))
+    """Largest motion (m,) of each mode at any point; 1 for one that moves none.
+
+    Coordinates of large deflections also move as far as their forces feel them.
+    """
+    basis = system.basis
+    largest = np.abs(basis.T[:, : basis.dimension]).max(axis=(0, 1))
+    for one in basis.large_deflections:
+        largest = np.maximum(largest, np.abs(
+            one.displacements(basis.angular_frequencies)).max(axis=0))
     return np.where(largest > 0.0, largest, 1.0)
 
 

@@ -191,7 +191,7 @@ def modal_basis(
     rows = np.asarray(forces.transpose(0, 2, 1) @ shapes)
     elements = body_elements(body)
     turning = None if rotation is None else modal_rotation(
-        body, system, rotation, shapes, () if condensed is None else condensed.modes)
+        body, system, rotation, shapes, None if condensed is None else condensed.modes)
     springs, _, dashpots = body.springs
     rates = springs @ shapes
     basis = ModalBasis(

@@ -1,6 +1,5 @@
 """Rotation of a body in its modes: Coriolis, centrifugal and stress terms of the reduced body."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,7 +68,7 @@ class ModalRotation:
 
 def modal_rotation(
     body: ElasticBody, system: FreeSystem, rotation: Rotation, shapes: Array,
-    deflected: Sequence[int] | Integers = (),
+    deflected: Integers | None = None,
 ) -> ModalRotation:
     """The terms of a rotation in mass-normalised shapes (d N, m) of the body at rest.
 
@@ -99,7 +98,8 @@ def modal_rotation(
         stiffening -= 0.5 * (softening + softening.T)
     if rotation.stress_stiffening:
         stressed = _stress_stiffening(body, system, force, shapes)
-        stressed[np.ix_(deflected, deflected)] = 0.0
+        if deflected is not None:
+            stressed[np.ix_(deflected, deflected)] = 0.0
         stiffening += stressed
     return ModalRotation(rotation.speed, coriolis, stiffening, load, rotation.axis,
                          (*rotation.centre, 0.0)[:3], rotation.stress_stiffening,

@@ -102,6 +102,21 @@ class LargeDeflectionForces(Summarised):
         """The same forces in other coordinates z, of which x = ``modes`` (m, k) z."""
         return replace(self, coordinates=self.coordinates @ modes, cubic=self.cubic @ modes)
 
+    def displacements(self, w: Array) -> Array:
+        """Rows (k, m) by which coordinates are displacements, as large as the fitted one [m].
+
+        Those of the modes where they reach the ends of their ranges, those of the linear
+        coordinates, of frequencies w (m,), in their static response to that.
+        """
+        R, reach = self.coordinates, np.abs(self.ranges).max(axis=1)
+        beside = self.cubic - self.cubic @ np.linalg.pinv(R) @ R
+        square = w**2
+        compliance = np.divide(1.0, square, out=np.zeros_like(square), where=square > 0.0)
+        moved = (beside**2) @ compliance * np.prod(reach[self.pairs], axis=1)
+        felt = moved > 0.0
+        return self.largest_displacement * np.vstack(
+            [R / reach[:, None], beside[felt] / moved[felt, None]])
+
     def reach(self, coordinates: Array) -> float:
         """Largest coordinate in states (N, m), by the end of its fitted range, which is 1."""
         q = coordinates @ self.coordinates.T

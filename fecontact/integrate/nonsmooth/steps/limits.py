@@ -3,7 +3,7 @@
 import numpy as np
 
 from fecontact.core.types import Array
-from fecontact.integrate.run_limits import longest_step
+from fecontact.integrate.run_limits import largest_motions, longest_step
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.loads import work_of_loads
 from fecontact.system.powers import POWER_COUNT
@@ -42,8 +42,7 @@ def floor_of(system: ContactSystem, state: Array, times: Array, longest: float) 
     """Values (2 m + p + n,) below which the error is not measured relative to the state."""
     m, n = system.basis.modes, system.basis.contact_nodes
     arrays, drive = system.arrays, system.drive
-    largest = np.abs(system.basis.T[:, : system.basis.dimension]).max(axis=(0, 1))
-    largest = np.where(largest > 0.0, largest, 1.0)
+    largest = largest_motions(system)
     depth = system.penetration_scale
     fastest = system.prescribed_motion.largest_speed(float(times[0]), float(times[-1]))
     speed = max(0.01 * fastest,
