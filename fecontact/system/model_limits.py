@@ -456,7 +456,8 @@ def named_motion(basis: ModalBasis, direction: Array) -> tuple[str, str]:
     """Moving body and kind of motion along modal coordinates (m,): 'the body', 'a rotation'."""
     d = basis.dimension
     if not basis.parts:
-        largest = np.abs(basis.contact_T @ direction).max(axis=0)
+        rows = basis.contact_T if basis.contact_nodes else basis.T
+        largest = np.abs(rows @ direction).max(axis=0)
         size = np.ptp(basis.positions[np.abs(basis.T).any(axis=(1, 2))], axis=0).max()
         named = _named(largest[:d], float(largest[d:].max()) * size)
         if len(named) > 1:
