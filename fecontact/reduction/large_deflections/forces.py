@@ -99,7 +99,7 @@ class LargeDeflectionForces(Summarised):
         ]
 
     def in_modes(self, modes: Array) -> "LargeDeflectionForces":
-        """The same forces in other coordinates z, of which x = ``modes`` (m, k) z."""
+        """Return the forces in other coordinates z, of which x = ``modes`` (m, k) z."""
         return replace(self, coordinates=self.coordinates @ modes, cubic=self.cubic @ modes)
 
     def displacements(self, w: Array) -> Array:
