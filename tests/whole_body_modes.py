@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from fecontact.fem.equations import least_squares
+from fecontact.fem.elimination import least_squares
 from fecontact.fem.finite_strain import FiniteStrainModel
 
 

@@ -38,7 +38,8 @@ from fecontact.fem.constraints import (
     reference_points,
 )
 from fecontact.fem.elements.cell_kinds import numbered_rows
-from fecontact.fem.equations import Elimination, eliminated
+from fecontact.fem.elimination import Elimination, eliminated
+from fecontact.fem.equations import Unknowns
 from fecontact.fem.incompatible_modes import in_parts, reductions
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
 from fecontact.fem.mesh import Bricks, Mesh
@@ -436,14 +437,14 @@ class ElasticBody(Summarised):
         """All degrees of freedom from the free ones, sparse (d N, f).
 
         Supports and constraints are eliminated; see
-        :attr:`fecontact.fem.equations.Elimination.expansion`.
+        :attr:`fecontact.fem.elimination.Elimination.expansion`.
         """
         return self.elimination.expansion
 
     @cached_property
     def elimination(self) -> Elimination:
         """Supports and constraints, substituted into each other."""
-        return eliminated(self)
+        return eliminated(Unknowns(self))
 
     @property
     def added(self) -> Sequence[Attachment]:

@@ -34,7 +34,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.fem.assembly import pattern
 from fecontact.fem.cell_gradients import cell_gradients
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.equations import selects
+from fecontact.fem.elimination import selects
 from fecontact.fem.fields import stress_of
 from fecontact.fem.finite_rotations import FiniteRotations
 from fecontact.fem.incompatible_modes import bubble_gradients

@@ -13,8 +13,9 @@ from fecontact.core.errors import AnalysisError, InputError, ModelWarning, choic
 from fecontact.core.records import Block, IntegerMatrix, IntegerVector, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.equations import least_squares, selects
+from fecontact.fem.elimination import least_squares, selects
 from fecontact.reduction.solid_motions import allowed_motions, solid_strain_energies
+from fecontact.reduction.solvers.block_rows import BlockRows
 from fecontact.reduction.solvers.congruence import Congruence, as_matrix, largest_column_sum
 from fecontact.reduction.solvers.factorisation import SINGULAR, Factors, factorised
 from fecontact.reduction.solvers.solid_solver import Eigensolver, SolidSolver, suited
@@ -216,15 +217,18 @@ def _congruences(body: ElasticBody) -> tuple[Congruence, Congruence]:
     """Stiffness and mass of a constrained solid, not formed."""
     E, (rows, k, _) = body.expansion, body.springs
     blocks = body.stiffness_blocks
+    by_rows = [BlockRows.of(one) for one in (blocks, body.component_mass)]
+
+    def product(which: int, u: Array) -> Array:
+        whole = np.ascontiguousarray(u).reshape(len(body.nodes), 3, -1)
+        return np.asarray(by_rows[which].product(whole)).reshape(u.shape)
 
     def stiffness(u: Array) -> Array:
-        pushed = np.asarray(blocks @ u)
+        pushed = product(0, u)
         return pushed + rows.T @ (k[:, None] * (rows @ u)) if len(k) else pushed
 
     def mass(u: Array) -> Array:
-        if body.added:
-            return np.asarray(body.mass @ u)
-        return np.asarray(body.component_mass @ u.reshape(len(u) // 3, -1)).reshape(u.shape)
+        return np.asarray(body.mass @ u) if body.added else product(1, u)
 
     return (Congruence(E, stiffness, lambda: body.stiffness if len(k) else blocks),
             Congruence(E, mass, lambda: body.mass))

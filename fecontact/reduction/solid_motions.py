@@ -16,7 +16,7 @@ from fecontact.core.records import (
 from fecontact.core.types import Array
 from fecontact.fem.cell_gradients import cell_gradients
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.equations import least_squares
+from fecontact.fem.elimination import least_squares
 from fecontact.fem.incompatible_modes import in_parts, reductions
 
 # Motions of supports, relative to that of the body, that count as none.

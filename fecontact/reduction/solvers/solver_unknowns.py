@@ -18,7 +18,7 @@ import numpy as np
 
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.equations import selects
+from fecontact.fem.elimination import selects
 
 # Largest number of equations R, and of angles and motions of points.
 _EQUATIONS = 400
