@@ -20,8 +20,7 @@ from .output.plots.many_runs import plot_basins, plot_poincare_scan, plot_runs
 from .output.plots.modes import plot_buckling, plot_convergence, plot_modes, plot_wheel
 from .output.plots.phase_space import plot_phase_space
 from .output.plots.preload import plot_loop, plot_shear
-from .output.plots.responses.nonlinear_modes import plot_nonlinear_mode, plot_resonance_curve
-from .output.plots.responses.response import plot_response
+from .output.plots.responses import plot_nonlinear_mode, plot_resonance_curve, plot_response
 from .output.plots.run import plot_energies, plot_history, plot_phase
 from .output.plots.stability import plot_eigenvalues, plot_stability_map
 from .output.plots.wear import plot_wear

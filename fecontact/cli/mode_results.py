@@ -112,7 +112,7 @@ def write_mode_results(
     """Write a nonlinear mode as HDF5, CSV, picture and page; returns the files."""
     from fecontact.core.files.atomic_write import write_text
     from fecontact.output.files.branches import write_mode
-    from fecontact.output.plots.responses.nonlinear_modes import plot_nonlinear_mode
+    from fecontact.output.plots.responses import plot_nonlinear_mode
     from fecontact.output.report.mode_report import report_modes
     from fecontact.study.study import with_given_keys
 

@@ -213,8 +213,7 @@ def plotted(file: Path, kind: str, target: Path) -> Path:
     """Draw branches, amplitude and phase of a response, or frequency and damping of a mode."""
     from fecontact.output.files.branches import read_branches, read_mode, read_response
     from fecontact.output.plots.bifurcation_diagram import plot_branches
-    from fecontact.output.plots.responses.nonlinear_modes import plot_nonlinear_mode
-    from fecontact.output.plots.responses.response import plot_response
+    from fecontact.output.plots.responses import plot_nonlinear_mode, plot_response
 
     if kind == "response":
         plot_response(read_response(file), path=target)

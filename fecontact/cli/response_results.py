@@ -45,7 +45,7 @@ def write_response_results(
     The wave of a wheel has no page. Points above the frequency up to which the basis is usable are
     marked.
     """
-    from fecontact.output.plots.responses.response import plot_response
+    from fecontact.output.plots.responses import plot_response
     from fecontact.output.report.response_report import report_response
     from fecontact.study.study import with_given_keys
 

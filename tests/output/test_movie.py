@@ -158,7 +158,7 @@ def test_colours_of_stresses_end_below_a_sharp_peak():
     drawn = Overlay(sharp, 960, 540)
     object.__setattr__(drawn, "colour_scale", lambda _, *what: said.append(what))
     assert drawn._footer.shape == (68, 960, 3)
-    (label, top, _, beyond), = said
+    (label, top, _, beyond, _), = said
     unit = {"kPa": 1e3, "MPa": 1e6}[label[label.index("[") + 1 : label.index("]")]]
     assert top * unit == pytest.approx(sharp.largest_colour)
     assert label.endswith(f", peak {sharp.peak / unit:.3g}")

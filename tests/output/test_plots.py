@@ -106,9 +106,9 @@ def test_words_of_a_stress_stay_within_the_figure():
 
 
 def test_slip_and_friction_have_colours_of_their_own():
-    from fecontact.output.render.force_chart import _totals
+    from fecontact.output.diagrams.runs import forces_on_body_diagram
 
-    lines = _totals(run(times=21), slice(None))
+    lines = forces_on_body_diagram(run(times=21)).curves
     assert {line.name: line.colour for line in lines}["friction on the body, +x"] not in (
         STATE_COLOURS.values())
 

@@ -20,6 +20,7 @@ from fecontact.cli.tables import preload_table, run_table, wear_table
 from fecontact.integrate import WearHistory
 from fecontact.io import export_pvd, to_xarray
 from fecontact.laws import EnergyWear, SlidingRotation, SlidingTranslation
+from fecontact.output.diagrams.runs import forces_on_body_diagram
 from fecontact.output.files import export
 from fecontact.output.files.frames import (
     body_numbers,
@@ -180,9 +181,7 @@ def test_the_legend_names_what_slides(trajectory):
 
 
 def test_the_chart_sums_the_forces_of_each_interface(trajectory):
-    from fecontact.output.render.force_chart import _totals
-
-    lines = {line.name: line.values for line in _totals(trajectory, slice(None))}
+    lines = {line.name: line.y for line in forces_on_body_diagram(trajectory).curves}
     assert list(lines) == ["shoe: normal", "shoe: friction", "foot: normal", "foot: friction"]
     np.testing.assert_allclose(lines["shoe: normal"], trajectory.normal_force[:, :8].sum(axis=1))
     np.testing.assert_allclose(lines["foot: friction"],

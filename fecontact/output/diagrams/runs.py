@@ -83,6 +83,37 @@ def force_diagrams(run: Trajectory) -> list[Diagram]:
                              for k, way in enumerate(ways))]
 
 
+def forces_on_body_diagram(run: Trajectory, width: float = WIDTH) -> Diagram:
+    """Sums of the normal forces and of the friction on the body over time, in one diagram.
+
+    Friction is along +x in the plane and along x and y in space. Of several bodies each interface
+    has its sums along its normals and tangents, in space the size of its friction.
+    """
+    basis, normal = run.system.basis, run.normal_force
+    faces, space = contact_faces(basis), basis.dimension == 3
+    along = (-np.einsum("fnk,nkd->fnd", run.friction_forces, basis.tangents) if space
+             else -run.friction_forces)
+    curves: list[Curve] = []
+    if not faces[0].name:
+        curves.append(Curve("normal" if space else "normal force", "", run.time,
+                            normal.sum(axis=1), width))
+        named = (("friction x", COLOURS[0]), ("friction y", COLOURS[1])) if space else (
+            ("friction on the body, +x", COLOURS[3]),)
+        curves += [Curve(name, colour, run.time, along[:, :, axis].sum(axis=1), width)
+                   for axis, (name, colour) in enumerate(named) if along[:, :, axis].any()]
+        return _over_time(run, "total [N]", tuple(curves))
+    for face, colour in zip(faces, distinct_colours(len(faces)), strict=True):
+        curves.append(Curve(f"{face.name}: normal", colour, run.time,
+                            normal[:, face.nodes].sum(axis=1), width))
+        total = along[:, face.nodes].sum(axis=1)
+        if along[:, face.nodes].any():
+            curves.append(Curve(
+                f"{face.name}: friction", colour, run.time,
+                np.linalg.norm(total, axis=1) if space else total[:, 0], width,
+                stable=np.zeros(len(run.time) - 1, dtype=bool)))
+    return _over_time(run, "total [N]", tuple(curves))
+
+
 def energy_diagrams(run: Trajectory) -> list[Diagram]:
     """Stored energy, work put in and energy lost, each with its terms and total.
 

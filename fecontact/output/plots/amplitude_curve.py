@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecontact.core.checks import as_several
-from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.measured.amplitude_curve import AmplitudeCurve
 from fecontact.output.diagrams.colours import distinct_colours
 from fecontact.output.diagrams.diagram import WIDTH, Curve, Diagram
 from fecontact.output.plots.drawing import draw_stacked
 from fecontact.output.plots.figure import new_figure
+from fecontact.output.plots.responses import named_curves
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -45,18 +44,11 @@ def plot_amplitude_curve(
         Without curves, for amplitudes in different units, another number of names, another suffix,
         or a file that cannot be written.
     """
-    given = as_several(curves, AmplitudeCurve, "plot_amplitude_curve", "curves")
-    if not given:
-        raise InputError("plot_amplitude_curve: there are no curves; give at least one.")
-    if len(units := {curve.unit for curve in given}) > 1:
-        raise InputError(f"plot_amplitude_curve: the amplitudes are in {', '.join(sorted(units))}; "
-                         f"give curves in one unit.")
-    if names and len(names) != len(given):
-        raise InputError(f"plot_amplitude_curve: {len(names)} names do not go with {len(given)} "
-                         f"curves; give one for each.")
+    given, labels = named_curves("plot_amplitude_curve", AmplitudeCurve, {"curves": curves}, names,
+                                 "unit", "have amplitudes in {}; give curves in one unit")
     title = given[0].observed
     label = f"amplitude{f' of {title}' if title else ''} [{given[0].unit}]"
-    named, colours = list(names) or [""] * len(given), distinct_colours(len(given))
+    named, colours = labels or [""] * len(given), distinct_colours(len(given))
     frequency, damping = (
         Diagram(label, y_label, tuple(
             _curve(curve, values, deviation, name, colour)

@@ -125,9 +125,9 @@ def _draw_curve(axes: "Axes", curve: Curve) -> None:
     else:
         for first, last in runs_of(curve.stable):
             solid = bool(curve.stable[first])
-            axes.plot(curve.x[first : last + 1], curve.y[first : last + 1],
-                      linewidth=curve.width if solid else WIDTH, linestyle="-" if solid else DASHES,
-                      **shown)
+            axes.plot(*thinned(curve.x[first : last + 1], curve.y[first : last + 1]),
+                      linewidth=curve.width if solid else min(curve.width, WIDTH),
+                      linestyle="-" if solid else DASHES, **shown)
 
 
 def runs_of(stable: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -29,7 +29,8 @@ Colour = Literal["displacement", "von_mises"]
 
 COLOURS = {"displacement": ("displacement", "m"), "von_mises": ("von Mises stress", "Pa")}
 
-_VISIBLE = 0.08  # largest motion drawn, as a part of the body's extent
+_VISIBLE = 0.1  # largest motion drawn, as a part of the body's extent
+_ROUND_OFF = 1e-12  # of the extent, below which a motion is not magnified
 _LABEL_ROOM = 0.1  # of the extent of all bodies, from a body's name to the nearest contact node
 
 
@@ -73,6 +74,11 @@ def body_labels(basis: ModalBasis) -> tuple[tuple[str, int], ...]:
         deep = deep[reach >= reach.max() * (1.0 - 1e-6)]
         found.append((part.name, first + int(deep[np.argmin(centre[deep])])))
     return tuple(found)
+
+
+def visible_scale(extent: float, size: float) -> float:
+    """A round factor of at least one that makes a motion well visible on bodies of an extent."""
+    return max(1.0, round_125(_VISIBLE * extent / size)) if size > _ROUND_OFF * extent else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,10 +190,13 @@ class Motion:
         if self.given_scale is not None:
             return float(self.given_scale)
         extent = float(np.linalg.norm(np.ptp(self.mode_shapes.nodes, axis=0)))
-        gap = self.gap
+        return visible_scale(extent, max(self._largest["shape"], self.still_size))
+
+    @property
+    def still_size(self) -> float:
+        """Size of what is magnified beside the bodies: waves of the ground and the gap [m]."""
         low, high = self.trajectory.system.ground.height_range if self.has_ground else (0.0, 0.0)
-        size = max(self._largest["shape"], 0.5 * (high - low), gap)
-        return max(1.0, round_125(1.25 * _VISIBLE * extent / size)) if size > 0.0 else 1.0
+        return max(0.5 * (high - low), self.gap)
 
     @cached_property
     def largest_colour(self) -> float:

@@ -187,26 +187,31 @@ class Overlay(Strips):
         self._legend(figure)
         return pixels(canvas)
 
-    def _colour_scale(self, figure: Any) -> None:
+    def _states(self, figure: Any, marker: str, left: float, apart: float) -> None:
+        """Draw the contact states with their colours into the lower strip."""
+        from matplotlib.lines import Line2D
+
+        for number, name in enumerate(self.motion.state_names):
+            x = left + number * apart
+            figure.add_artist(Line2D([x], [0.80], marker=marker, markersize=8.5 * self.size,
+                                     markerfacecolor=NODE_COLOURS[name], markeredgecolor=DARK,
+                                     markeredgewidth=0.8 * self.size, linestyle=""))
+            self._text(figure, x + 0.013, 0.80, name)
+
+    def _colour_scale(self, figure: Any, span: tuple[float, float] = (0.03, 0.42)) -> None:
         name, unit = COLOURS[self.motion.colour]
         largest = self.motion.largest_colour or 1.0
         factor, symbol = suitable_unit(largest, unit)
         beyond = self.motion.peak > largest
         label = f"{name} [{symbol}]" + (f", peak {self.motion.peak / factor:.3g}" if beyond else "")
-        self.colour_scale(figure, label, largest / factor, COLOUR_MAPS[self.motion.colour], beyond)
+        self.colour_scale(figure, label, largest / factor, COLOUR_MAPS[self.motion.colour], beyond,
+                          span)
 
     def _legend(self, figure: Any) -> None:
-        from matplotlib.lines import Line2D
         from matplotlib.patches import FancyArrow
 
         self._text(figure, 0.49, 0.80, "contact nodes")
-        x = 0.64
-        for name in self.motion.state_names:
-            figure.add_artist(Line2D([x], [0.80], marker="o", markersize=8.5 * self.size,
-                                     markerfacecolor=NODE_COLOURS[name], markeredgecolor=DARK,
-                                     markeredgewidth=0.8 * self.size, linestyle=""))
-            self._text(figure, x + 0.013, 0.80, name)
-            x += 0.09
+        self._states(figure, "o", 0.64, 0.09)
         force = self.motion.largest_force
         self._text(figure, 0.49, 0.34,
                    "contact force" if self.motion.labels else "force on body")

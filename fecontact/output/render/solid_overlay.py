@@ -1,7 +1,6 @@
 """The whole picture of solids: scene, maps of the contact faces, forces over time, legends."""
 
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +9,8 @@ from fecontact.core.units import quantity, suitable_unit
 from fecontact.output.render.canvas import canvas_of
 from fecontact.output.render.face_maps import PRESSURE_MAP, FaceMaps
 from fecontact.output.render.force_chart import ForceChart
-from fecontact.output.render.frames_data import COLOURS
 from fecontact.output.render.overlay import FONT, Overlay, pixels
 from fecontact.output.render.pixels import DARK, blend, label_image
-from fecontact.output.render.scene import COLOUR_MAPS, NODE_COLOURS
 from fecontact.output.render.solid_motion import SolidMotion, motion_words
 
 Image = NDArray[np.uint8]
@@ -76,34 +73,19 @@ class SolidOverlay(Overlay):
     @cached_property
     def _footer(self) -> Image:
         figure, canvas = canvas_of(self.width, self.footer_height)
-        name, unit = COLOURS[self.motion.colour]
-        largest, peak = self.motion.largest_colour or 1.0, self.motion.peak
-        factor, symbol = suitable_unit(largest, unit)
-        beyond = f", peak {peak / factor:.3g}" if peak > largest else ""
-        self.colour_scale(figure, f"{name} [{symbol}]{beyond}", largest / factor,
-                          COLOUR_MAPS[self.motion.colour], bool(beyond), (0.03, 0.25))
+        self._colour_scale(figure, (0.03, 0.25))
         top = self.motion.largest_pressure
         factor, symbol = suitable_unit(top, "Pa")
         self.colour_scale(figure, f"contact pressure [{symbol}]", top / factor or 1.0,
                           PRESSURE_MAP, False, (0.33, 0.25))
-        self._states(figure)
-        return pixels(canvas)
-
-    def _states(self, figure: Any) -> None:
-        from matplotlib.lines import Line2D
-        from matplotlib.patches import FancyArrow
-
-        x = 0.635
-        for name in self.motion.state_names:
-            figure.add_artist(Line2D([x], [0.80], marker="s", markersize=8.5 * self.size,
-                                     markerfacecolor=NODE_COLOURS[name], markeredgecolor=DARK,
-                                     markeredgewidth=0.8 * self.size, linestyle=""))
-            self._text(figure, x + 0.013, 0.80, name)
-            x += 0.085
+        self._states(figure, "s", 0.635, 0.085)
         force = self.motion.largest_friction
         if force > 0.0:
+            from matplotlib.patches import FancyArrow
+
             figure.add_artist(FancyArrow(
                 0.628, 0.34, 0.03, 0.0, width=0.06, head_width=0.22, head_length=0.012,
                 length_includes_head=True, facecolor="white", edgecolor=DARK,
                 linewidth=0.6 * self.size))
             self._text(figure, 0.665, 0.34, f"friction up to {quantity(force, 'N')}")
+        return pixels(canvas)

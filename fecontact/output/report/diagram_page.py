@@ -12,10 +12,11 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
-from fecontact.core.units import UNITS, count, round_125, suitable_unit
+from fecontact.core.units import UNITS, count, suitable_unit
 from fecontact.output.diagrams.colours import distinct_colours
 from fecontact.output.diagrams.diagram import Diagram
 from fecontact.output.files.stored_system import library_versions
+from fecontact.output.render.frames_data import visible_scale
 from fecontact.output.report.bodies import Motions, bodies_table
 from fecontact.output.report.charts import diagram_table
 from fecontact.output.report.drawing import drawn_bodies
@@ -30,7 +31,6 @@ _ORBITS = 240  # of all branches together
 _ORBITS_RUN = 60  # by shooting, which are run again
 _STEP = 1e-4  # of motions, of their largest value
 _HEIGHTS = {1: (440,), 2: (330, 190)}  # of diagrams above each other [pixels]
-_VISIBLE = 0.1  # largest motion drawn, as a part of the bodies' extent
 
 Motion = tuple[float, Array]  # period [s], and states (SAMPLES, d) at equal distances in time
 
@@ -98,8 +98,7 @@ def write_diagrams(
     if shown.basis.mode_shapes is not None:
         q = shown.basis.mode_shapes.stress_coordinates(q)
         seen = Motions(drawn_bodies(shown.basis), q)
-        largest = seen.largest_displacement
-        scale = max(1.0, round_125(_VISIBLE * seen.bodies.extent / largest)) if largest else 1.0
+        scale = visible_scale(seen.bodies.extent, seen.largest_displacement)
         header |= {"bodies": bodies_table(seen, payload), "scale": scale, "maps": colour_maps(),
                    "box": seen.box(scale)}
         if shown.alike:
@@ -110,10 +109,8 @@ def write_diagrams(
 
 def _scales(seen: Motions, count: int) -> list[float]:
     """Factor of each of the motions, with which its largest is as well visible."""
-    found = [Motions(seen.bodies, q).largest_displacement
-             for q in np.split(seen.coordinates, count)]
-    return [max(1.0, round_125(_VISIBLE * seen.bodies.extent / one)) if one else 1.0
-            for one in found]
+    return [visible_scale(seen.bodies.extent, Motions(seen.bodies, q).largest_displacement)
+            for q in np.split(seen.coordinates, count)]
 
 
 def _status(named: Mapping[str, Branch]) -> str:

@@ -15,11 +15,11 @@ from fecontact.analysis.sampling import alias_message
 from fecontact.core.checks import as_path, require_kind, require_scale
 from fecontact.core.errors import InputError
 from fecontact.core.tables import parsed
-from fecontact.core.units import UNITS, quantity, round_125
+from fecontact.core.units import UNITS, quantity
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.files.frames import LARGEST_DRAWN, drawable
 from fecontact.output.files.stored_system import library_versions
-from fecontact.output.render.frames_data import Motion
+from fecontact.output.render.frames_data import Motion, visible_scale
 from fecontact.output.render.scene import COLOUR_MAPS
 from fecontact.output.report.bodies import PRESSURE, STATE, Motions, bodies_table
 from fecontact.output.report.charts import chart_tables, energy_charts, spectrum_tables
@@ -37,7 +37,6 @@ from fecontact.output.report.page import write_page
 from fecontact.output.report.payload import Payload
 
 _SHADES = 64  # of a colour map
-_VISIBLE = 0.1  # largest motion drawn, as a part of the bodies' extent
 _PAINTS = {"von_mises": "von Mises stress"}
 # Sections of a study that do not change the motion.
 _NOT_OF_RUNS = ("branch", "response", "sweep", "wear", "preload", "render", "output")
@@ -148,7 +147,8 @@ def run_block(
         assert shapes is not None
         motions = Motions(drawn_bodies(system.basis),
                           shapes.stress_coordinates(found.modal_coordinates), drift_rows(motion))
-        scale = _visible_scale(motions, motion) if scale is None else float(scale)
+        scale = float(scale or visible_scale(motions.bodies.extent, max(
+            motions.largest_magnified, motion.still_size)))
         box = motions.box(scale)
         header |= moving_tables(motions, scale, box, drawn_ground(motion, box), payload)
         if "owners" in header["bodies"]:
@@ -167,13 +167,6 @@ def moving_tables(
         "ground": None if ground is None else ground_table(ground, payload),
         "scale": scale, "box": box,
     }
-
-
-def _visible_scale(motions: Motions, motion: Motion) -> float:
-    """A round factor of at least one that makes the largest motion well visible."""
-    low, high = motion.trajectory.system.ground.height_range if motion.has_ground else (0.0, 0.0)
-    size = max(motions.largest_magnified, 0.5 * (high - low), motion.gap)
-    return max(1.0, round_125(_VISIBLE * motions.bodies.extent / size)) if size > 0.0 else 1.0
 
 
 def study_tables(study: str | None, *also: str) -> list[dict[str, Any]]:
