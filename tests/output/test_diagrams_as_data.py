@@ -1,0 +1,92 @@
+"""One diagram gives a picture and a part of a page with the same numbers."""
+
+import numpy as np
+import pytest
+
+from fecontact.output.diagrams.diagram import Band, Curve, Diagram, Level, Mark
+from fecontact.output.diagrams.labels import in_unit
+from fecontact.output.plots.drawing import draw, legend_entries
+from fecontact.output.plots.figure import new_figure
+from fecontact.output.report.charts import diagram_table
+from fecontact.output.report.payload import Payload, stored_array, unpacked
+
+X = np.geomspace(1e-6, 4e-4, 41)
+STABLE = np.arange(40) < 25
+DIAGRAM = Diagram(
+    "amplitude [m]", "force [N]",
+    (Curve("one", "#0072b2", X, 3e4 * X**0.5, 1.8, stable=STABLE),
+     Curve("two", "", X, 5e4 * X, 0.0, 3.0)),
+    marks=(Mark("fold", float(X[25]), float(3e4 * X[25] ** 0.5), "F"),),
+    bands=(Band("beyond", 1e-4, 4e-4),), levels=(Level(200.0, name="limit", dashed=True),),
+    heading="force", logarithmic="x", y_limits=(0.0, None))
+
+
+def table_of(diagram, **how):
+    payload = Payload()
+    return unpacked(payload.block({"one": diagram_table(diagram, payload, **how)}))
+
+
+def test_the_picture_has_the_values_in_si_units():
+    with new_figure(5.0, 4.0) as figure:
+        axes = figure.subplots()
+        draw(axes, DIAGRAM)
+        figure.draw_without_rendering()
+    solid, dashed, dots, mark, level = axes.lines
+    np.testing.assert_array_equal(np.append(solid.get_xdata(), dashed.get_xdata()[1:]), X)
+    assert (solid.is_dashed(), dashed.is_dashed()) == (False, True)
+    np.testing.assert_array_equal(dots.get_ydata(), 5e4 * X)
+    assert (mark.get_xdata()[0], mark.get_marker()) == (X[25], "s")
+    assert level.get_ydata()[0] == 200.0
+    assert (axes.get_xscale(), axes.get_xlabel(), axes.get_ylabel()) == (
+        "log", "amplitude [µm]", "force [N]")
+    assert axes.get_ylim()[0] == 0.0
+    ticks = dict(zip(axes.get_xticks(), (one.get_text() for one in axes.get_xticklabels()),
+                     strict=True))
+    assert {f"{place:.0e}": text for place, text in ticks.items()}["1e-05"] == "10"
+    assert [one.get_label() for one in legend_entries([DIAGRAM])] == [
+        "force", "one", "two", "stable", "unstable", "fold (F)", "beyond"]
+
+
+def test_the_page_has_the_same_values_in_its_units():
+    header, contents = table_of(DIAGRAM)
+    table = header["one"]
+    assert (table["title"], table["unit"], table["xLabel"], table["log"]) == (
+        "force", "N", "amplitude [µm]", "x")
+    for line, curve in zip(table["lines"], DIAGRAM.curves, strict=True):
+        x, y = (stored_array(line[name], contents) for name in "xy")
+        assert 1e-6 * 10.0**x == pytest.approx(curve.x, rel=1e-5)
+        assert table["factor"] * y == pytest.approx(curve.y, abs=1e-5 * curve.y.max())
+    assert [line["name"] for line in table["lines"]] == ["force one", "force two"]
+    assert (stored_array(table["lines"][0]["stable"], contents) == STABLE).all()
+    (x, y, letters), = table["marks"]
+    assert (1e-6 * 10.0**x, y, letters) == (
+        pytest.approx(X[25]), pytest.approx(3e4 * X[25] ** 0.5), "F")
+    assert table["limits"] == {"y": [0.0, None]}
+
+
+def test_curves_over_the_time_of_a_page_have_no_abscissae_of_their_own():
+    time = np.linspace(0.0, 1.0, 21)
+    header, contents = table_of(Diagram("time [s]", "gap [m]", (
+        Curve("a", "", time, 1e-5 * time),), x_limits=(0.0, 1.0)), over_time=True)
+    line, = header["one"]["lines"]
+    assert "x" not in line
+    assert header["one"]["limits"] == {}
+    assert header["one"]["factor"] * stored_array(line["y"], contents) == pytest.approx(
+        1e-5 * time, abs=1e-9)
+
+
+def test_round_off_about_a_constant_is_not_magnified():
+    values = 14.0 + 1e-12 * np.sin(np.arange(30.0))
+    flat = Diagram("time [s]", "force [N]", (Curve("", "", np.arange(30.0), values),))
+    assert flat.flat_range == pytest.approx((13.3, 14.7))
+    bent = Diagram("time [s]", "force [N]", (Curve("", "", np.arange(30.0), 1e6 * values),
+                                             Curve("", "", np.arange(30.0), 0.0 * values)))
+    assert bent.flat_range is None
+
+
+@pytest.mark.parametrize(("label", "largest", "expected"), [
+    ("speed [m/s]", 4e-3, (1e-3, "speed [mm/s]")), ("moment [N m]", 2e-3, (1e-3, "moment [mN m]")),
+    ("frequency [Hz]", 2e4, (1.0, "frequency [Hz]")), ("decay [s/m]", 3e4, (1.0, "decay [s/m]")),
+    ("ratio", 5.0, (1.0, "ratio")), ("gap [m]", np.nan, (1.0, "gap [m]"))])
+def test_units_suit_the_values(label, largest, expected):
+    assert in_unit(label, np.array([0.0, largest])) == expected
