@@ -11,6 +11,7 @@ from fecontact import ElasticBody, Material, Mesh, ModelWarning, modal_basis
 from fecontact.fem import Coupling, LinearEquation, PointMass, PointSpring, Term, Tie
 from fecontact.reduction.eigenmodes import FreeSystem, eigenmodes, free_modes
 from fecontact.reduction.solvers import multigrid
+from fecontact.reduction.static_modes import iterated_flexibility, residual_vectors
 
 STEEL = Material()
 SIDE = (0.1, 0.1, 0.1)
@@ -132,6 +133,25 @@ def test_a_modal_basis_with_contact_nodes_beside_a_tie():
                   for way in ("direct", "iterative"))
     assert other.angular_frequencies == pytest.approx(one.angular_frequencies, rel=1e-5)
     assert other.quality.compliance == pytest.approx(one.quality.compliance, rel=1e-7)
+
+
+@pytest.mark.parametrize("constrained", [False, True])
+def test_many_rows_of_bodies_with_masses_at_points(constrained, monkeypatch):
+    """Residual vectors are orthogonal in the mass with that of points, and complete the rows."""
+    monkeypatch.setattr(residual_vectors, "_LARGE", 0)
+    monkeypatch.setattr(residual_vectors, "_FEW", 8)
+    # Linear elements away from the rows, wherever they may be, would leave out the mass.
+    for name, value in (("_LAYERS", (1,)), ("_WORTH", 1.0), ("_FAR", 10.0)):
+        monkeypatch.setattr(iterated_flexibility, name, value)
+    mass = PointMass(0, 0.5)
+    found = (coupled("kinematic", attachments=[mass]) if constrained else
+             ElasticBody(block_mesh((6, 3, 3), (0.2, 0.1, 0.1)), STEEL, attachments=[mass]))
+    one, other = (modal_basis(found, 10, contact="contact", contact_nodes=12, tolerance=0.2,
+                              reduction="residual", eigensolver=way)
+                  for way in ("direct", "iterative"))
+    assert other.quality.orthogonality < 1e-9
+    assert 1.0 <= other.modes / one.modes < 1.1
+    assert other.quality.compliance[2:] == pytest.approx(one.quality.compliance[2:], rel=0.03)
 
 
 def test_two_tied_halves_that_match_have_the_modes_of_the_whole():

@@ -146,6 +146,12 @@ class SolidSolver:
             solver = replace(solver, added_mass=sp.csr_array(E.T @ mass @ E))
         return solver
 
+    @property
+    def plain(self) -> bool:
+        """True if the unknowns are all displacements, without springs and masses at points."""
+        one = None if self.unknowns is None else self.unknowns.dependence
+        return one is None and self.links is None and self.added_mass is None
+
     def modes(self, count: int, rigid: Array) -> Found:
         """The lowest elastic modes; ``rigid`` (3 N, r) are the rigid ones."""
         # Whole registers, and guard vectors for the last modes.

@@ -64,8 +64,7 @@ class TrialSpace:
         """
         whole = cls.whole(system)
         assert system.body is not None
-        if system.body.degree == 1 or whole.unknowns.dependence is not None or (
-                whole.solver.links is not None):
+        if system.body.degree == 1 or not whole.solver.plain:
             return whole
         loaded = np.flatnonzero(np.diff(rows.indptr))
         some = rows[loaded[:: -(-len(loaded) // WIDTH)]]
