@@ -37,6 +37,12 @@ def has_polynomial(s):
 
 
 @helper
+def _work_arrays(s):
+    """Rows (5, k) for c and f, p, and the slopes of :func:`_evaluate`."""
+    return np.empty((5, max(len(s.polynomial_rows), len(s.polynomial_pairs))))
+
+
+@helper
 def _project(x, rows, c):
     """Fill c (D,) with the combinations of coordinates."""
     for a in range(len(rows)):
@@ -47,106 +53,97 @@ def _project(x, rows, c):
 
 
 @helper
-def _set_slopes(x, p, L, Q, slopes):
-    """Fill slopes (2, P) with Q p and L x."""
-    for r in range(len(p)):
-        quartic, cubic = 0.0, 0.0
-        for k in range(len(p)):
-            quartic += Q[r, k] * p[k]
+def _set_slopes(x, p, s, quartic, cubic):
+    """Fill ``quartic`` (P,) with Q p and ``cubic`` (P,) with L x."""
+    L, Q = s.polynomial_cubic, s.polynomial_quartic
+    for r in range(len(Q)):
+        by_products, by_coordinates = 0.0, 0.0
+        for k in range(len(Q)):
+            by_products += Q[r, k] * p[k]
         for k in range(L.shape[1]):
-            cubic += L[r, k] * x[k]
-        slopes[0, r], slopes[1, r] = quartic, cubic
+            by_coordinates += L[r, k] * x[k]
+        quartic[r], cubic[r] = by_products, by_coordinates
 
 
 @helper
-def _add_forces(c, p, slopes, s, f, out):
+def _evaluate(x, s, c, p, quartic, cubic):
+    """Fill c (D,), the products p (P,), and Q p and L x (P,) at coordinates x (m,)."""
+    pairs = s.polynomial_pairs
+    _project(x, s.polynomial_rows, c)
+    for r in range(len(pairs)):
+        p[r] = c[pairs[r, 0]] * c[pairs[r, 1]]
+    _set_slopes(x, p, s, quartic, cubic)
+
+
+@helper
+def _add_forces(c, p, quartic, cubic, s, f, out):
     """Add to out (m,) the forces; f (D,) is a work array."""
     rows, pairs, L = s.polynomial_rows, s.polynomial_pairs, s.polynomial_cubic
-    for a in range(len(c)):
+    for a in range(len(rows)):
         f[a] = 0.0
-    for r in range(len(p)):
-        i, j, slope = pairs[r, 0], pairs[r, 1], slopes[0, r] + slopes[1, r]
+    for r in range(len(pairs)):
+        i, j, slope, part = pairs[r, 0], pairs[r, 1], quartic[r] + cubic[r], p[r]
         f[i] += slope * c[j]
         f[j] += slope * c[i]
-    for r in range(len(p)):
-        part = p[r]
         for k in range(L.shape[1]):
             out[k] -= part * L[r, k]
-    for a in range(len(c)):
+    for a in range(len(rows)):
         part = f[a]
         for k in range(rows.shape[1]):
             out[k] -= part * rows[a, k]
 
 
 @helper
-def _set_gradient(c, dc, slopes, s, gradient):
-    """Fill G (D, m): by the slopes (2, P), and by ``dc`` (D,) in the place of c with L."""
+def _set_gradient(c, quartic, cubic, s, gradient):
+    """Fill G (D, m) by Q p, L x and c, or by their changes."""
     rows, pairs, L = s.polynomial_rows, s.polynomial_pairs, s.polynomial_cubic
     for a in range(len(rows)):
         for k in range(rows.shape[1]):
             gradient[a, k] = 0.0
     for r in range(len(pairs)):
         i, j = pairs[r, 0], pairs[r, 1]
-        half = 0.5 * (3.0 * slopes[0, r] + slopes[1, r])
-        first, second = dc[i], dc[j]
+        half, first, second = 0.5 * (3.0 * quartic[r] + cubic[r]), c[i], c[j]
         for k in range(rows.shape[1]):
             gradient[i, k] += half * rows[j, k] + second * L[r, k]
             gradient[j, k] += half * rows[i, k] + first * L[r, k]
 
 
-@helper
-def _products(c, pairs, p):
-    """Fill p (P,) with the products of the combinations."""
-    for r in range(len(pairs)):
-        p[r] = c[pairs[r, 0]] * c[pairs[r, 1]]
-
-
 @routine
 def add_polynomial_forces(x, s, out):
     """Add to out (m,) the forces at coordinates x (m,)."""
-    D, P = len(s.polynomial_rows), len(s.polynomial_pairs)
-    c, p, slopes = np.empty((2, D)), np.empty(P), np.empty((2, P))
-    _project(x, s.polynomial_rows, c[0])
-    _products(c[0], s.polynomial_pairs, p)
-    _set_slopes(x, p, s.polynomial_cubic, s.polynomial_quartic, slopes)
-    _add_forces(c[0], p, slopes, s, c[1], out)
+    work = _work_arrays(s)
+    _evaluate(x, s, work[0], work[2], work[3], work[4])
+    _add_forces(work[0], work[2], work[3], work[4], s, work[1], out)
 
 
 @routine
 def add_polynomial(x, s, gradient, out):
     """Add to out (m,) the forces at coordinates x (m,), and fill their ``gradient`` G (D, m)."""
-    D, P = len(s.polynomial_rows), len(s.polynomial_pairs)
-    c, p, slopes = np.empty((2, D)), np.empty(P), np.empty((2, P))
-    _project(x, s.polynomial_rows, c[0])
-    _products(c[0], s.polynomial_pairs, p)
-    _set_slopes(x, p, s.polynomial_cubic, s.polynomial_quartic, slopes)
-    _add_forces(c[0], p, slopes, s, c[1], out)
-    _set_gradient(c[0], c[0], slopes, s, gradient)
+    work = _work_arrays(s)
+    _evaluate(x, s, work[0], work[2], work[3], work[4])
+    _add_forces(work[0], work[2], work[3], work[4], s, work[1], out)
+    _set_gradient(work[0], work[3], work[4], s, gradient)
 
 
 @routine
 def set_polynomial_gradient(x, s, gradient):
     """Fill the gradient G (D, m) of the forces at coordinates x (m,)."""
-    D, P = len(s.polynomial_rows), len(s.polynomial_pairs)
-    c, p, slopes = np.empty(D), np.empty(P), np.empty((2, P))
-    _project(x, s.polynomial_rows, c)
-    _products(c, s.polynomial_pairs, p)
-    _set_slopes(x, p, s.polynomial_cubic, s.polynomial_quartic, slopes)
-    _set_gradient(c, c, slopes, s, gradient)
+    work = _work_arrays(s)
+    _evaluate(x, s, work[0], work[2], work[3], work[4])
+    _set_gradient(work[0], work[3], work[4], s, gradient)
 
 
 @routine
 def set_polynomial_change(x, change, s, gradient):
     """Fill ``gradient`` with the derivative of G along a ``change`` (m,) of the coordinates x."""
-    pairs = s.polynomial_pairs
-    D, P = len(s.polynomial_rows), len(pairs)
-    c, dc, dp, slopes = np.empty(D), np.empty(D), np.empty(P), np.empty((2, P))
+    pairs, work = s.polynomial_pairs, _work_arrays(s)
+    c, dc, dp = work[0], work[1], work[2]
     _project(x, s.polynomial_rows, c)
     _project(change, s.polynomial_rows, dc)
-    for r in range(P):
+    for r in range(len(pairs)):
         dp[r] = c[pairs[r, 0]] * dc[pairs[r, 1]] + dc[pairs[r, 0]] * c[pairs[r, 1]]
-    _set_slopes(change, dp, s.polynomial_cubic, s.polynomial_quartic, slopes)
-    _set_gradient(c, dc, slopes, s, gradient)
+    _set_slopes(change, dp, s, work[3], work[4])
+    _set_gradient(dc, work[3], work[4], s, gradient)
 
 
 @routine
@@ -183,14 +180,10 @@ def add_polynomial_product(factor, gradient, x, s, out):
 @routine
 def polynomial_potential(x, s):
     """V at coordinates x (m,) [J]."""
-    D, P = len(s.polynomial_rows), len(s.polynomial_pairs)
-    c, p, slopes = np.empty(D), np.empty(P), np.empty((2, P))
-    _project(x, s.polynomial_rows, c)
-    _products(c, s.polynomial_pairs, p)
-    _set_slopes(x, p, s.polynomial_cubic, s.polynomial_quartic, slopes)
-    total = 0.0
-    for r in range(P):
-        total += p[r] * (0.5 * slopes[0, r] + slopes[1, r])
+    work, total = _work_arrays(s), 0.0
+    _evaluate(x, s, work[0], work[2], work[3], work[4])
+    for r in range(len(s.polynomial_pairs)):
+        total += work[2, r] * (0.5 * work[3, r] + work[4, r])
     return total
 
 
