@@ -17,7 +17,7 @@ from fecontact.integrate.courses import (
 )
 from fecontact.integrate.near_nodes import reach_out
 from fecontact.integrate.rodas5p import dynamics as motion
-from fecontact.system.nodes import in_space, moved_along
+from fecontact.system.nodes import ground_speed
 
 # Largest number of nodes that counts as few.
 _FEW = 4
@@ -54,8 +54,8 @@ def _restless_nodes(moved, h, s, blocks, control, room):
     n, m = len(s.gap), len(control.largest)
     some = False
     for j in range(n):
-        spread = abs(s.sliding[j]) * control.ground[QUICKEST] * h
-        passing = moved_along(j, moved.speed, moved.second_speed, s)
+        spread = abs(s.sliding[j, 0, 0]) * control.ground[QUICKEST] * h
+        passing = ground_speed(0, j, moved, s)
         k1, k2, k3, r1, r2, r3 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for span in range(blocks.spans.shape[1]):
             for i in range(blocks.spans[j, span, 0], blocks.spans[j, span, 1]):
@@ -75,7 +75,7 @@ def _restless_nodes(moved, h, s, blocks, control, room):
             mixed = low + shift < 0.0 and high + shift > 0.0
             some |= (mixed or low + shift < felt) and not monotone
             touching |= low + shift < 0.0 or level > 0
-        if in_space(s):
+        if s.rows.shape[1] > 2:
             continue
         first, last = ends[1, j] - passing, nodes[1, j] - passing
         low, high, monotone = _range(first, last, r1, r2, r3)
@@ -121,9 +121,9 @@ def _restless_modes(step, problem, progress, room):
         f, g = bounds[HIGHEST], bounds[HIGHEST]
         if wavy:
             f, g = ends[2, j], ends[2, n + j]
-            shift = abs(nodes[0, j] - ends[0, j]) + 2.0 * move
-            if in_space(s):
-                shift += abs(nodes[0, 2 * n + j] - ends[0, 2 * n + j]) + 2.0 * move
+            shift = 0.0
+            for first in range(0, len(nodes[0]), 2 * n):
+                shift += abs(nodes[0, first + j] - ends[0, first + j]) + 2.0 * move
             reach += 0.5 * bounds[STEEPEST] * (shift + bounds[FASTEST] * h)
         touching = nodes[2, n + j] != 0.0
         for level in range(levels.shape[0]):
@@ -132,9 +132,9 @@ def _restless_modes(step, problem, progress, room):
             low, high = min(first, last) - reach, max(first, last) + reach
             some |= (low < 0.0 and high > 0.0) or low < 2.0 * min(min(first, last), 0.0)
             touching |= low < 0.0 or level > 0
-        if in_space(s):
+        if s.rows.shape[1] > 2:
             continue
-        factor = s.sliding[j]
+        factor = s.sliding[j, 0, 0]
         first, last = ends[1, j] - factor * moved.speed, nodes[1, j] - factor * later
         part = quicken + abs(factor) * bounds[QUICKEST] * h
         low, high = min(first, last) - part, max(first, last) + part
@@ -163,11 +163,12 @@ def doubtful(moved, h, s, bounds, levels, slip_scale, room):
     c = room.courses
     n = levels.shape[1]
     for j in range(n):
-        if in_space(s):
+        if s.rows.shape[1] > 2:
             # Slip velocities turn there, and the error of a step sees it.
             c[DOUBT, j], c[DOUBT, n + j] = 0.0, 0.0
             continue
-        spread, v = abs(s.sliding[j]) * bounds[QUICKEST] * h, s.sliding[j] * moved.speed
+        spread = abs(s.sliding[j, 0, 0]) * bounds[QUICKEST] * h
+        v = s.sliding[j, 0, 0] * moved.speed
         low = min(min(min(c[0, j], c[1, j]), min(c[2, j], c[3, j])), c[4, j]) - v - spread
         high = max(max(max(c[0, j], c[1, j]), max(c[2, j], c[3, j])), c[4, j]) - v + spread
         largest = max(-low, high)

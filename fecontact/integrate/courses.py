@@ -19,14 +19,7 @@ from fecontact.integrate import bernstein
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import tableau
 from fecontact.integrate.rodas5p.blocks import block_at
-from fecontact.laws.signatures import ground_at
-from fecontact.system.nodes import (
-    ground_motion,
-    in_space,
-    moved_across,
-    moved_along,
-)
-from fecontact.system.space_nodes import surface_under
+from fecontact.system.nodes import ground_motion, ground_speed, ground_under, node_place
 
 # Entries of Control.ground: bounds of the ground.
 LOWEST, HIGHEST, STEEPEST, FASTEST, QUICKEST = range(5)
@@ -115,7 +108,7 @@ def set_courses(s, blocks, bounds, before, after, room):
     n = len(s.gap)
     columns = 2 * n
     if bounds[STEEPEST] != 0.0:
-        columns = 4 * n if in_space(s) else 3 * n
+        columns = (s.rows.shape[1] + 1) * n
     tableau.inner_coefficients(before, after, room.dense, inner)
     _project(blocks, before, columns, out[0])
     for k in range(3):
@@ -123,12 +116,9 @@ def set_courses(s, blocks, bounds, before, after, room):
     for j in range(n):
         out[4, j] = room.nodes[1, j]
         out[4, n + j] = room.nodes[0, n + j]
-    if columns > 2 * n:
+    for first in range(2 * n, columns, n):
         for j in range(n):
-            out[4, 2 * n + j] = room.nodes[0, j]
-    if columns > 3 * n:
-        for j in range(n):
-            out[4, 3 * n + j] = room.nodes[0, 2 * n + j]
+            out[4, first + j] = room.nodes[0, 2 * (first - 2 * n) + j]
     for k in range(COEFFICIENTS):
         for j in range(n):
             out[k, n + j] += s.gap[j]
@@ -145,13 +135,7 @@ def set_ends(t, y, s, blocks, bounds, ends):
 @helper
 def _height_at(j, along, across, moved, s):
     """Height of the ground under node j, displaced so far along both tangents."""
-    place = s.abscissa[j] + along - moved_along(j, moved.travel, moved.second_travel, s)
-    if in_space(s):
-        return surface_under(
-            place, s.ordinate[j] + across - moved_across(j, moved.travel, moved.second_travel, s),
-            s.wave_direction[0], s.wave_direction[1], s.profile, s.surface,
-            s.profile_parameters)[0]
-    return ground_at(s.profile)(place, s.profile_parameters)[0]
+    return ground_under(j, node_place(j, along, across, moved, s), s)[0]
 
 
 @helper
@@ -161,10 +145,8 @@ def set_heights(moved, s, bounds, places, heights):
     for j in range(len(heights)):
         heights[j] = bounds[HIGHEST]
         if bounds[STEEPEST] != 0.0:
-            heights[j] = 0.0
-            if s.on_ground[j]:
-                across = places[2 * n + j] if in_space(s) else 0.0
-                heights[j] = _height_at(j, places[j], across, moved, s)
+            across = places[2 * n + j] if s.rows.shape[1] > 2 else 0.0
+            heights[j] = _height_at(j, places[j], across, moved, s)
 
 
 @helper
@@ -183,15 +165,14 @@ def ground_part(part, course):
     s, step, row = course.system, course.step, course.row
     now = min(step.t + part * step.h, step.latest)
     if course.what == SLIP:
-        moved = ground_motion(now, s)
-        return moved_along(course.node, moved.speed, moved.second_speed, s)
+        return ground_speed(0, course.node, ground_motion(now, s), s)
     if course.bounds[STEEPEST] == 0.0:
         return course.bounds[HIGHEST]
     if not s.on_ground[course.node]:
         return 0.0
-    n = s.gap.shape[0]
+    n, d, _ = s.rows.shape
     along, across = _displaced(part, 2 * n + course.node, course, row), 0.0
-    if in_space(s):
+    if d > 2:
         across = _displaced(part, 3 * n + course.node, course, row)
     return _height_at(course.node, along, across, ground_motion(now, s), s)
 
@@ -231,12 +212,13 @@ def _ground_bound(course):
     """Largest rate of change of what the ground adds, over the step."""
     bounds, h = course.bounds, course.step.h
     if course.what == SLIP:
-        return abs(course.system.sliding[course.node]) * bounds[QUICKEST] * h
+        return abs(course.system.sliding[course.node, 0, 0]) * bounds[QUICKEST] * h
     if bounds[STEEPEST] == 0.0 or not course.system.on_ground[course.node]:
         return 0.0
     # The node's own motion over the ground, and that of the ground.
-    bound, n = 0.0, course.system.gap.shape[0]
-    for first in range(2, 4 if in_space(course.system) else 3):
+    n, d, _ = course.system.rows.shape
+    bound = 0.0
+    for first in range(2, d + 1):
         column, most = first * n + course.node, 0.0
         for k in range(COEFFICIENTS - 1):
             most = max(most, 4.0 * abs(course.courses[k + 1, column] - course.courses[k, column]))

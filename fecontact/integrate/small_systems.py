@@ -14,7 +14,7 @@ import numpy as np
 
 from fecontact.core.constants import constants
 from fecontact.core.records import Size, shapes
-from fecontact.integrate.rodas5p import dynamics, stage_solver, state
+from fecontact.integrate.rodas5p import stage_solver, state
 from fecontact.integrate.rodas5p.blocks import Blocks, one_block
 from fecontact.system.nodes import (
     AXES,
@@ -39,8 +39,7 @@ def sizes_of(modes: int, nodes: int) -> dict[Size, int]:
 
     They have no polynomial forces.
     """
-    return {MODES: modes, NODES: nodes, AXES: 2, MEMORY: 0, dynamics.FRICTION_ENTRIES: 3,
-            COMBINATIONS: 0, PRODUCTS: 0}
+    return {MODES: modes, NODES: nodes, AXES: 2, MEMORY: 0, COMBINATIONS: 0, PRODUCTS: 0}
 
 
 def _same_values(modes: int, nodes: int) -> Values:

@@ -18,7 +18,6 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.interfaces import PrescribedMotion
 from fecontact.system.loads import load_rows
 from fecontact.system.nodes import SystemArrays
-from fecontact.system.space_nodes import SIDES, space_node
 
 LawGroup = tuple[slice, Array, Any]
 
@@ -52,18 +51,16 @@ def system_arrays(
     scale, surface = ground.friction_scale_kernel, ground.surface_kernel
     first, second = motion.motions[0], motion.motions[-1]
     rows = basis.contact_T
-    return with_sides(SystemArrays(
+    return SystemArrays(
         **drive_arrays(basis, drive),
         **load_arrays(basis, load),
         modal_damping=basis.damping.copy(),
         rows=rows[:, [0, 2, 1] if d == 3 else [0, 1]].copy(),
-        abscissa=basis.contact_x.copy(),
-        ordinate=basis.contact_places[:, 1].copy() if d == 3 else np.zeros(0),
+        places=(basis.contact_places[:, :2].copy() if d == 3
+                else np.array(basis.contact_x)[:, None]),
         gap=np.array(np.broadcast_to(gap, n)),
-        sliding=np.array(motion.factors[0] if d == 2 else motion.factors[0, :, 0]),
-        sliding_across=_sliding_across(motion.factors) if d == 3 else np.zeros((3, 0)),
-        wave_direction=np.array(ground.wave_direction) if d == 3 else np.zeros(0),
-        sides=np.zeros((0, SIDES)),
+        sliding=_sliding(motion.factors),
+        wave_direction=np.array(ground.wave_direction if d == 3 else (1.0, 0.0)),
         bristle_stiffness=_bristles(friction_groups, n, d - 1),
         **_polynomial_arrays(basis),
         normal_parameters=normal_parameters,
@@ -84,8 +81,7 @@ def system_arrays(
         ground_motion=first.motion_kernel.address,
         second_motion=0 if second is first else second.motion_kernel.address,
         follows_surface=int(ground.normal == "surface"),
-        space_node=0,
-    ))
+    )
 
 
 def _polynomial_arrays(basis: ModalBasis) -> dict[str, Any]:
@@ -174,29 +170,18 @@ def _multilinear(name: str, parts: Mapping[str, Any]) -> bool:
     return type(owner) is Harmonic
 
 
-def with_sides(arrays: SystemArrays) -> SystemArrays:
-    """The arrays with what functions of nodes in space take from them, if they are in space."""
-    if arrays.rows.shape[1] == 2:
-        return arrays
-    n = len(arrays.gap)
-    columns = [arrays.gap, arrays.abscissa, arrays.ordinate, arrays.sliding,
-               arrays.sliding_across[1], arrays.sliding_across[0], arrays.sliding_across[2],
-               arrays.on_ground, arrays.follows_surface, *arrays.wave_direction]
-    sides = np.column_stack([np.broadcast_to(np.asarray(column, dtype=float), n)
-                             for column in columns])
-    return arrays._replace(sides=sides, space_node=space_node.address)
-
-
 def with_motions(arrays: SystemArrays, factors: Array) -> SystemArrays:
-    """Arrays of solids whose other sides have motions with factors (k, n, 2) for both tangents."""
-    return with_sides(arrays._replace(sliding=factors[0, :, 0].copy(),
-                                      sliding_across=_sliding_across(factors)))
+    """Arrays of a system whose other sides move with factors (k, n, 2), k = 1 or 2, in space."""
+    return arrays._replace(sliding=_sliding(factors))
 
 
-def _sliding_across(factors: Array) -> Array:
-    """Rows (3, n): first motion across, second motion along and across."""
-    second = factors[1] if len(factors) > 1 else np.zeros_like(factors[0])
-    return np.array([factors[0, :, 1], second[:, 0], second[:, 1]])
+def _sliding(factors: Array) -> Array:
+    """Factors (n, d - 1, 2) of both motions along the tangents, from those (k, n) or (k, n, 2)."""
+    factors = np.asarray(factors, dtype=float)
+    by_tangent = factors.reshape(len(factors), factors.shape[1], -1)
+    found = np.zeros((factors.shape[1], by_tangent.shape[2], 2))
+    found[:, :, : len(factors)] = by_tangent.transpose(1, 2, 0)
+    return found
 
 
 def _planar(friction_groups: list[LawGroup]) -> Integers:

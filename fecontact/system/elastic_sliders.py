@@ -15,18 +15,9 @@ from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.laws.friction.planar import along_slip
 from fecontact.laws.friction.stribeck import no_friction
-from fecontact.laws.signatures import ground_at
-from fecontact.system.kernels import node_forces
-from fecontact.system.nodes import (
-    SystemArrays,
-    force_room,
-    ground_motion,
-    in_space,
-    memory_of,
-    node_motion,
-)
+from fecontact.system.node_forces import force_room, node_forces
+from fecontact.system.nodes import SystemArrays, ground_motion, memory_of, node_motion
 from fecontact.system.powers import BRISTLES, FRICTION, POWER_COUNT
-from fecontact.system.space_nodes import scale_under
 
 # An element that sticks again is short of its limit by this part, so that a parameter that changes
 # for derivatives does not let it slide.
@@ -36,24 +27,10 @@ SHORT = 2e-8
 _ROUNDING, _APART = 1e-11, 1e-4
 
 
-@helper
-def pressing_on(j, contact, F, s):
-    """Force that friction of node j sees under a normal force F."""
-    pressing = abs(F)
-    if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
-        if in_space(s):
-            pressing *= scale_under(contact, s.wave_direction[0], s.wave_direction[1],
-                                    s.friction_scale, s.friction_scale_parameters)[0]
-        else:
-            pressing *= ground_at(s.friction_scale)(contact.place, s.friction_scale_parameters)[0]
-    return pressing
-
-
 @routine
 def pressing_at(j, y, moved, s, force, rates):
     """Normal force of node j in the state y, what friction sees of it, and the contact."""
-    F, _, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force, rates)
-    return F, pressing_on(j, contact, F, s), contact
+    return node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force, rates)
 
 
 @helper
@@ -78,14 +55,18 @@ def limits_at(moved, y, s, counts, force, rates):
 @helper
 def deflection_of(z, i, s):
     """Magnitude of the deflection of element i [m]."""
-    return np.hypot(z[2 * i], z[2 * i + 1]) if in_space(s) else abs(z[i])
+    tangents = s.rows.shape[1] - 1
+    size = 0.0
+    for k in range(tangents * i, tangents * (i + 1)):
+        size = abs(z[k]) if size == 0.0 else np.hypot(size, z[k])
+    return size
 
 
 @helper
 def return_deflection(z, i, size, target, s):
     """Reduce the deflection of element i from the magnitude ``size`` to ``target``."""
-    first, last = (2 * i, 2 * i + 2) if in_space(s) else (i, i + 1)
-    for k in range(first, last):
+    tangents = s.rows.shape[1] - 1
+    for k in range(tangents * i, tangents * (i + 1)):
         z[k] *= target / size
 
 
@@ -127,15 +108,14 @@ def widen_scales(moved, y, s, counts, force, rates, scale):
     An error of the deflection z turns their force, c times the limit l, by l / |z| of it. A limit
     far below its scale is on its way to or from zero: its force acts for as short a time.
     """
-    limits = limits_at(moved, y, s, counts, force, rates)
+    limits, tangents = limits_at(moved, y, s, counts, force, rates), s.rows.shape[1] - 1
     for j in range(len(counts)):
         first = len(y) + (j - len(counts)) * s.memory.max()
         for i in range(counts[j]):
             limit, size = limits[j, i], deflection_of(memory_of(j, y, s), i, s)
             if size > limit:
-                begin, end = (2 * i, 2 * i + 2) if in_space(s) else (i, i + 1)
                 least = max(limit, _ROUNDING * size)
-                for k in range(first + begin, first + end):
+                for k in range(first + tangents * i, first + tangents * (i + 1)):
                     scale[k] *= size / least * max(1.0, scale[k] / least)
 
 

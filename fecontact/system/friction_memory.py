@@ -9,14 +9,8 @@ from fecontact.core.records import Block, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.laws.base import FrictionLaw
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.system.kernels import node_forces
-from fecontact.system.nodes import (
-    SystemArrays,
-    force_room,
-    ground_motion,
-    memory_of,
-    node_motion,
-)
+from fecontact.system.node_forces import force_room, node_forces
+from fecontact.system.nodes import SystemArrays, ground_motion, memory_of, node_motion
 from fecontact.system.powers import storing_power
 
 
@@ -28,7 +22,7 @@ def bristle_history(times: Vector, states: Matrix, s: SystemArrays, out: Block) 
         y, moved = states[i], ground_motion(times[i], s)
         for j in range(len(s.rows)):
             z = memory_of(j, y, s)
-            F = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)[0]
+            F = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates).normal
             stored = 0.0
             for k in range(s.memory[j]):
                 stored += (s.bristle_stiffness[0, j, k]

@@ -4,23 +4,20 @@ import numpy as np
 
 from fecontact.core.compiled import borrowing, helper, kernel, routine
 from fecontact.core.records import Block, Matrix, Vector
-from fecontact.system.kernels import (
-    friction_across,
-    given_at,
-    linear_rates,
+from fecontact.system.kernels import given_at, linear_rates, rates_under
+from fecontact.system.node_forces import (
+    axis_force,
+    force_room,
+    friction_entry,
     node_gradients,
-    rates_under,
+    slip_entry,
 )
 from fecontact.system.nodes import (
     GroundMotion,
     SystemArrays,
-    force_room,
-    friction_entry,
     ground_motion,
     memory_of,
     node_motion,
-    slip_entry,
-    tangent_force,
 )
 from fecontact.system.parameter_derivatives import (
     given_rates,
@@ -104,10 +101,10 @@ def _contact_gradients(t, y, s, gradients, active, out):
     partial = np.empty((d + 1, 2 * d))
     count = 0
     for j in range(n):
-        F, _, _ = node_gradients(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force,
-                                 rates, partial)
+        node = node_gradients(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force,
+                              rates, partial)
         _memory_jacobian(j, s, force, rates, partial, out)
-        if F == 0.0:
+        if node.normal == 0.0:
             continue
         for axis in range(d):
             for i in range(m):
@@ -204,35 +201,29 @@ def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
                 P[c, m : 2 * m] = load_p
         for j in range(n):
             z = memory_of(j, y, s)
-            F, T, contact = node_gradients(j, node_motion(j, y, s), moved, z, s, force, rates,
-                                           partial)
+            node = node_gradients(j, node_motion(j, y, s), moved, z, s, force, rates, partial)
             first = 2 * m + j * states
             for k in range(s.memory[j]):
                 out[first + k] = rates[k, 0]
             _memory_jacobian(j, s, force, rates, partial, A)
-            pushes[0], pushes[1] = -T, F
-            if d > 2:
-                R2 = friction_across(force, rates)
-                pushes[2] = -tangent_force(F, R2, contact.slope_across, s)
+            for axis in range(d):
+                pushes[axis] = axis_force(axis, node, force, rates, s)
             if differs:
                 set_shifts(j, y, s, r, basis_moves, moved, moved_p, shifts)
-                found = node_rates(j, contact, z, F, shifts, s, laws, force, partial,
-                                   (room, room_rates, memory))
-                pushes_p[0], pushes_p[1] = -found.T, found.F
-                if d > 2:
-                    pushes_p[2] = -found.T2
+                pressing_p = node_rates(j, node, z, shifts, s, laws, force, partial,
+                                        (room, room_rates, memory), pushes_p)
                 for axis in range(d):
                     for i in range(m):
                         P[c, m + i] += s.rows[j, axis, i] * pushes_p[axis]
-                    if basis_moves and F != 0.0:
+                    if basis_moves and node.normal != 0.0:
                         for i in range(m):
                             P[c, m + i] += r.rows[j, axis, i] * pushes[axis]
                 for k in range(s.memory[j]):
-                    P[c, first + k] = (rates[k, 1] * found.slip + rates[k, 2] * found.pressing
-                                       + memory[k])
-                    if d > 2:
-                        P[c, first + k] += rates[k, 3 + states] * found.slip_across
-            if F != 0.0:
+                    P[c, first + k] = rates[k, 2] * pressing_p + memory[k]
+                    for tangent in range(d - 1):
+                        P[c, first + k] += (rates[k, slip_entry(tangent, states)]
+                                            * shifts[d + 2 * tangent])
+            if node.normal != 0.0:
                 _add_contact(j, pushes, s, partial, gradient, out, A)
 
 

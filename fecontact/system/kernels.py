@@ -15,29 +15,19 @@ Rows of nodes between two bodies are those of their relative motion; y_R is zero
 moves all other sides, by a factor each: travel_j = c_j travel, V_j = c_j V.
 
 In space x is the displacement along the first tangent of a node, y that along its normal, and a
-second tangent follows: its quantities are called ``across``. Friction is a vector, the ground a
-surface, and two motions move the other sides, by factors for both tangents. All that has entries
-for the second tangent has them last, so that the first ones are the same in the plane.
+second tangent follows. Friction is a vector, the ground a surface, and two motions move the other
+sides, by factors for both tangents. All that has entries for the second tangent has them last, so
+that the first ones are the same in the plane.
 """
 
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Block, IntegerVector, Matrix, Vector
-from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, signal_at
-from fecontact.system.nodes import (
-    SystemArrays,
-    force_room,
-    ground_motion,
-    in_space,
-    memory_of,
-    node_contact,
-    node_motion,
-    pressing_force,
-    tangent_force,
-)
+from fecontact.laws.signatures import normal_at, signal_at
+from fecontact.system.node_forces import axis_force, force_room, friction_entry, node_forces
+from fecontact.system.nodes import SystemArrays, ground_motion, memory_of, node_motion
 from fecontact.system.polynomial_forces import add_polynomial_forces, has_polynomial
-from fecontact.system.space_nodes import tell, told_gradients
 
 # Columns of the per-node results of `contact_state`; the last two in space only.
 (NORMAL_FORCE, FRICTION_FORCE, PENETRATION, PENETRATION_RATE, SLIP_VELOCITY, GROUND_RATE,
@@ -50,112 +40,25 @@ def state_columns(arrays: SystemArrays) -> int:
     return SPACE_STATE_COLUMNS if arrays.rows.shape[1] > 2 else STATE_COLUMNS
 
 
-@helper
-def friction_across(force, rates):
-    """Friction along the second tangent, from the results of a law in two directions."""
-    return force[4 + len(rates)]
-
-
-@helper
-def node_forces(j, motion, moved, z, s, force, rates):
-    """F and R of node j, and its :class:`~fecontact.system.nodes.NodeContact`.
-
-    ``force`` and ``rates`` are filled by friction with memory and, in space, by all friction; see
-    the contract in :mod:`fecontact.laws.signatures`.
-    """
-    if in_space(s):
-        F, contact = tell(j, motion, moved, z, s, force, rates)
-        return F, force[0], contact
-    contact = node_contact(j, motion, moved, s)
-    F = normal_at(s.normal[j])(contact.penetration, contact.rate, s.normal_parameters[j])[0]
-    pressing = pressing_force(j, contact, F, s)
-    R = 0.0
-    if s.memory[j] > 0:
-        memory_at(s.friction[j])(contact.slip, pressing, z, s.friction_parameters[j], force, rates)
-        R = force[0]
-    elif F != 0.0:
-        R = friction_at(s.friction[j])(contact.slip, pressing, s.friction_parameters[j])[0]
-    return F, R, contact
-
-
-@helper
-def normal_gradients(j, contact, s, out):
-    """F of node j and the force that friction sees under it.
-
-    Fills out[1] and out[2] with their derivatives to x, y, x', y' of the node.
-    """
-    slope = contact.slope
-    F, F_u, F_v = normal_at(s.normal[j])(contact.penetration, contact.rate,
-                                         s.normal_parameters[j])
-    out[1, 0] = F_u * slope + F_v * contact.curvature * contact.slip
-    out[1, 1] = -F_u
-    out[1, 2] = F_v * slope
-    out[1, 3] = -F_v
-    sign = 1.0 if F >= 0.0 else -1.0
-    pressing = abs(F)
-    for k in range(4):
-        out[2, k] = sign * out[1, k]
-    if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
-        scale, scale_x, _ = ground_at(s.friction_scale)(contact.place, s.friction_scale_parameters)
-        for k in range(4):
-            out[2, k] *= scale
-        out[2, 0] += scale_x * pressing
-        pressing *= scale
-    return F, pressing
-
-
-@helper
-def node_gradients(j, motion, moved, z, s, force, rates, out):
-    """F of node j, its force T in -x, and a :class:`~fecontact.system.nodes.NodeContact`.
-
-    Fills out (d + 1, 2 d) with the derivatives of the forces on the node along its axes, -T, F and
-    in space -T_2, and last of the force that friction sees, to displacements and velocities along
-    the axes. ``force`` begins with R and its derivatives to slip velocity and pressing force for
-    all laws.
-    """
-    if in_space(s):
-        F, contact = tell(j, motion, moved, z, s, force, rates)
-        told_gradients(force, rates, out)
-        return F, tangent_force(F, force[0], contact.slope, s), contact
-    contact = node_contact(j, motion, moved, s)
-    F, pressing = normal_gradients(j, contact, s, out)
-    R, R_v, R_F = 0.0, 0.0, 0.0
-    if s.memory[j] > 0:
-        memory_at(s.friction[j])(contact.slip, pressing, z, s.friction_parameters[j], force, rates)
-        R, R_v, R_F = force[0], force[1], force[2]
-    elif F != 0.0:
-        R, R_v, R_F = friction_at(s.friction[j])(contact.slip, pressing, s.friction_parameters[j])
-    force[0], force[1], force[2] = R, R_v, R_F
-    for k in range(4):
-        out[0, k] = -R_F * out[2, k]
-    out[0, 2] -= R_v
-    if s.follows_surface:
-        for k in range(4):
-            out[0, k] -= contact.slope * out[1, k]
-        out[0, 0] -= F * contact.curvature
-    return F, tangent_force(F, R, contact.slope, s), contact
-
-
 @kernel
 def contact_state(t: float, y: Vector, s: SystemArrays, out: Matrix) -> None:
     """Fill out (n, 6): F, R, u, v, slip velocity and rate y_R' of the ground under the node.
 
     In space (n, 8): with friction force and slip velocity along the second tangent.
     """
-    n = len(s.rows)
+    n, d, _ = s.rows.shape
     moved = ground_motion(t, s)
     force, rates = force_room(s)
     for j in range(n):
-        F, R, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force,
-                                    rates)
-        out[j, NORMAL_FORCE], out[j, FRICTION_FORCE] = F, R
-        out[j, PENETRATION], out[j, PENETRATION_RATE] = contact.penetration, contact.rate
-        out[j, SLIP_VELOCITY] = contact.slip
-        out[j, GROUND_RATE] = contact.slope * contact.slip
-        if in_space(s):
-            out[j, GROUND_RATE] += contact.slope_across * contact.slip_across
-            out[j, FRICTION_ACROSS] = friction_across(force, rates)
-            out[j, SLIP_ACROSS] = contact.slip_across
+        node = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force, rates)
+        contact, row = node.contact, out[j]
+        row[NORMAL_FORCE], row[GROUND_RATE] = node.normal, 0.0
+        row[PENETRATION], row[PENETRATION_RATE] = contact.penetration, contact.rate
+        for tangent in range(d - 1):
+            R, slip = force[friction_entry(tangent, len(rates))], contact.slip[tangent]
+            row[FRICTION_ACROSS if tangent else FRICTION_FORCE] = R
+            row[SLIP_ACROSS if tangent else SLIP_VELOCITY] = slip
+            row[GROUND_RATE] += contact.slope[tangent] * slip
 
 
 @helper
@@ -231,22 +134,18 @@ def linear_rates(load, y, s, out):
 @helper
 def rates_under(load, moved, y, s, force, rates, out):
     """Fill out (2 m + n s,) with y'; ``force`` and ``rates`` are work arrays of friction."""
-    n, _, m = s.rows.shape
+    n, d, m = s.rows.shape
     states = len(rates)
     linear_rates(load, y, s, out)
     if has_polynomial(s):
         add_polynomial_forces(y, s, out[m : 2 * m])
     for j in range(n):
-        F, R, contact = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force,
-                                    rates)
-        if F != 0.0:
-            T = tangent_force(F, R, contact.slope, s)
-            for i in range(m):
-                out[m + i] += s.rows[j, 1, i] * F - s.rows[j, 0, i] * T
-            if in_space(s):
-                T = tangent_force(F, friction_across(force, rates), contact.slope_across, s)
+        node = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force, rates)
+        if node.normal != 0.0:
+            for axis in range(d):
+                push = axis_force(axis, node, force, rates, s)
                 for i in range(m):
-                    out[m + i] -= s.rows[j, 2, i] * T
+                    out[m + i] += s.rows[j, axis, i] * push
         for k in range(s.memory[j]):
             out[2 * m + j * states + k] = rates[k, 0]
 

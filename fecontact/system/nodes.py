@@ -1,5 +1,7 @@
-"""Contact nodes against the other side: motions there, kinematics, and forces.
+"""Contact nodes against the other side: their motions and kinematics.
 
+A node has d axes: its first tangent, its normal and, in space, its second tangent. Tangent k is
+axis 2 k. What has a value for each tangent is a pair, of which the second is zero in the plane.
 Arrays of a contact system as its compiled functions see them; the equations are those of
 :mod:`fecontact.system.kernels`.
 """
@@ -11,7 +13,7 @@ import numpy as np
 from fecontact.core.compiled import helper
 from fecontact.core.records import ANY, IntegerVector, Matrix, Size, Vector
 from fecontact.core.types import Array, Integers
-from fecontact.laws.signatures import ground_at, signal_at
+from fecontact.laws.signatures import ground_at, signal_at, surface_at
 
 # Modes, contact nodes, dimensions of space, internal variables of a node; length of a state.
 MODES, NODES, AXES, MEMORY = map(Size, ("modes", "nodes", "axes", "memory"))
@@ -19,26 +21,29 @@ MODES, NODES, AXES, MEMORY = map(Size, ("modes", "nodes", "axes", "memory"))
 COMBINATIONS, PRODUCTS = map(Size, ("combinations", "products"))
 SIZE = 2 * MODES + NODES * MEMORY
 
+# Values along both tangents, and along all axes; symmetric second derivatives along the tangents.
+Pair = tuple[float, float]
+Triple = tuple[float, float, float]
+PairOfPairs = tuple[tuple[float, float], tuple[float, float]]
+
 
 class SystemArrays(NamedTuple):
     """A contact system as the kernels see it: arrays, and laws by address.
 
-    ``drive_damping`` (d,) is that of relative dashpots; ``sliding`` (n,) are the factors c_j;
-    ``bristle_stiffness`` (2, n, s) are a and b of the stored ``(a + b |F|) z^2 / 2``; ``on_ground``
-    is 0 for nodes between bodies, ``follows_surface`` where contact forces stay vertical, else 1.
+    ``drive_damping`` (d,) is that of relative dashpots; ``bristle_stiffness`` (2, n, s) are a and b
+    of the stored ``(a + b |F|) z^2 / 2``; ``on_ground`` is 0 for nodes between bodies,
+    ``follows_surface`` where contact forces stay vertical, else 1.
 
-    ``rows`` (n, d, m) are those of the displacements of the nodes along their axes: the first
-    tangent, the normal and, in space, the second tangent.
+    ``rows`` (n, d, m) are those of the displacements of the nodes along their axes. ``places``
+    (n, d - 1) are reference places along the tangents; ``sliding`` (n, d - 1, 2) are the factors by
+    which both motions of the other sides move along the tangents of a node.
 
     ``polynomial_rows`` (D, m), ``polynomial_pairs`` (P, 2), ``polynomial_cubic`` (P, m) and
     ``polynomial_quartic`` (P, P) are those of :mod:`fecontact.system.polynomial_forces`.
 
-    In space, else of length zero: reference places ``ordinate`` (n,) along the second tangent;
-    ``sliding_across`` (3, n), factors of the first motion for the second
-    tangent, of the second motion for the first and for the second one; ``planar`` (n,), addresses
-    of friction in two directions; ``sides`` (n, 11), what :mod:`fecontact.system.space_nodes`
-    evaluates, and ``space_node``, its address. Heights of the ground are those of ``surface``, or
-    where that is 0 of ``profile`` along the unit vector ``wave_direction`` (2,).
+    ``planar`` (n,) are addresses of friction in two directions, (0,) in the plane. Heights of the
+    ground are those of ``surface``, or where that is 0 of ``profile`` along the unit vector
+    ``wave_direction`` (2,), (1, 0) in the plane.
     """
 
     stiffness: Annotated[Array, MODES, MODES]
@@ -50,13 +55,10 @@ class SystemArrays(NamedTuple):
     drive_damping: Annotated[Array, AXES]
     load_shapes: Annotated[Array, ANY, MODES]
     rows: Annotated[Array, NODES, AXES, MODES]
-    abscissa: Annotated[Array, NODES]
-    ordinate: Annotated[Array, NODES * (AXES - 2)]
+    places: Annotated[Array, NODES, AXES - 1]
     gap: Annotated[Array, NODES]
-    sliding: Annotated[Array, NODES]
-    sliding_across: Matrix
-    wave_direction: Vector
-    sides: Matrix
+    sliding: Annotated[Array, NODES, AXES - 1, 2]
+    wave_direction: Annotated[Array, 2]
     bristle_stiffness: Annotated[Array, 2, NODES, ANY]
     polynomial_rows: Annotated[Array, COMBINATIONS, MODES]
     polynomial_pairs: Annotated[Integers, PRODUCTS, 2]
@@ -83,12 +85,6 @@ class SystemArrays(NamedTuple):
     ground_motion: int
     second_motion: int
     follows_surface: int
-    space_node: int
-
-
-# Entries that tell of a node in space: its NodeContact, F, and derivatives (4, 6).
-CONTACT_FIELDS, SPACE_ROWS, SPACE_COLUMNS = 11, 4, 6
-TOLD = CONTACT_FIELDS + 1 + SPACE_ROWS * SPACE_COLUMNS
 
 
 class GroundMotion(NamedTuple):
@@ -101,56 +97,25 @@ class GroundMotion(NamedTuple):
 
 
 class NodeMotion(NamedTuple):
-    """Displacements of a node along the ground, away from it and across, and their rates."""
+    """Displacements of a node along its axes [m], and their rates [m/s]."""
 
-    along: float
-    height: float
-    along_rate: float
-    height_rate: float
-    across: float
-    across_rate: float
+    places: Triple
+    speeds: Triple
 
 
 class NodeContact(NamedTuple):
     """A node against the ground.
 
-    Place xi, u, u', slip velocity, and y_R' and y_R'' of the profile; in space ``across`` are the
-    place, the slip velocity, the slope and the curvature along the second tangent, and ``twist``
-    is the mixed derivative of the height.
+    Penetration u [m] and its rate [m/s]; along the tangents the place xi [m] and the slip velocity
+    [m/s]; slopes of the ground's height and its second derivatives along the tangents.
     """
 
-    place: float
     penetration: float
     rate: float
-    slip: float
-    slope: float
-    curvature: float
-    place_across: float
-    slip_across: float
-    slope_across: float
-    curvature_across: float
-    twist: float
-
-
-@helper
-def in_space(s):
-    """Whether nodes have a second tangent."""
-    return s.rows.shape[1] > 2
-
-
-@helper
-def slip_entry(tangent, states):
-    """Place of the derivative to the slip velocity along a tangent.
-
-    Among the results of friction with so many internal variables, for a force or for a rate.
-    """
-    return 3 + states if tangent else 1
-
-
-@helper
-def friction_entry(tangent, states):
-    """First place in the results of friction of those for the force along a tangent."""
-    return 4 + states if tangent else 0
+    place: Pair
+    slip: Pair
+    slope: Pair
+    curvature: PairOfPairs
 
 
 @helper
@@ -164,43 +129,62 @@ def ground_motion(t, s):
 
 
 @helper
-def moved_along(j, first, second, s):
-    """Component of two motions of the ground along the first tangent of node j."""
-    total = s.sliding[j] * first
-    if in_space(s):
-        total += s.sliding_across[1, j] * second
-    return total
+def ground_moved(tangent, j, first, second, s):
+    """Component of two motions of the ground along a tangent of node j."""
+    return s.sliding[j, tangent, 0] * first + s.sliding[j, tangent, 1] * second
 
 
 @helper
-def moved_across(j, first, second, s):
-    """Component of two motions of the ground along the second tangent of node j."""
-    return s.sliding_across[0, j] * first + s.sliding_across[2, j] * second
+def ground_speed(tangent, j, moved, s):
+    """Speed of the ground along a tangent of node j [m/s]."""
+    return ground_moved(tangent, j, moved.speed, moved.second_speed, s)
 
 
 @helper
-def ground_moved(axis, j, first, second, s):
-    """Two motions of the ground along an axis of node j; zero along its normal."""
-    if axis == 1:
-        return 0.0
-    return moved_along(j, first, second, s) if axis == 0 else moved_across(j, first, second, s)
+def ground_travel(tangent, j, moved, s):
+    """Distance that the ground has gone along a tangent of node j [m]."""
+    return ground_moved(tangent, j, moved.travel, moved.second_travel, s)
+
+
+@helper
+def size_of(pair):
+    """Magnitude of a vector along the tangents."""
+    return np.hypot(pair[0], pair[1]) if pair[1] != 0.0 else abs(pair[0])
 
 
 @helper
 def node_motion(j, y, s):
     """Motion of node j in the state y."""
-    m = s.rows.shape[2]
-    x, height, x_rate, height_rate, across, across_rate = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    _, d, m = s.rows.shape
+    x, height, across, x_rate, height_rate, across_rate = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(m):
         x += s.rows[j, 0, i] * y[i]
         height += s.rows[j, 1, i] * y[i]
         x_rate += s.rows[j, 0, i] * y[m + i]
         height_rate += s.rows[j, 1, i] * y[m + i]
-    if in_space(s):
+    if d > 2:
         for i in range(m):
             across += s.rows[j, 2, i] * y[i]
             across_rate += s.rows[j, 2, i] * y[m + i]
-    return NodeMotion(x, height, x_rate, height_rate, across, across_rate)
+    return NodeMotion((x, height, across), (x_rate, height_rate, across_rate))
+
+
+@helper
+def motion_in(row, d):
+    """Motion of a node from a row (2 d,) of displacements along its axes, then of velocities."""
+    if d > 2:
+        return NodeMotion((row[0], row[1], row[2]), (row[3], row[4], row[5]))
+    return NodeMotion((row[0], row[1], 0.0), (row[2], row[3], 0.0))
+
+
+@helper
+def motion_at(column, places, speeds, n, d):
+    """Motion of a node from arrays (d n,) of all nodes, one axis after the other."""
+    across, across_speed = 0.0, 0.0
+    if d > 2:
+        across, across_speed = places[2 * n + column], speeds[2 * n + column]
+    return NodeMotion((places[column], places[n + column], across),
+                      (speeds[column], speeds[n + column], across_speed))
 
 
 @helper
@@ -218,16 +202,46 @@ def change_by(row, j, x, s):
 
 
 @helper
+def ground_under(j, place, s):
+    """Height of the ground under node j, its slopes and second derivatives along the tangents."""
+    if not s.on_ground[j]:
+        return 0.0, (0.0, 0.0), ((0.0, 0.0), (0.0, 0.0))
+    if s.surface != 0:
+        height, x, y, xx, xy, yy = surface_at(s.surface)(place[0], place[1], s.profile_parameters)
+        return height, (x, y), ((xx, xy), (xy, yy))
+    a, b = s.wave_direction[0], s.wave_direction[1]
+    height, slope, bend = ground_at(s.profile)(a * place[0] + b * place[1], s.profile_parameters)
+    return height, (a * slope, b * slope), ((a * a * bend, a * b * bend), (a * b * bend,
+                                                                          b * b * bend))
+
+
+@helper
+def node_place(j, along, across, moved, s):
+    """Place of node j on the ground that has moved, at displacements along both tangents."""
+    second = 0.0
+    if s.rows.shape[1] > 2:
+        second = s.places[j, 1] + across - ground_travel(1, j, moved, s)
+    return s.places[j, 0] + along - ground_travel(0, j, moved, s), second
+
+
+@helper
+def slip_velocity(j, speeds, moved, s):
+    """Slip velocity of node j along both tangents, of its velocities along the axes."""
+    second = 0.0
+    if s.rows.shape[1] > 2:
+        second = speeds[2] - ground_speed(1, j, moved, s)
+    return speeds[0] - ground_speed(0, j, moved, s), second
+
+
+@helper
 def node_contact(j, motion, moved, s):
-    """Contact kinematics of node j of a plane body; ``moved`` is the motion of the ground."""
-    place = s.abscissa[j] + motion.along - s.sliding[j] * moved.travel
-    ground, slope, curvature = 0.0, 0.0, 0.0
-    if s.on_ground[j]:
-        ground, slope, curvature = ground_at(s.profile)(place, s.profile_parameters)
-    slip = motion.along_rate - s.sliding[j] * moved.speed
-    return NodeContact(place, ground - motion.height - s.gap[j],
-                       slope * slip - motion.height_rate, slip, slope, curvature,
-                       0.0, 0.0, 0.0, 0.0, 0.0)
+    """Contact kinematics of node j; ``moved`` is the motion of the ground."""
+    places, speeds = motion.places, motion.speeds
+    place, slip = node_place(j, places[0], places[2], moved, s), slip_velocity(j, speeds, moved, s)
+    height, slope, curvature = ground_under(j, place, s)
+    return NodeContact(height - places[1] - s.gap[j],
+                       slope[0] * slip[0] + slope[1] * slip[1] - speeds[1],
+                       place, slip, slope, curvature)
 
 
 @helper
@@ -236,30 +250,3 @@ def memory_of(j, y, s):
     n, _, m = s.rows.shape
     first = 2 * m + j * ((len(y) - 2 * m) // n)
     return y[first : first + s.memory[j]]
-
-
-@helper
-def pressing_force(j, contact, F, s):
-    """The force that friction sees under a normal force: |F| times the ground's variation."""
-    pressing = abs(F)
-    if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
-        pressing *= ground_at(s.friction_scale)(contact.place, s.friction_scale_parameters)[0]
-    return pressing
-
-
-@helper
-def tangent_force(F, R, slope, s):
-    """Force of a node against a tangent: friction, and the contact force along the surface."""
-    return R + F * slope if s.follows_surface else R
-
-
-@helper
-def force_room(s):
-    """Arrays for what a friction law says at a node of a system: ``force`` and ``rates``.
-
-    In space what :mod:`fecontact.system.space_nodes` says of a node follows the friction.
-    """
-    states = s.memory.max()
-    if in_space(s):
-        return np.empty(2 * (4 + states) + TOLD), np.empty((states, 4 + states))
-    return np.empty(3 + states), np.empty((states, 3 + states))

@@ -11,21 +11,15 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.types import Array
-from fecontact.laws.friction.planar import direction
-from fecontact.laws.signatures import (
-    friction_at,
-    ground_at,
-    memory_at,
-    normal_at,
-    planar_at,
-    signal_at,
-    surface_at,
+from fecontact.laws.signatures import ground_at, normal_at, signal_at, surface_at
+from fecontact.system.node_forces import (
+    friction_entry,
+    friction_onset,
+    friction_scale,
+    set_friction,
+    slip_entry,
 )
-from fecontact.system.nodes import (
-    GroundMotion,
-    ground_moved,
-    in_space,
-)
+from fecontact.system.nodes import GroundMotion, ground_speed, ground_travel
 
 # Fourth-order differences: offsets in steps, and weights in twelfths of a step.
 _PLACES = np.array([1.0, -1.0, 2.0, -2.0])
@@ -139,24 +133,20 @@ def _ground_rates(address, xi, beside, h):
 
 @helper
 def _surface_rates(contact, s, laws):
-    """Derivatives of the ground's height under a node and of its slopes."""
-    h = laws.step
-    if not in_space(s):
-        ground, slope = _ground_rates(s.profile, contact.place, laws.profile, h)
-        return ground, slope, 0.0
-    ground, slope, across = 0.0, 0.0, 0.0
+    """Derivatives of the ground's height under a node and of its slopes along the tangents."""
+    h, place = laws.step, contact.place
     if s.surface != 0:
+        ground, x, y = 0.0, 0.0, 0.0
         for k in range(len(laws.profile)):
-            found = surface_at(s.surface)(contact.place, contact.place_across, laws.profile[k, 0])
+            found = surface_at(s.surface)(place[0], place[1], laws.profile[k, 0])
             weight = _WEIGHTS[k] / (12.0 * h)
             ground += weight * found[0]
-            slope += weight * found[1]
-            across += weight * found[2]
-        return ground, slope, across
+            x += weight * found[1]
+            y += weight * found[2]
+        return ground, (x, y)
     a, b = s.wave_direction[0], s.wave_direction[1]
-    ground, slope = _ground_rates(s.profile, a * contact.place + b * contact.place_across,
-                                  laws.profile, h)
-    return ground, a * slope, b * slope
+    ground, slope = _ground_rates(s.profile, a * place[0] + b * place[1], laws.profile, h)
+    return ground, (a * slope, b * slope)
 
 
 @helper
@@ -172,102 +162,78 @@ def set_shifts(j, y, s, r, basis_moves, moved, moved_p, shifts):
             for i in range(m):
                 place += r.rows[j, axis, i] * y[i]
                 speed += r.rows[j, axis, i] * y[m + i]
-        shifts[axis] = place - (
-            ground_moved(axis, j, moved_p.travel, moved_p.second_travel, s)
-            + ground_moved(axis, j, moved.travel, moved.second_travel, r))
-        shifts[d + axis] = speed - (
-            ground_moved(axis, j, moved_p.speed, moved_p.second_speed, s)
-            + ground_moved(axis, j, moved.speed, moved.second_speed, r))
-    shifts[0] += r.abscissa[j]
+        shifts[axis], shifts[d + axis] = place, speed
     shifts[1] += r.gap[j]
-    if in_space(s):
-        shifts[2] += r.ordinate[j]
-
-
-class NodeRates(NamedTuple):
-    """Derivatives of F and of the forces against both tangents, of slip and of pressing force."""
-
-    F: float
-    T: float
-    T2: float
-    slip: float
-    slip_across: float
-    pressing: float
+    for tangent in range(d - 1):
+        axis = 2 * tangent
+        shifts[axis] += r.places[j, tangent] - (ground_travel(tangent, j, moved_p, s)
+                                                + ground_travel(tangent, j, moved, r))
+        shifts[d + axis] -= (ground_speed(tangent, j, moved_p, s)
+                             + ground_speed(tangent, j, moved, r))
 
 
 @helper
-def node_rates(j, contact, z, F, shifts, s, laws, force, partial, room):
-    """The :class:`NodeRates` of node j.
+def _pressing_rate(j, node, F_p, shifts, s, laws):
+    """Derivative of the force that friction sees of node j, by that of its normal force."""
+    size, pressing_p = abs(node.normal), F_p if node.normal >= 0.0 else -F_p
+    if s.friction_scale == 0 or not s.on_ground[j]:
+        return pressing_p
+    scale, rise = friction_scale(j, node.contact, s)
+    a, b = s.wave_direction[0], s.wave_direction[1]
+    place = a * node.contact.place[0] + b * node.contact.place[1]
+    own = _ground_rates(s.friction_scale, place, laws.friction_scale, laws.step)[0]
+    for tangent in range(s.rows.shape[1] - 1):
+        own += rise[tangent] * shifts[2 * tangent]
+    return scale * pressing_p + size * own
 
-    ``shifts`` are those of :func:`set_shifts`;
-    ``contact``, ``force`` and ``partial`` are results of
-    :func:`fecontact.system.kernels.node_gradients`. Of ``room``, for the results of friction with
-    memory, the last is filled with what the friction law's own parameters add to the rates of its
-    internal variables; the others are overwritten.
+
+@helper
+def node_rates(j, node, z, shifts, s, laws, force, partial, room, out):
+    """Fill out (d,) with the derivatives of the forces on node j along its axes.
+
+    Returns that of the force that friction sees. ``shifts`` are those of :func:`set_shifts`;
+    ``node``, ``force`` and ``partial`` are results of
+    :func:`fecontact.system.node_forces.node_gradients`. Of ``room``, for the results of friction
+    with memory, the last is filled with what the friction law's own parameters add to the rates of
+    its internal variables; the others are overwritten.
     """
     room_force, room_rates, memory = room
-    slip, h, space, d = contact.slip, laws.step, in_space(s), s.rows.shape[1]
-    second = 4 + len(memory)
-    ground, slope, across = 0.0, 0.0, 0.0
+    contact, F, h, d = node.contact, node.normal, laws.step, s.rows.shape[1]
+    states = len(memory)
+    ground, slope = 0.0, (0.0, 0.0)
     if s.on_ground[j]:
-        ground, slope, across = _surface_rates(contact, s, laws)
+        ground, slope = _surface_rates(contact, s, laws)
     F_p = -partial[1, 1] * ground - partial[1, d + 1] * (
-        slope * slip + across * contact.slip_across)
+        slope[0] * contact.slip[0] + slope[1] * contact.slip[1])
     for k in range(len(shifts)):
         F_p += partial[1, k] * shifts[k]
     for k in range(len(laws.normal)):
         F_p += _WEIGHTS[k] / (12.0 * h) * normal_at(s.normal[j])(
             contact.penetration, contact.rate, laws.normal[k, j])[0]
-    size, pressing_p = abs(F), F_p if F >= 0.0 else -F_p
-    pressing = size
-    if s.friction_scale != 0 and s.on_ground[j]:
-        place, shift = contact.place, shifts[0]
-        if space:
-            a, b = s.wave_direction[0], s.wave_direction[1]
-            place = a * contact.place + b * contact.place_across
-            shift = a * shifts[0] + b * shifts[2]
-        scale, scale_x, _ = ground_at(s.friction_scale)(place, s.friction_scale_parameters)
-        pressing = scale * size
-        pressing_p = scale * pressing_p + size * (
-            scale_x * shift + _ground_rates(s.friction_scale, place, laws.friction_scale, h)[0])
-    R_F, R_F2 = force[2], 0.0
-    if space:
-        R_F2 = force[second + 2]
-    if s.memory[j] == 0 and F == 0.0 and F_p != 0.0:
-        # Friction is zero without a normal force, but may be about to begin.
-        if space:
-            speed, e1, e2 = direction(slip, contact.slip_across, 0.0, 0.0)
-            R_F = friction_at(s.friction[j])(speed, 0.0, s.friction_parameters[j])[2]
-            R_F, R_F2 = R_F * e1, R_F * e2
-        else:
-            R_F = friction_at(s.friction[j])(slip, 0.0, s.friction_parameters[j])[2]
-    R_p, R_p2, slip_across = force[1] * shifts[d] + R_F * pressing_p, 0.0, 0.0
-    if space:
-        slip_across = shifts[5]
-        R_p += force[3 + len(memory)] * slip_across
-        R_p2 = (force[second + 1] * shifts[d] + force[second + 3 + len(memory)] * slip_across
-                + R_F2 * pressing_p)
+    pressing_p = _pressing_rate(j, node, F_p, shifts, s, laws)
+    # Friction is zero without a normal force, but may be about to begin.
+    begins, onset = s.memory[j] == 0 and F == 0.0 and F_p != 0.0, (0.0, 0.0)
+    if begins:
+        onset = friction_onset(j, contact.slip, s)
+    out[1] = F_p
+    for tangent in range(d - 1):
+        first = friction_entry(tangent, states)
+        R_p = (onset[tangent] if begins else force[first + 2]) * pressing_p
+        for other in range(d - 1):
+            R_p += force[first + slip_entry(other, states)] * shifts[d + 2 * other]
+        if s.follows_surface:
+            R_p += contact.slope[tangent] * F_p + F * slope[tangent]
+            for other in range(d - 1):
+                R_p += F * contact.curvature[tangent][other] * shifts[2 * other]
+        out[2 * tangent] = -R_p
     for i in range(s.memory[j]):
         memory[i] = 0.0
     for k in range(len(laws.friction)):
         weight = _WEIGHTS[k] / (12.0 * h)
-        if space:
-            planar_at(s.planar[j])(s.friction[j], slip, contact.slip_across, pressing, z,
-                                   laws.friction[k, j], room_force, room_rates)
-            R_p += weight * room_force[0]
-            R_p2 += weight * room_force[second]
-        elif s.memory[j] > 0:
-            memory_at(s.friction[j])(slip, pressing, z, laws.friction[k, j], room_force,
-                                     room_rates)
-            R_p += weight * room_force[0]
-        elif F != 0.0:
-            R_p += weight * friction_at(s.friction[j])(slip, pressing, laws.friction[k, j])[0]
+        set_friction(j, contact.slip, node.pressing, z, laws.friction[k, j], s, room_force,
+                     room_rates)
+        for tangent in range(d - 1):
+            out[2 * tangent] -= weight * room_force[friction_entry(tangent, states)]
         for i in range(s.memory[j]):
             memory[i] += weight * room_rates[i, 0]
-    if s.follows_surface:
-        if space:
-            R_p2 += contact.slope_across * F_p + F * (
-                across + contact.twist * shifts[0] + contact.curvature_across * shifts[2])
-            R_p += F * contact.twist * shifts[2]
-        R_p += contact.slope * F_p + F * (slope + contact.curvature * shifts[0])
-    return NodeRates(F_p, R_p, R_p2, shifts[d], slip_across, pressing_p)
+    return pressing_p

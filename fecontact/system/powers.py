@@ -1,21 +1,17 @@
 """Powers of a contact system in a state: what is put in, lost and stored, for energy balances."""
 
-import math
-
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Vector
-from fecontact.laws.signatures import normal_at, signal_at
-from fecontact.system.kernels import friction_across, node_forces
+from fecontact.laws.signatures import signal_at
+from fecontact.system.node_forces import force_room, friction_entry, node_forces, normal_force
 from fecontact.system.nodes import (
     NODES,
     SystemArrays,
-    force_room,
     ground_motion,
-    in_space,
+    ground_speed,
     memory_of,
-    moved_across,
-    moved_along,
     node_motion,
+    size_of,
 )
 
 # Columns of `powers`: five that are put in, by stiffness that is not symmetric too, four that are
@@ -113,28 +109,22 @@ def storing_power(j, F, z, rates, s):
 @helper
 def add_node_powers(j, motion, moved, z, stick_speed, s, force, rates, out, nodes):
     """Add to out (p,) the powers of node j; fill its entries of ``nodes`` (2 n,)."""
-    F, R, contact = node_forces(j, motion, moved, z, s, force, rates)
-    elastic = normal_at(s.normal[j])(contact.penetration, 0.0, s.normal_parameters[j])[0]
-    speed = moved_along(j, moved.speed, moved.second_speed, s)
-    out[BELT_NORMAL] += belt_normal_power(F, contact.slope, contact.slip, speed, s)
-    out[BELT_FRICTION] -= R * speed
-    taken = R * contact.slip
-    slip = abs(contact.slip)
-    if in_space(s):
-        R2 = friction_across(force, rates)
-        speed = moved_across(j, moved.speed, moved.second_speed, s)
-        out[BELT_NORMAL] += belt_normal_power(F, contact.slope_across, contact.slip_across, speed,
-                                              s)
-        out[BELT_FRICTION] -= R2 * speed
-        taken += R2 * contact.slip_across
-        slip = math.hypot(contact.slip, contact.slip_across)
+    node = node_forces(j, motion, moved, z, s, force, rates)
+    F, contact, taken = node.normal, node.contact, 0.0
+    elastic = normal_force(j, contact.penetration, 0.0, s)[0]
+    for tangent in range(s.rows.shape[1] - 1):
+        R, slip = force[friction_entry(tangent, len(rates))], contact.slip[tangent]
+        speed = ground_speed(tangent, j, moved, s)
+        out[BELT_NORMAL] += belt_normal_power(F, contact.slope[tangent], slip, speed, s)
+        out[BELT_FRICTION] -= R * speed
+        taken += R * slip
     out[CONTACT_DAMPING] += (F - elastic) * contact.rate
     storing = storing_power(j, F, z, rates, s)
     lost = taken - storing
     out[BRISTLES] += storing
     out[FRICTION] += lost
     nodes[j] = lost
-    nodes[len(s.gap) + j] = lost if slip < stick_speed else 0.0
+    nodes[len(s.gap) + j] = lost if size_of(contact.slip) < stick_speed else 0.0
 
 
 @routine

@@ -51,7 +51,7 @@ from fecontact.integrate.step_loop import (
     Method,
     step_loop,
 )
-from fecontact.laws.signatures import normal_at
+from fecontact.system.node_forces import normal_force
 
 # Step of differences, in sizes of the states or in the longest step, and their weights: to both
 # sides from -2 to 2, to one from 0 to 4.
@@ -343,11 +343,9 @@ def _pressed(j, p, w):
     force, depth, rate = w.nodes[j, FORCE], w.nodes[j, PENETRATION], w.nodes[j, RATE]
     if force > 0.0:
         return force
-    law = normal_at(s.normal[j])
     if depth > 0.0:
-        return (2.0 * law(depth, 0.0, s.normal_parameters[j])[0]
-                - law(depth, abs(rate), s.normal_parameters[j])[0])
-    return -law(-depth, max(-rate, 0.0), s.normal_parameters[j])[0]
+        return 2.0 * normal_force(j, depth, 0.0, s)[0] - normal_force(j, depth, abs(rate), s)[0]
+    return -normal_force(j, -depth, max(-rate, 0.0), s)[0]
 
 
 @kernel
@@ -436,9 +434,8 @@ def decide(
 def forces_of_touch(p: NonsmoothProblem, out: Vector) -> None:
     """Fill out (n,) with the normal forces at first contact of dashpots, at a unit rate."""
     for j in range(len(out)):
-        law = normal_at(p.system.normal[j])
-        out[j] = (law(_FIRST, 1.0, p.system.normal_parameters[j])[0]
-                  - law(_FIRST, 0.0, p.system.normal_parameters[j])[0])
+        out[j] = (normal_force(j, _FIRST, 1.0, p.system)[0]
+                  - normal_force(j, _FIRST, 0.0, p.system)[0])
 
 
 @kernel

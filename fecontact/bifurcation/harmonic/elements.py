@@ -12,7 +12,6 @@ import numpy as np
 
 from fecontact.bifurcation.harmonic.memory import (
     LEAK,
-    element_law,
     solve_around,
     solve_around_limit,
     take_element,
@@ -21,14 +20,14 @@ from fecontact.bifurcation.harmonic.slip_path import Path, cut_pieces, moved_at
 from fecontact.bifurcation.harmonic.stick_and_slip import follow_along
 from fecontact.core.compiled import kernel, routine
 from fecontact.core.records import Block, IntegerVector, Matrix, Vector
-from fecontact.system.elastic_sliders import limit_of, pressing_on
-from fecontact.system.kernels import node_gradients
+from fecontact.system.elastic_sliders import limit_of
+from fecontact.system.node_forces import normal_gradients, set_friction
 from fecontact.system.nodes import (
-    NodeMotion,
     SystemArrays,
-    force_room,
     ground_motion,
-    ground_moved,
+    ground_speed,
+    motion_in,
+    node_contact,
 )
 
 
@@ -48,8 +47,7 @@ def _pressing_of(j, X, T, values, s, derivatives, series, moved, pressing, slope
         for k in range(L):
             for i in range(m):
                 series[axis, k] += s.rows[j, axis, i] * X[k, i]
-    force, rates = force_room(s)
-    gradients, nothing = np.empty((d + 1, 2 * d)), np.empty(0)
+    gradients = np.empty((d + 1, 2 * d))
     varies, timed = False, False
     for n in range(N):
         for axis in range(d):
@@ -60,14 +58,11 @@ def _pressing_of(j, X, T, values, s, derivatives, series, moved, pressing, slope
                 place += one * c + other * e
                 speed += w * (other * c - one * e)
             moved[n, axis], moved[n, d + axis] = place, speed
-        here = moved[n]
-        motion = (NodeMotion(here[0], here[1], here[3], here[4], here[2], here[5]) if d > 2 else
-                  NodeMotion(here[0], here[1], here[2], here[3], 0.0, 0.0))
         ground = ground_motion(n * T / N, s)
-        F, _, contact = node_gradients(j, motion, ground, nothing, s, force, rates, gradients)
-        for axis in range(0, d, 2):
-            timed = timed or ground_moved(axis, j, ground.speed, ground.second_speed, s) != 0.0
-        pressing[n] = pressing_on(j, contact, F, s)
+        contact = node_contact(j, motion_in(moved[n], d), ground, s)
+        pressing[n] = normal_gradients(j, contact, s, gradients)[1]
+        for tangent in range(d - 1):
+            timed = timed or ground_speed(tangent, j, ground, s) != 0.0
         varies = varies or pressing[n] != pressing[0]
         for axis in range(d):
             place, speed = gradients[d, axis], gradients[d, d + axis]
@@ -92,7 +87,7 @@ def _along_one_tangent(j, X, T, s, count, offsets, values, derivatives, r, z, ro
     most = 3 * N
     path = Path(series[0], pressing, slopes if varies else nothing,
                 np.empty(most, dtype=np.int64), np.empty(most), np.empty(most), np.empty(most),
-                np.empty(most), np.empty(most), np.empty(most), s.sliding[j], T)
+                np.empty(most), np.empty(most), np.empty(most), s.sliding[j, 0, 0], T)
     pieces = cut_pieces(path, s)
     own = rows[0] if derivatives else nothing
     own[:, :] = 0.0
@@ -140,8 +135,7 @@ def _along_two_tangents(j, X, T, s, count, offsets, values, derivatives, r, z, r
         slip[n, 2] = pressing[n]
         for c in range(2):
             slip[n, c] = rate * (1.5 * moved[n, 2 * c] - 2.0 * moved[n - 1, 2 * c]
-                                 + 0.5 * moved[n - 2, 2 * c]) - ground_moved(
-                                     2 * c, j, ground.speed, ground.second_speed, s)
+                                 + 0.5 * moved[n - 2, 2 * c]) - ground_speed(c, j, ground, s)
     rows[:, :, :] = 0.0
     done = 1
     for i in range(count):
@@ -152,7 +146,7 @@ def _along_two_tangents(j, X, T, s, count, offsets, values, derivatives, r, z, r
         if solve_around_limit(j, s, T, slip, p, target, path) == 0:
             done = 0
         for n in range(N):
-            element_law(j, slip[n], path[n], s, p, force, rates)
+            set_friction(j, (slip[n, 0], slip[n, 1]), slip[n, 2], path[n], p, s, force, rates)
             for c in range(2):
                 z[n, 2 * i + c] = path[n, c]
                 r[c, n] += force[6 * c]

@@ -26,17 +26,14 @@ from fecontact.core.compiled import borrowing, helper, kernel
 from fecontact.core.dense_lu import factorise, solve, solve_rows
 from fecontact.core.records import Array4, Block, IntegerVector, Matrix, Vector
 from fecontact.core.types import Array, Integers
-from fecontact.laws.signatures import memory_at, planar_at
-from fecontact.system.elastic_sliders import pressing_on
-from fecontact.system.kernels import node_forces
-from fecontact.system.nodes import (
-    TOLD,
-    SystemArrays,
+from fecontact.system.node_forces import (
     force_room,
-    ground_motion,
-    in_space,
-    node_motion,
+    node_forces,
+    normal_force,
+    pressing_force,
+    set_friction,
 )
+from fecontact.system.nodes import SystemArrays, ground_motion, node_contact, node_motion
 
 LEAK = 1e-6
 # Largest number of rounds, of Newton steps at a sample, and relative changes that end both.
@@ -206,19 +203,6 @@ def _take_block(rates, diagonal, a):
 
 
 @helper
-def element_law(j, slip, z, s, p, force, rates):
-    """Fill ``force`` and ``rates`` with what an element of node j alone says.
-
-    ``slip`` (3,) are the slip velocities and the pressing force, z the deflections, p (3,) the
-    return time, the stiffness and the coefficient.
-    """
-    if in_space(s):
-        planar_at(s.planar[j])(s.friction[j], slip[0], slip[1], slip[2], z, p, force, rates)
-    else:
-        memory_at(s.friction[j])(slip[0], slip[2], z, p, force, rates)
-
-
-@helper
 def take_element(j, i, count, s, p):
     """Fill p (3,) with the parameters of element i of the ``count`` of node j."""
     own = s.friction_parameters[j]
@@ -228,13 +212,11 @@ def take_element(j, i, count, s, p):
 @borrowing
 def _take_slip(j, t, y, s, slip):
     """Fill slip (N, 3) with slip velocities of node j and its pressing force; y (N, d)."""
-    force = np.empty(8 + TOLD if in_space(s) else 3)
-    rates, nothing = np.empty((0, 4 if in_space(s) else 3)), np.empty(0)
     for n in range(len(t)):
-        F, _, contact = node_forces(j, node_motion(j, y[n], s), ground_motion(t[n], s), nothing, s,
-                                    force, rates)
-        slip[n, 0], slip[n, 1] = contact.slip, contact.slip_across
-        slip[n, 2] = pressing_on(j, contact, F, s)
+        contact = node_contact(j, node_motion(j, y[n], s), ground_motion(t[n], s), s)
+        F = normal_force(j, contact.penetration, contact.rate, s)[0]
+        slip[n, 0], slip[n, 1] = contact.slip[0], contact.slip[1]
+        slip[n, 2] = pressing_force(j, contact, F, s)
 
 
 @borrowing
@@ -260,7 +242,8 @@ def march_block(j, alone, t, y, s, T, slip, p, target, force, rates, path):
                 here[i] = path[place - 1, i] if place > 0 else start[i]
             for _ in range(_STEPS):
                 if alone:
-                    element_law(j, slip[place], here, s, p, force, rates)
+                    set_friction(j, (slip[place, 0], slip[place, 1]), slip[place, 2], here, p, s,
+                                 force, rates)
                 else:
                     node_forces(j, node_motion(j, y[place], s), ground_motion(t[place], s), here, s,
                                 force, rates)
@@ -332,7 +315,7 @@ def _left_over(j, s, T, slip, p, target, force, rates, path, left, slopes):
     N, b = path.shape
     rate, most, largest = N / T, 0.0, 0.0
     for n in range(N):
-        element_law(j, slip[n], path[n], s, p, force, rates)
+        set_friction(j, (slip[n, 0], slip[n, 1]), slip[n, 2], path[n], p, s, force, rates)
         for i in range(b):
             left[n, i, 0] = (rates[i, 0] - LEAK / T * (path[n, i] - target[n, i])
                              - rate * (1.5 * path[n, i] - 2.0 * path[n - 1, i]

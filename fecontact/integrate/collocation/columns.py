@@ -49,14 +49,17 @@ from fecontact.integrate.rodas5p import tableau as rows
 from fecontact.integrate.rodas5p.propagation import RECORDS, open_nodes
 from fecontact.integrate.rodas5p.variational import DIRECTIONS, Vary, add_matrices
 from fecontact.integrate.small_systems import USUAL, Sized
-from fecontact.laws.signatures import friction_at, normal_at
-from fecontact.system.kernels import node_forces
+from fecontact.system.node_forces import (
+    node_forces,
+    normal_force,
+    plane_friction,
+    pressing_force,
+)
 from fecontact.system.nodes import (
     NodeMotion,
     ground_motion,
     node_contact,
     node_motion,
-    pressing_force,
 )
 
 # A change of a force at once by more than this part of it is a jump.
@@ -79,11 +82,9 @@ def _linearise(t, Y, moved, problem, room, vary, forced):
 @helper
 def _law_forces(j, own, here, s):
     """F and R by the laws of a system at the penetration and slip of ``own``, in its place."""
-    F = normal_at(s.normal[j])(own.penetration, own.rate, s.normal_parameters[j])[0]
-    R = 0.0
+    F, R = normal_force(j, own.penetration, own.rate, s)[0], 0.0
     if F != 0.0:
-        R = friction_at(s.friction[j])(own.slip, pressing_force(j, here, F, s),
-                                       s.friction_parameters[j])[0]
+        R = plane_friction(j, own.slip[0], pressing_force(j, here, F, s), s)[0]
     return F, R
 
 
@@ -111,7 +112,7 @@ def _set_forced(t, Y, moved, problem, vary, out):
         F, R = _law_forces(j, own, one, above)
         F_below, R_below = _law_forces(j, own, other, below)
         deeper, faster, slip = (one.penetration - other.penetration, one.rate - other.rate,
-                                one.slip - other.slip)
+                                one.slip[0] - other.slip[0])
         F += -F_below - p[1, 1] * deeper - p[1, 3] * faster
         R += -R_below + p[0, 1] * deeper + p[0, 3] * faster - p[0, 2] * slip
         w[2, at], w[2, n + at] = -R / vary.width, F / vary.width
@@ -228,8 +229,8 @@ def _error_at(at, h, problem, progress, room, c, v):
 @helper
 def _deeper(motion, aside):
     """A motion of a node that is so much further on the other side."""
-    return NodeMotion(motion.along, motion.height - aside, motion.along_rate, motion.height_rate,
-                      motion.across, motion.across_rate)
+    places = motion.places
+    return NodeMotion((places[0], places[1] - aside, places[2]), motion.speeds)
 
 
 @helper
@@ -261,10 +262,11 @@ def _cross(t, near, problem, c, vary):
             jump, slip_jump, largest = 0.0, 0.0, 0.0
             for side in (-1.0, 1.0):
                 aside = levels[level, j] + side * (reach if rate > 0.0 else -reach) - u
-                F, R, _ = node_forces(j, _deeper(node_motion(j, c.after, s), aside), moved,
-                                      c.after[2 * m :], s, v.inside.force[0], v.inside.rates[0])
+                force = v.inside.force[0]
+                F = node_forces(j, _deeper(node_motion(j, c.after, s), aside), moved,
+                                c.after[2 * m :], s, force, v.inside.rates[0]).normal
                 jump += side * F
-                slip_jump += side * R
+                slip_jump += side * force[0]
                 largest = max(largest, abs(F))
             if abs(jump) < _JUMP * largest:
                 continue

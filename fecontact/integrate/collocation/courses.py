@@ -25,7 +25,7 @@ from fecontact.integrate.collocation.tableau import (
 from fecontact.integrate.rodas5p import dynamics, stage_solver
 from fecontact.integrate.rodas5p.state import ENERGY, WORST_NODE
 from fecontact.integrate.step_loop import RATES
-from fecontact.laws.signatures import normal_at
+from fecontact.system.node_forces import normal_force
 from fecontact.system.nodes import ground_motion, node_motion
 from fecontact.system.powers import (
     POWER_COUNT,
@@ -137,7 +137,7 @@ def step_error(step, problem, progress, room, c):
                 slip = 0.0
                 for k in range(m):
                     slip += s.rows[j, 0, k] * c.small_right[k]
-                distance = abs(room.nodes[1, j] - s.sliding[j] * room.given[dynamics.SPEED])
+                distance = abs(room.nodes[1, j] - s.sliding[j, 0, 0] * room.given[dynamics.SPEED])
                 part = abs(slip) * g / (control.slip_part * (control.slip_scale[j] + distance))
                 if part > error:
                     error = part
@@ -235,7 +235,7 @@ def _normal_force(x, j, s, c):
     for k in range(c.accelerations.shape[1]):
         u -= s.rows[j, 1, k] * value_at(c.places, k, x)
         v -= s.rows[j, 1, k] * value_at(c.rates, k, x)
-    return normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0]
+    return normal_force(j, u, v, s)[0]
 
 
 @helper
@@ -358,7 +358,7 @@ def first_switch(after, problem, c):
             ground = 0.0
             for i in range(RATE_TERMS):
                 ground += RATE_POWERS[power, i] * c.speeds[i]
-            line[power] -= s.sliding[j] * ground
+            line[power] -= s.sliding[j, 0, 0] * ground
             size += abs(ground)
         creep, noise = control.stick_speed[j], max(_NOISE * size,
                                                    c.tolerance * control.slip_scale[j])

@@ -260,13 +260,13 @@ def nonsmooth_problem(
     if system.basis.dimension == 3:
         cluster, rows = np.arange(n), np.ascontiguousarray(arrays.rows[:, 0])
     else:
-        cluster, rows = _clusters(arrays.rows[:, 0], arrays.sliding)
+        cluster, rows = _clusters(arrays.rows[:, 0], arrays.sliding[:, 0, 0])
         # Nodes slip exactly as their cluster does.
         whole = arrays.rows.copy()
         whole[:, 0] = rows[cluster]
         arrays = arrays._replace(rows=whole)
     sliding = np.zeros(len(rows))
-    sliding[cluster] = arrays.sliding
+    sliding[cluster] = arrays.sliding[:, 0, 0]
     ground = system.ground
     wave = ground.shortest_wavelength if ground.wavy else None
     plane = system.basis.dimension == 2

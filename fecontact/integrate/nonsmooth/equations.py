@@ -34,9 +34,10 @@ from fecontact.integrate.nonsmooth.problem import (
     NonsmoothProblem,
     Workspace,
 )
-from fecontact.laws.signatures import friction_at, normal_at, signal_at
+from fecontact.laws.signatures import signal_at
 from fecontact.system.kernels import body_acceleration, given_at
-from fecontact.system.nodes import node_contact, node_motion, pressing_force
+from fecontact.system.node_forces import normal_force, plane_friction, pressing_force
+from fecontact.system.nodes import ground_speed, node_contact, node_motion
 from fecontact.system.powers import (
     BELT_FRICTION,
     BELT_NORMAL,
@@ -96,12 +97,12 @@ def contact_powers(moved, s, nodes, friction, elastic, out):
     ``elastic`` says whether the normal forces come from the normal laws.
     """
     for j in range(len(nodes)):
-        force, R, speed = nodes[j, FORCE], friction[j], s.sliding[j] * moved.speed
+        force, R, speed = nodes[j, FORCE], friction[j], ground_speed(0, j, moved, s)
         out[BELT_NORMAL] += belt_normal_power(force, nodes[j, SLOPE], nodes[j, SLIP], speed, s)
         out[BELT_FRICTION] -= R * speed
         if elastic and nodes[j, RATE] != 0.0:
             # Damping may bring the force to zero while the spring is still compressed.
-            stored = normal_at(s.normal[j])(nodes[j, PENETRATION], 0.0, s.normal_parameters[j])[0]
+            stored = normal_force(j, nodes[j, PENETRATION], 0.0, s)[0]
             out[CONTACT_DAMPING] += (force - stored) * nodes[j, RATE]
         out[POWER_COUNT + j] = R * nodes[j, SLIP]
         out[FRICTION] += out[POWER_COUNT + j]
@@ -113,7 +114,7 @@ def stick_limit(j, pressing, p):
     s = p.system
     if p.static[j] >= 0.0:
         return p.static[j] * pressing
-    return friction_at(s.friction[j])(CREEP, pressing, s.friction_parameters[j])[0]
+    return plane_friction(j, CREEP, pressing, s)[0]
 
 
 @helper
@@ -124,17 +125,16 @@ def observe_forces(moved, Y, p, nodes):
         contact = node_contact(j, node_motion(j, Y, s), moved, s)
         force, grip = 0.0, 0.0
         if p.rigid == 0:
-            force = normal_at(s.normal[j])(contact.penetration, contact.rate,
-                                           s.normal_parameters[j])[0]
+            force = normal_force(j, contact.penetration, contact.rate, s)[0]
         else:
             grip = pressing_force(j, contact, 1.0, s)
             if stick_limit(j, grip, p) == 0.0:
                 grip = 0.0
         nodes[j, FORCE], nodes[j, PRESSING] = force, pressing_force(j, contact, force, s)
         nodes[j, PENETRATION], nodes[j, RATE] = contact.penetration, contact.rate
-        nodes[j, SLIP], nodes[j, SLOPE] = contact.slip, contact.slope
+        nodes[j, SLIP], nodes[j, SLOPE] = contact.slip[0], contact.slope[0]
         nodes[j, GRIP] = grip
-        nodes[j, CURVED] = contact.curvature * contact.slip * contact.slip
+        nodes[j, CURVED] = contact.curvature[0][0] * contact.slip[0] * contact.slip[0]
 
 
 @helper
@@ -196,7 +196,7 @@ def force_size(i, Y, pushes, s):
 def slipping_force(j, slip, sign, pressing, s):
     """R of node j that slips with the given sign, also where its slip velocity is still zero."""
     v = sign * max(sign * slip, CREEP)
-    return friction_at(s.friction[j])(v, pressing, s.friction_parameters[j])[0]
+    return plane_friction(j, v, pressing, s)[0]
 
 
 @helper

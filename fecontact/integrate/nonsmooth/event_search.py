@@ -46,7 +46,8 @@ from fecontact.integrate.nonsmooth.steps.flights import (
 )
 from fecontact.integrate.nonsmooth.steps.rates import GIVEN, nothing_given
 from fecontact.integrate.nonsmooth.steps.releases import QUARTERS, first_let_go
-from fecontact.laws.signatures import ground_at, normal_at
+from fecontact.laws.signatures import ground_at
+from fecontact.system.node_forces import normal_force
 from fecontact.system.nodes import MODES, NODES, ground_motion
 
 # Rounding of a sum, relative to its parts.
@@ -194,7 +195,7 @@ def _add_ground(j, step, p, Y, room):
     low, high = np.inf, -np.inf
     for i in range(len(x)):
         travel = ground_motion(step.t + _PLACES[i] * step.h, s).travel
-        xi = s.abscissa[j] + value(x, _PLACES[i], room.nested) - s.sliding[j] * travel
+        xi = s.places[j, 0] + value(x, _PLACES[i], room.nested) - s.sliding[j, 0, 0] * travel
         low, high = min(low, xi), max(high, xi)
         values[i] = ground_at(s.profile)(xi, s.profile_parameters)[0]
     _through(values, b)
@@ -204,7 +205,7 @@ def _add_ground(j, step, p, Y, room):
 @helper
 def pressed(u, j, s):
     """Magnitude of the elastic normal force of node j at penetration u."""
-    return abs(normal_at(s.normal[j])(u, 0.0, s.normal_parameters[j])[0])
+    return abs(normal_force(j, u, 0.0, s)[0])
 
 
 @helper

@@ -51,7 +51,7 @@ from fecontact.integrate.nonsmooth.problem import (
     pace,
     pass_break,
 )
-from fecontact.integrate.nonsmooth.space_contact import contact_of, scale_of
+from fecontact.integrate.nonsmooth.space_contact import contact_of
 from fecontact.integrate.nonsmooth.space_impulses import (
     ImpactRoom,
     find_impulses,
@@ -70,9 +70,9 @@ from fecontact.integrate.step_loop import (
     Method,
     step_loop,
 )
-from fecontact.laws.signatures import friction_at
 from fecontact.system.kernels import body_acceleration, given_at
-from fecontact.system.nodes import ground_motion, moved_across, moved_along
+from fecontact.system.node_forces import friction_scale, plane_friction
+from fecontact.system.nodes import ground_motion, ground_speed
 from fecontact.system.powers import (
     BELT_FRICTION,
     BELT_NORMAL,
@@ -106,7 +106,7 @@ class Data(NamedTuple):
 def _coefficient(j, slip, grip, p):
     """Coefficient of friction of node j at a slip velocity."""
     s = p.system
-    return friction_at(s.friction[j])(max(slip, CREEP), grip, s.friction_parameters[j])[0]
+    return plane_friction(j, max(slip, CREEP), grip, s)[0]
 
 
 @helper
@@ -146,10 +146,9 @@ def _observe_nodes(t, Y, closed, quick, p, room):
         if not room.touching[j]:
             continue
         set_rows(j, contact, p, room)
-        room.slopes[j], room.slopes[n + j] = contact.slope, contact.slope_across
-        sides[j] = moved_along(j, moved.speed, moved.second_speed, s)
-        sides[n + j] = moved_across(j, moved.speed, moved.second_speed, s)
-        lifted = contact.slope * sides[j] + contact.slope_across * sides[n + j]
+        room.slopes[j], room.slopes[n + j] = contact.slope[0], contact.slope[1]
+        sides[j], sides[n + j] = ground_speed(0, j, moved, s), ground_speed(1, j, moved, s)
+        lifted = contact.slope[0] * sides[j] + contact.slope[1] * sides[n + j]
         for place, own in ((j, lifted), (n + j, -sides[j]), (2 * n + j, -sides[n + j])):
             free, now = own, own
             for i in range(m):
@@ -158,7 +157,7 @@ def _observe_nodes(t, Y, closed, quick, p, room):
             room.given[place], room.before[place] = free, now
         struck = struck or (not closed[j] and -room.before[j] > _STILL * quick)
         slip = math.hypot(room.before[n + j], room.before[2 * n + j])
-        room.grip[j] = scale_of(j, contact, s)[0]
+        room.grip[j] = friction_scale(j, contact, s)[0]
         room.slipping[j] = _coefficient(j, slip, room.grip[j], p)
         room.sticking[j] = max(stick_limit(j, room.grip[j], p), room.slipping[j])
         room.weights[j] = 1.0 if slip > _STILL * quick else 0.0

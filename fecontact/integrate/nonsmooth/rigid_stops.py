@@ -265,7 +265,7 @@ def _strike(t, touching, p, progress, w):
                     limit += conditions.slipping[other] * x[other]
             if limit > 0.0:
                 rubbed = x[n + c] * conditions.slipping[j] * x[j] / limit
-                Y[first + BELT_FRICTION] -= rubbed * s.sliding[j] * speed
+                Y[first + BELT_FRICTION] -= rubbed * s.sliding[j, 0, 0] * speed
                 # Where normal impulses turn slip round, friction may give energy back in part.
                 worn = max(rubbed * slip, 0.0)
                 Y[first + FRICTION] += worn
@@ -273,7 +273,7 @@ def _strike(t, touching, p, progress, w):
                 Y[first + CONTACT_DAMPING] += rubbed * slip - worn
                 lost += rubbed * slip
         Y[first + BELT_NORMAL] += belt_normal_power(x[j], w.nodes[j, SLOPE], slip,
-                                                    s.sliding[j] * speed, s)
+                                                    s.sliding[j, 0, 0] * speed, s)
     if lost < -_GAIN * energy:
         progress.counts[GAINED] += 1
     return True

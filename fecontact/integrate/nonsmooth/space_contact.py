@@ -40,14 +40,14 @@ from fecontact.integrate.nonsmooth.stepping_room import (
     THIRDS,
     InSpace,
 )
-from fecontact.laws.signatures import friction_at, normal_at
-from fecontact.system.nodes import (
-    ground_motion,
-    moved_across,
-    moved_along,
-    node_motion,
+from fecontact.system.node_forces import (
+    normal_force,
+    normal_gradients,
+    plane_friction,
+    pressing_force,
     tangent_force,
 )
+from fecontact.system.nodes import ground_motion, ground_speed, node_contact, node_motion
 from fecontact.system.powers import (
     BELT_FRICTION,
     BELT_NORMAL,
@@ -55,14 +55,6 @@ from fecontact.system.powers import (
     FRICTION,
     POWER_COUNT,
     belt_normal_power,
-)
-from fecontact.system.space_nodes import (
-    ON_GROUND,
-    WAVES_X,
-    WAVES_Y,
-    contact_in_space,
-    laws_of,
-    scale_under,
 )
 
 # Part of the softness against rounding that is enough for a node in space.
@@ -72,19 +64,7 @@ _FINER = 1e-4
 @helper
 def contact_of(j, Y, moved, s):
     """Contact kinematics of node j in the state Y."""
-    return contact_in_space(node_motion(j, Y, s), moved, laws_of(j, s), s.sides[j],
-                            s.profile_parameters)
-
-
-@helper
-def scale_of(j, contact, s):
-    """Variation of friction along the ground at node j, and its derivatives along the tangents."""
-    side = s.sides[j]
-    if s.friction_scale == 0 or side[ON_GROUND] == 0.0:
-        return 1.0, 0.0, 0.0
-    a, b = side[WAVES_X], side[WAVES_Y]
-    scale, slope = scale_under(contact, a, b, s.friction_scale, s.friction_scale_parameters)
-    return scale, a * slope, b * slope
+    return node_contact(j, node_motion(j, Y, s), moved, s)
 
 
 def _observe(moved, Y, p, nodes):
@@ -92,14 +72,13 @@ def _observe(moved, Y, p, nodes):
     s = p.system
     for j in range(len(nodes)):
         contact = contact_of(j, Y, moved, s)
-        force = normal_at(s.normal[j])(contact.penetration, contact.rate,
-                                       s.normal_parameters[j])[0]
-        pressing = abs(force) * scale_of(j, contact, s)[0]
+        force = normal_force(j, contact.penetration, contact.rate, s)[0]
+        pressing = pressing_force(j, contact, force, s)
         nodes[j, FORCE], nodes[j, PRESSING] = force, pressing
         nodes[j, LIMIT] = stick_limit(j, pressing, p) if pressing > 0.0 else 0.0
         nodes[j, PENETRATION], nodes[j, RATE] = contact.penetration, contact.rate
-        nodes[j, SLIP], nodes[j, SLIP_ACROSS] = contact.slip, contact.slip_across
-        nodes[j, SLOPE], nodes[j, SLOPE_ACROSS] = contact.slope, contact.slope_across
+        nodes[j, SLIP], nodes[j, SLIP_ACROSS] = contact.slip[0], contact.slip[1]
+        nodes[j, SLOPE], nodes[j, SLOPE_ACROSS] = contact.slope[0], contact.slope[1]
         nodes[j, CURVED], nodes[j, GRIP] = 0.0, 0.0
 
 
@@ -109,17 +88,14 @@ def _contact_powers(moved, p, nodes, friction, out):
     for j in range(n):
         force, rubbed = nodes[j, FORCE], 0.0
         for tangent in range(2):
-            if tangent == 0:
-                speed = moved_along(j, moved.speed, moved.second_speed, s)
-                slope, slip, R = nodes[j, SLOPE], nodes[j, SLIP], friction[j]
-            else:
-                speed = moved_across(j, moved.speed, moved.second_speed, s)
-                slope, slip, R = nodes[j, SLOPE_ACROSS], nodes[j, SLIP_ACROSS], friction[n + j]
+            speed, R = ground_speed(tangent, j, moved, s), friction[tangent * n + j]
+            slope, slip = (nodes[j, SLOPE_ACROSS if tangent else SLOPE],
+                           nodes[j, SLIP_ACROSS if tangent else SLIP])
             out[BELT_NORMAL] += belt_normal_power(force, slope, slip, speed, s)
             out[BELT_FRICTION] -= R * speed
             rubbed += R * slip
         # Damping may bring the force to zero while the spring is still compressed.
-        stored = normal_at(s.normal[j])(nodes[j, PENETRATION], 0.0, s.normal_parameters[j])[0]
+        stored = normal_force(j, nodes[j, PENETRATION], 0.0, s)[0]
         out[CONTACT_DAMPING] += (force - stored) * nodes[j, RATE]
         out[POWER_COUNT + j] = rubbed
         out[FRICTION] += rubbed
@@ -142,8 +118,7 @@ def _slips_back(j, step, p, w, tolerance, room):
     speed[:] = 0.0
     for k in range(4):
         moved = ground_motion(step.t + h * k / 3.0, s)
-        side = (e1 * moved_along(j, moved.speed, moved.second_speed, s)
-                + e2 * moved_across(j, moved.speed, moved.second_speed, s))
+        side = e1 * ground_speed(0, j, moved, s) + e2 * ground_speed(1, j, moved, s)
         for i in range(4):
             speed[i] += THIRDS[i, k] * side
     rise, fall = 0.0, 0.0
@@ -186,25 +161,22 @@ def _linearise(stage, moved, p, hold, turning, room, force):
     under force and the largest velocity that there must not be: of a sticking node, or of slip
     athwart its friction; infinite when a node has changed between stick and slip.
     """
-    s, g, side = p.system, stage.g, hold.side
+    s, g, side, partial = p.system, stage.g, hold.side, room.partial
     n, _, m = s.rows.shape
     count, creep = 0, 0.0
     for j in range(n):
         force[j], force[n + j] = 0.0, 0.0
         grip = _grip(j, g, hold, s)
         contact = contact_of(j, stage.Y, moved, s)
-        F, F_u, F_v = normal_at(s.normal[j])(contact.penetration, contact.rate,
-                                             s.normal_parameters[j])
+        F, pressing = normal_gradients(j, contact, s, partial)
         if F == 0.0:
             continue
-        v1, v2, s1, s2 = contact.slip, contact.slip_across, contact.slope, contact.slope_across
-        # Derivatives of F to the velocities along, away and across.
-        F_1 = g * (F_u * s1 + F_v * (contact.curvature * v1 + contact.twist * v2)) + F_v * s1
-        F_y = -g * F_u - F_v
-        F_2 = g * (F_u * s2 + F_v * (contact.twist * v1 + contact.curvature_across * v2)) + F_v * s2
-        sign = 1.0 if F >= 0.0 else -1.0
-        scale, scale_1, scale_2 = scale_of(j, contact, s)
-        pressing = abs(F) * scale
+        v1, v2, s1, s2 = contact.slip[0], contact.slip[1], contact.slope[0], contact.slope[1]
+        # Derivatives of F and of the pressing force to the velocities along, away and across.
+        F_1, F_y, F_2 = (g * partial[1, 0] + partial[1, 3], g * partial[1, 1] + partial[1, 4],
+                         g * partial[1, 2] + partial[1, 5])
+        P_1, P_y, P_2 = (g * partial[3, 0] + partial[3, 3], g * partial[3, 1] + partial[3, 4],
+                         g * partial[3, 2] + partial[3, 5])
         limit = stick_limit(j, pressing, p)
         trial1 = hold.multiplier[j] + grip * v1
         trial2 = hold.multiplier[n + j] + grip * v2
@@ -231,8 +203,7 @@ def _linearise(stage, moved, p, hold, turning, room, force):
                 creep = math.inf
             side[j], side[n + j] = e1, e2
             slip = e1 * v1 + e2 * v2
-            R, R_v, R_F = friction_at(s.friction[j])(max(slip, CREEP), pressing,
-                                                     s.friction_parameters[j])
+            R, R_v, R_F = plane_friction(j, max(slip, CREEP), pressing, s)
             if slip < 0.0:
                 creep = max(creep, math.hypot(v1, v2))
                 R_v = 0.0
@@ -242,9 +213,7 @@ def _linearise(stage, moved, p, hold, turning, room, force):
             R1, R2 = R * e1, R * e2
             # The force of slip turns with the trial force.
             around = R * turn
-            P_1 = R_F * (sign * scale * F_1 + g * abs(F) * scale_1)
-            P_y = R_F * sign * scale * F_y
-            P_2 = R_F * (sign * scale * F_2 + g * abs(F) * scale_2)
+            P_1, P_y, P_2 = R_F * P_1, R_F * P_y, R_F * P_2
             R11 = R_v * e1 * e1 + around * e2 * e2 + e1 * P_1
             R12 = (R_v - around) * e1 * e2 + e1 * P_2
             R21 = (R_v - around) * e1 * e2 + e2 * P_1
@@ -253,10 +222,11 @@ def _linearise(stage, moved, p, hold, turning, room, force):
         force[j], force[n + j] = R1, R2
         T1, T2 = tangent_force(F, R1, s1, s), tangent_force(F, R2, s2, s)
         if s.follows_surface:
-            R11 += s1 * F_1 + g * F * contact.curvature
-            R12 += s1 * F_2 + g * F * contact.twist
-            R21 += s2 * F_1 + g * F * contact.twist
-            R22 += s2 * F_2 + g * F * contact.curvature_across
+            bend = contact.curvature
+            R11 += s1 * F_1 + g * F * bend[0][0]
+            R12 += s1 * F_2 + g * F * bend[0][1]
+            R21 += s2 * F_1 + g * F * bend[1][0]
+            R22 += s2 * F_2 + g * F * bend[1][1]
             R1y += s1 * F_y
             R2y += s2 * F_y
         for i in range(m):

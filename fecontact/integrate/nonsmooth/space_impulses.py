@@ -134,8 +134,8 @@ def set_rows(j, contact, p, room):
     s, rows = p.system, room.rows
     n, _, m = s.rows.shape
     for i in range(m):
-        rows[j, i] = (s.rows[j, 1, i] - contact.slope * s.rows[j, 0, i]
-                      - contact.slope_across * s.rows[j, 2, i])
+        rows[j, i] = (s.rows[j, 1, i] - contact.slope[0] * s.rows[j, 0, i]
+                      - contact.slope[1] * s.rows[j, 2, i])
         rows[n + j, i], rows[2 * n + j, i] = s.rows[j, 0, i], s.rows[j, 2, i]
 
 

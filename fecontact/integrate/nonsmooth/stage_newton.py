@@ -29,9 +29,8 @@ from fecontact.core.compiled import helper
 from fecontact.core.records import Block, Matrix, Vector
 from fecontact.integrate.nonsmooth.equations import free_acceleration, stick_limit
 from fecontact.integrate.nonsmooth.problem import CREEP, NonsmoothProblem
-from fecontact.laws.signatures import friction_at
-from fecontact.system.kernels import normal_gradients
-from fecontact.system.nodes import GroundMotion, in_space, node_contact, node_motion, tangent_force
+from fecontact.system.node_forces import normal_gradients, plane_friction, tangent_force
+from fecontact.system.nodes import GroundMotion, node_contact, node_motion
 from fecontact.system.polynomial_forces import (
     add_polynomial_stiffness,
     has_polynomial,
@@ -81,7 +80,7 @@ class NewtonRoom(NamedTuple):
 
     Rows ``active`` (n, d, m) of the nodes under force, and their ``gradients`` (n, d, m), minus
     the derivatives of the forces along the axes to V;
-    ``partial`` (3, 4) of one node; ``linear`` (m, m) is 1 + g C + g^2 K, ``matrix`` the whole
+    ``partial`` (d + 1, 2 d) of one node; ``linear`` (m, m) is 1 + g C + g^2 K, ``matrix`` the whole
     matrix; ``balance`` and ``residual`` (m,); ``polynomial`` (D, m) is G of
     :mod:`fecontact.system.polynomial_forces` where the matrix was made last.
     """
@@ -110,7 +109,8 @@ def newton_room_for(
     linear, whole = np.zeros((2, modes, modes))
     balance, residual = np.zeros((2, modes))
     gradients, active = np.zeros((2, nodes, 1 + tangents, modes))
-    return NewtonRoom(gradients, active, np.zeros((3, 4)), linear, whole, balance, residual,
+    partial = np.zeros((2 + tangents, 2 * (1 + tangents)))
+    return NewtonRoom(gradients, active, partial, linear, whole, balance, residual,
                       np.zeros((combinations, modes)))
 
 
@@ -133,7 +133,7 @@ def _linearise(stage, moved, p, hold, turning, room, force):
         F, pressing = normal_gradients(j, contact, s, partial)
         if F == 0.0:
             continue
-        slip = contact.slip
+        slip = contact.slip[0]
         along, away = g * partial[1, 0] + partial[1, 2], g * partial[1, 1] + partial[1, 3]
         limit = stick_limit(j, pressing, p)
         trial = hold.multiplier[j] + hold.grip[j] * slip
@@ -149,18 +149,18 @@ def _linearise(stage, moved, p, hold, turning, room, force):
             if side[j] != sense:
                 creep = math.inf
             side[j] = sense
-            R, R_v, R_F = friction_at(s.friction[j])(sense * max(sense * slip, CREEP), pressing,
-                                                     s.friction_parameters[j])
+            R, R_v, R_F = plane_friction(j, sense * max(sense * slip, CREEP), pressing, s)
             if sense * slip < 0.0:
                 creep = max(creep, abs(slip))
                 R_v = 0.0
             R_along = R_v + R_F * (g * partial[2, 0] + partial[2, 2])
             R_away = R_F * (g * partial[2, 1] + partial[2, 3])
         force[j] = R
-        T = tangent_force(F, R, contact.slope, s)
+        slope = contact.slope[0]
+        T = tangent_force(F, R, slope, s)
         if s.follows_surface:
-            R_along += contact.slope * along + g * F * contact.curvature
-            R_away += contact.slope * away
+            R_along += slope * along + g * F * contact.curvature[0][0]
+            R_away += slope * away
         for i in range(m):
             tx, ty = s.rows[j, 0, i], s.rows[j, 1, i]
             room.balance[i] += ty * F - tx * T
@@ -178,7 +178,7 @@ def _evaluate(stage, p, hold, turning, room, force):
     for i in range(m):
         Y[i] = stage.start[i] + stage.g * Y[m + i]
     moved = free_acceleration(stage.t, Y, p.system, room.balance)
-    if in_space(p.system):
+    if p.system.rows.shape[1] > 2:
         found, creep = _linearise_at(hold.linearise)(stage, moved, p, hold, turning, room, force)
         count = int(found)
     else:

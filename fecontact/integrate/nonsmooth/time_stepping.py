@@ -61,7 +61,7 @@ from fecontact.integrate.step_loop import (
     Method,
     step_loop,
 )
-from fecontact.system.nodes import ground_motion, in_space, moved_across, moved_along
+from fecontact.system.nodes import ground_motion, ground_speed
 from fecontact.system.polynomial_forces import add_polynomial_product, has_polynomial
 from fecontact.system.powers import body_powers
 
@@ -98,7 +98,7 @@ class Data(NamedTuple):
 
 @helper
 def _observe(moved, Y, p, nodes, room):
-    if in_space(p.system):
+    if p.system.rows.shape[1] > 2:
         _observe_at(room.space.observe)(moved, Y, p, nodes)
     else:
         observe(moved, Y, p, nodes)
@@ -108,13 +108,11 @@ def _observe(moved, Y, p, nodes, room):
 def _fastest_side(moved, p):
     """Largest speed of what slides under the nodes."""
     s, fastest = p.system, 0.0
-    if not in_space(s):
-        for c in range(len(p.sliding)):
-            fastest = max(fastest, abs(p.sliding[c] * moved.speed))
-        return fastest
     for j in range(len(s.gap)):
-        fastest = max(fastest, math.hypot(moved_along(j, moved.speed, moved.second_speed, s),
-                                          moved_across(j, moved.speed, moved.second_speed, s)))
+        speed = 0.0
+        for tangent in range(s.rows.shape[1] - 1):
+            speed = math.hypot(speed, ground_speed(tangent, j, moved, s))
+        fastest = max(fastest, speed)
     return fastest
 
 
@@ -122,7 +120,7 @@ def _fastest_side(moved, p):
 def _slips_back(j, h, p, w, tolerance, room):
     """Part of a step at which node j slips back between ends with slip of one sense; or 1."""
     s, b, speed = p.system, room.cubic, room.speed
-    factor = s.sliding[j]
+    factor = s.sliding[j, 0, 0]
     first, last = room.old[j, SLIP], w.nodes[j, SLIP]
     if not (room.old[j, FORCE] != 0.0 and w.nodes[j, FORCE] != 0.0 and first * last > 0.0
             and min(abs(first), abs(last)) > tolerance):
@@ -172,7 +170,7 @@ def _passed_over(step, p, limits, tolerance, w, room):
                                                            p.system).speed
     shorter = 1.0
     for j in range(len(room.old)):
-        if in_space(p.system):
+        if p.system.rows.shape[1] > 2:
             back = _slips_back_at(room.space.slips_back)(j, step, p, w, tolerance, room)
         else:
             back = _slips_back(j, step.h, p, w, tolerance, room)
@@ -227,19 +225,16 @@ def _fill(row, output, step, data):
 def _set_inertia(p, limits, room):
     """Fill ``room.inertia``; returns the largest floor of the slip velocities."""
     s = p.system
-    n, _, m = s.rows.shape
+    n, d, m = s.rows.shape
     slowest = 0.0
     for j in range(n):
         room.inertia[j], part = 0.0, 0.0
-        for i in range(m):
-            room.inertia[j] += s.rows[j, 0, i] * s.rows[j, 0, i]
-            part = max(part, abs(s.rows[j, 0, i]) * limits.floor[m + i])
-        if in_space(s):
-            across = 0.0
+        for axis in range(0, d, 2):
+            inertia = 0.0
             for i in range(m):
-                across += s.rows[j, 2, i] * s.rows[j, 2, i]
-                part = max(part, abs(s.rows[j, 2, i]) * limits.floor[m + i])
-            room.inertia[j] = max(room.inertia[j], across)
+                inertia += s.rows[j, axis, i] * s.rows[j, axis, i]
+                part = max(part, abs(s.rows[j, axis, i]) * limits.floor[m + i])
+            room.inertia[j] = max(room.inertia[j], inertia)
         slowest = max(slowest, part)
     return slowest
 
@@ -323,7 +318,7 @@ def _set_rates(step, p, w, room):
         moved = ground_motion(moment, p.system)
         _observe(moved, room.states[k], p, w.nodes, room)
         body_powers(moment, room.states[k], p.system, room.rates[k])
-        if in_space(p.system):
+        if p.system.rows.shape[1] > 2:
             _powers_at(room.space.powers)(moved, p, w.nodes, room.forces[k], room.rates[k])
         else:
             contact_powers(moved, p.system, w.nodes, room.forces[k], True, room.rates[k])
@@ -363,7 +358,7 @@ def _attempt(step, last, smallest, data):
     quick = largest[SLIP_SIZE] + _fastest_side(moved, p)
     _prepare(step, quick, p, progress, w, room)
     finest = (1e-2 * limits.rtol + 1e-11) * max(slowest, quick)
-    if in_space(p.system):
+    if p.system.rows.shape[1] > 2:
         # Athwart a fast belt slip velocities are small, and their errors count.
         finest *= 0.01
     solved = _solve_stages(step, finest, p, limits, progress, room)
@@ -393,7 +388,7 @@ def _attempt(step, last, smallest, data):
         return CUT, part * length
     for j in range(n):
         slip = abs(w.nodes[j, SLIP])
-        if in_space(p.system):
+        if p.system.rows.shape[1] > 2:
             slip = math.hypot(slip, w.nodes[j, SLIP_ACROSS])
         largest[SLIP_SIZE] = max(largest[SLIP_SIZE], slip)
     _set_end(length, m, progress, room)

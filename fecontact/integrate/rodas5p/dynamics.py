@@ -8,11 +8,17 @@ import math
 from typing import Annotated, NamedTuple
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.records import Size
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.blocks import block_at
-from fecontact.laws.signatures import normal_at, signal_at
+from fecontact.laws.signatures import signal_at
 from fecontact.system import kernels, nodes
+from fecontact.system.node_forces import (
+    axis_force,
+    node_forces,
+    node_gradients,
+    normal_force,
+    slip_entry,
+)
 from fecontact.system.nodes import AXES, COMBINATIONS, MEMORY, MODES, NODES
 from fecontact.system.polynomial_forces import (
     add_polynomial,
@@ -27,13 +33,8 @@ PULL, PULL_RATE, TRAVEL, SPEED, SECOND_TRAVEL, SECOND_SPEED = 0, 3, 6, 7, 8, 9
 GIVEN = 10
 
 
-# Length of what friction says of a node; it is longer in space, see
-# :func:`fecontact.system.nodes.force_room`.
-FRICTION_ENTRIES = Size("entries of friction")
-
-
 class Gradients(NamedTuple):
-    """Derivatives of the node forces, as :func:`fecontact.system.kernels.node_gradients` gives.
+    """Derivatives of the node forces, as :func:`fecontact.system.node_forces.node_gradients` gives.
 
     And of the polynomial forces, G of :mod:`fecontact.system.polynomial_forces`.
 
@@ -45,7 +46,7 @@ class Gradients(NamedTuple):
     """
 
     partial: Annotated[Array, NODES, AXES + 1, 2 * AXES]
-    force: Annotated[Array, NODES, FRICTION_ENTRIES]
+    force: Annotated[Array, NODES, (AXES - 1) * (AXES + 1 + MEMORY)]
     rates: Annotated[Array, NODES, MEMORY, AXES + 1 + MEMORY]
     polynomial: Annotated[Array, COMBINATIONS, MODES]
 
@@ -78,10 +79,7 @@ def motion_given(given):
 def motion_of(j, w, s):
     """Motion of node j of the blocks, as :func:`project` puts it into w (3, d n)."""
     n = len(s.gap)
-    if nodes.in_space(s):
-        return nodes.NodeMotion(w[0, j], w[0, n + j], w[1, j], w[1, n + j], w[0, 2 * n + j],
-                                w[1, 2 * n + j])
-    return nodes.NodeMotion(w[0, j], w[0, n + j], w[1, j], w[1, n + j], 0.0, 0.0)
+    return nodes.motion_at(j, w[0], w[1], n, s.rows.shape[1])
 
 
 @helper
@@ -205,13 +203,10 @@ def set_forces(y, s, blocks, moved, w, scratch, rate):
     for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         first = 2 * m + j * states
-        F, R, contact = kernels.node_forces(j, motion_of(at, w, s), moved,
-                                            y[first : first + s.memory[j]], s, force, rates)
-        forces[at] = -nodes.tangent_force(F, R, contact.slope, s)
-        forces[n + at] = F
-        if nodes.in_space(s):
-            forces[2 * n + at] = -nodes.tangent_force(F, kernels.friction_across(force, rates),
-                                                contact.slope_across, s)
+        node = node_forces(j, motion_of(at, w, s), moved, y[first : first + s.memory[j]], s, force,
+                           rates)
+        for axis in range(s.rows.shape[1]):
+            forces[axis * n + at] = axis_force(axis, node, force, rates, s)
         for k in range(states):
             rate[first + k] = rates[k, 0] if k < s.memory[j] else 0.0
 
@@ -250,14 +245,10 @@ def set_node_gradients(y, s, blocks, moved, w, out):
     for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         first = 2 * m + j * states
-        F, T, contact = kernels.node_gradients(j, motion_of(at, w, s), moved,
-                                         y[first : first + s.memory[j]], s, out.force[j],
-                                         out.rates[j], out.partial[j])
-        forces[at] = -T
-        forces[n + at] = F
-        if nodes.in_space(s):
-            forces[2 * n + at] = -nodes.tangent_force(
-                F, kernels.friction_across(out.force[j], out.rates[j]), contact.slope_across, s)
+        node = node_gradients(j, motion_of(at, w, s), moved, y[first : first + s.memory[j]], s,
+                              out.force[j], out.rates[j], out.partial[j])
+        for axis in range(s.rows.shape[1]):
+            forces[axis * n + at] = axis_force(axis, node, out.force[j], out.rates[j], s)
 
 
 @routine
@@ -274,13 +265,6 @@ def set_rate_and_gradients(y, s, blocks, given, load, w, out, rate):
 
 
 @helper
-def friction_length(g):
-    """Number of entries of ``force`` that tell of friction."""
-    width = g.rates.shape[2]
-    return 2 * width if g.partial.shape[1] > 3 else width
-
-
-@helper
 def copy_gradients(there, here, blocks):
     """Make the derivatives ``here`` those ``there``, at the nodes of ``blocks``."""
     for a in range(len(here.polynomial)):
@@ -292,7 +276,7 @@ def copy_gradients(there, here, blocks):
         for row in range(here.partial.shape[1]):
             for k in range(here.partial.shape[2]):
                 here.partial[j, row, k] = there.partial[j, row, k]
-        for k in range(friction_length(here)):
+        for k in range(here.force.shape[1]):
             here.force[j, k] = there.force[j, k]
         for k in range(width):
             for row in range(states):
@@ -347,20 +331,19 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
     states, forces = g.rates.shape[1], w[2]
     for i in range(m):
         out[i] = 0.0
-        out[m + i] = (rate_of_loads[i] + given[PULL_RATE] * s.drive_shapes[0, i]
-                      + given[PULL_RATE + 1] * s.drive_shapes[1, i])
-    if nodes.in_space(s):
-        for i in range(m):
-            out[m + i] += given[PULL_RATE + 2] * s.drive_shapes[2, i]
+        out[m + i] = rate_of_loads[i]
+        for axis in range(d):
+            out[m + i] += given[PULL_RATE + axis] * s.drive_shapes[axis, i]
     for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         pressing = 0.0
         for row in range(d + 1):
             rate = 0.0
-            for axis in range(0, d, 2):
-                rate -= (nodes.ground_moved(axis, j, given[SPEED], given[SECOND_SPEED], s)
+            for tangent in range(d - 1):
+                axis = 2 * tangent
+                rate -= (nodes.ground_moved(tangent, j, given[SPEED], given[SECOND_SPEED], s)
                          * g.partial[j, row, axis]
-                         + nodes.ground_moved(axis, j, acceleration[0], acceleration[1], s)
+                         + nodes.ground_moved(tangent, j, acceleration[0], acceleration[1], s)
                          * g.partial[j, row, d + axis])
             if row < d:
                 forces[row * n + at] = rate
@@ -371,8 +354,8 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
             if k < s.memory[j]:
                 rate = g.rates[j, k, 2] * pressing
                 for tangent in range(d - 1):
-                    rate -= (nodes.ground_moved(2 * tangent, j, acceleration[0], acceleration[1], s)
-                             * g.rates[j, k, nodes.slip_entry(tangent, states)])
+                    rate -= (nodes.ground_moved(tangent, j, acceleration[0], acceleration[1], s)
+                             * g.rates[j, k, slip_entry(tangent, states)])
             out[2 * m + j * states + k] = rate
     push(blocks, forces, out[m : 2 * m])
 
@@ -394,21 +377,18 @@ def next_kink(y, rate, s, blocks, g, depth, slow, moved, w, within):
         u, v, a = -w[0, n + j] - s.gap[j], -w[1, n + j], -w[2, n + j]
         first = _crossing(u, v, a, first)
         first = _crossing(u - depth[j], v, a, first)
-        force = normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0]
+        force = normal_force(j, u, v, s)[0]
         if force > 0.0:
             fall = g.partial[j, 1, 1] * -v + g.partial[j, 1, d + 1] * -a
             if fall < 0.0 and -force / fall < first:
                 first = -force / fall
-            slip = w[1, j] - nodes.moved_along(j, moved.speed, moved.second_speed, s)
-            towards = -w[2, j] if slip > 0.0 else w[2, j]
-            if nodes.in_space(s):
-                across = w[1, 2 * n + j] - nodes.moved_across(j, moved.speed, moved.second_speed, s)
-                size = math.hypot(slip, across)
-                if size > 0.0:
-                    towards = -(slip * w[2, j] + across * w[2, 2 * n + j]) / size
-                slip = size
-            if abs(slip) > 1.5 * slow[j] and (abs(slip) - slow[j]) < towards * first:
-                first = (abs(slip) - slow[j]) / towards
+            motion = nodes.motion_at(j, w[1], w[2], n, d)
+            slip = nodes.slip_velocity(j, motion.places, moved, s)
+            size = nodes.size_of(slip)
+            if size > 1.5 * slow[j]:
+                towards = -(slip[0] * motion.speeds[0] + slip[1] * motion.speeds[2]) / size
+                if size - slow[j] < towards * first:
+                    first = (size - slow[j]) / towards
     return first
 
 

@@ -11,7 +11,7 @@ from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, WORST_NODE
 from fecontact.integrate.step_loop import RATES
-from fecontact.system.nodes import ground_motion, in_space, moved_across, moved_along
+from fecontact.system.nodes import ground_motion, ground_speed, size_of, slip_velocity
 from fecontact.system.powers import POWER_COUNT, add_node_powers, given_powers, matrix_powers
 
 
@@ -53,7 +53,7 @@ def memory_error(error, problem, progress, room):
     states, difference = len(control.memory_scale) // max(n, 1), room.stages[tableau.STAGES - 1]
     for j in range(n):
         begins = (progress.signs[j] == 0 and control.slider_counts[j] > 0
-                  and in_space(problem.system))
+                  and problem.system.rows.shape[1] > 2)
         if room.nodes[2, n + j] != 0.0 and not begins:
             for k in range(j * states, (j + 1) * states):
                 error = max(error, abs(difference[2 * m + k]) / (
@@ -135,13 +135,13 @@ def slip_error(error, problem, progress, room):
     for at in range(near.used[0]):
         j = near.nodes[at]
         if s.memory[j] == 0 and room.nodes[2, n + j] != 0.0:
-            slip = slips[at]
-            distance = abs(room.nodes[1, j] - moved_along(j, moved.speed, moved.second_speed, s))
-            if in_space(s):
-                slip = math.hypot(slip, slips[2 * n + at])
-                distance = math.hypot(distance, room.nodes[1, 2 * n + j] - moved_across(
-                    j, moved.speed, moved.second_speed, s))
-            part = abs(slip) / (control.slip_part * (control.slip_scale[j] + distance))
+            slip, distance = 0.0, 0.0
+            for tangent in range(s.rows.shape[1] - 1):
+                first = 2 * tangent * n
+                slip = math.hypot(slip, slips[first + at])
+                distance = math.hypot(distance, room.nodes[1, first + j] - ground_speed(
+                    tangent, j, moved, s))
+            part = slip / (control.slip_part * (control.slip_scale[j] + distance))
             if part > error:
                 error = part
                 progress.counts[WORST_NODE] = j
@@ -313,15 +313,14 @@ def _above_creep(part, j, step, problem, progress, room):
     """Slip speed of node j at a part of the step less that below which it creeps."""
     s, m = problem.system, len(problem.control.largest)
     moved = ground_motion(min(step.t + part * step.h, step.latest), s)
-    slip, across = -moved_along(j, moved.speed, moved.second_speed, s), 0.0
-    if in_space(s):
-        across = -moved_across(j, moved.speed, moved.second_speed, s)
+    d, along, across = s.rows.shape[1], 0.0, 0.0
     for i in range(m):
         v = tableau.one_interpolated(part, m + i, progress.state, room.after, room.dense)
-        slip += s.rows[j, 0, i] * v
-        if in_space(s):
+        along += s.rows[j, 0, i] * v
+        if d > 2:
             across += s.rows[j, 2, i] * v
-    return (math.hypot(slip, across) if in_space(s) else abs(slip)) - problem.control.stick_speed[j]
+    slip = slip_velocity(j, (along, 0.0, across), moved, s)
+    return size_of(slip) - problem.control.stick_speed[j]
 
 
 @helper

@@ -21,7 +21,8 @@ from fecontact.integrate import bernstein
 from fecontact.integrate.courses import COEFFICIENTS, GAP, MOST, SLIP, Course, changes
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import tableau
-from fecontact.system import kernels, nodes
+from fecontact.system import nodes
+from fecontact.system.node_forces import friction_entry, node_forces
 
 EVENT = Callable[[float, Vector, Vector], float]
 event_at = function_at(EVENT)
@@ -142,21 +143,21 @@ def _between(x, places, values):
 @helper
 def _zone_of(j, t, y, s, depth, force, rates, watch):
     """State of node j, and whether it is past the depth of its normal law."""
-    F, R, contact = kernels.node_forces(j, nodes.node_motion(j, y, s),
-                                        nodes.ground_motion(t, s), nodes.memory_of(j, y, s),
-                                        s, force, rates)
-    u, slip = contact.penetration, contact.slip
-    if nodes.in_space(s):
-        R, slip = math.hypot(R, kernels.friction_across(force, rates)), math.hypot(
-            slip, contact.slip_across)
-    zone = OPEN
-    if F != 0.0:
+    node = node_forces(j, nodes.node_motion(j, y, s), nodes.ground_motion(t, s),
+                       nodes.memory_of(j, y, s), s, force, rates)
+    R, slip, zone = 0.0, node.contact.slip[0], OPEN
+    for tangent in range(s.rows.shape[1] - 1):
+        R = math.hypot(R, force[friction_entry(tangent, len(rates))])
+        if tangent:
+            slip = math.hypot(slip, node.contact.slip[tangent])
+    if node.normal != 0.0:
         if s.memory[j] > 0 and len(watch.curve_speed) > 0 and watch.curve[j, 0] != 0.0:
-            sticks = abs(R) < 0.95 * abs(_between(slip, watch.curve_speed, watch.curve[j]) * F)
+            sticks = abs(R) < 0.95 * abs(_between(slip, watch.curve_speed, watch.curve[j])
+                                         * node.normal)
         else:
             sticks = abs(slip) < watch.stick_speed[j]
         zone = STICKING if sticks else SLIPPING
-    return zone + DEEP if u > depth[j] else zone
+    return zone + DEEP if node.contact.penetration > depth[j] else zone
 
 
 @helper
@@ -340,7 +341,7 @@ def _set_places(step, problem, before, room, watch):
                 what, shift = SLIP, watch.stick_speed[j] * (2.0 * (k - levels) - 1.0)
             # In space a slip velocity turns instead of changing its sign: more looks find it.
             if watch.counts[NODES] == 0 or (
-                    what == SLIP and (s.memory[j] > 0 or nodes.in_space(s))) or (
+                    what == SLIP and (s.memory[j] > 0 or s.rows.shape[1] > 2)) or (
                     count + MOST > len(watch.changed)):
                 continue
             course = Course(what, j, shift, step, s, control.ground, room.courses, row)
@@ -411,7 +412,7 @@ def _note_events(step, problem, progress, room, watch):
     """Note the events of an accepted step; the part of it after which the run ends, or 2."""
     view = _view(step, problem, progress, room)
     begun = watch.counts[FOUND]
-    looks = _MORE_LOOKS if nodes.in_space(view.system) else _LOOKS
+    looks = _MORE_LOOKS if view.system.rows.shape[1] > 2 else _LOOKS
     for k in range(len(watch.own)):
         if watch.linear[k] == 0:
             looks = _MORE_LOOKS

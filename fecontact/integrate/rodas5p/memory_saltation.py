@@ -12,12 +12,12 @@ Elastic Coulomb elements do not decay; :mod:`fecontact.integrate.rodas5p.sliders
 
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.rodas5p import tableau
-from fecontact.system.kernels import node_forces
+from fecontact.system.node_forces import node_forces
 from fecontact.system.nodes import (
     change_by,
     ground_motion,
     ground_moved,
-    in_space,
+    ground_speed,
     memory_of,
     node_motion,
 )
@@ -45,24 +45,26 @@ def _touch(j, step, acceleration, problem, progress, room, vary, row):
     force, rates = v.inside.force[j], v.inside.rates[j]
     now = min(step.target, step.latest)
     moved, z = ground_motion(now, s), memory_of(j, y, s)
-    before = node_forces(j, node_motion(j, progress.state, s), step.moved, z, s, force, rates)[2]
+    before = node_forces(j, node_motion(j, progress.state, s), step.moved, z, s, force,
+                         rates).contact
     own, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
     for k in range(len(row)):
         row[k] = room.gradients_after.partial[j, 1, k]
     rate = change_by(row, j, room.rate_after, s)
     d = s.rows.shape[1]
-    for axis in range(0, d, 2):
-        rate -= (row[axis] * ground_moved(axis, j, moved.speed, moved.second_speed, s)
-                 + row[d + axis] * ground_moved(axis, j, acceleration[0], acceleration[1], s))
+    for tangent in range(d - 1):
+        axis = 2 * tangent
+        rate -= (row[axis] * ground_speed(tangent, j, moved, s)
+                 + row[d + axis] * ground_moved(tangent, j, acceleration[0], acceleration[1], s))
     # A force that jumps is cut off at a penetration.
     by_depth = abs(own) > 2.0 * abs(rate) * step.h or _passes_level(
         j, before.penetration, contact.penetration, problem.control)
     if by_depth:
         for k in range(len(row)):
             row[k] = 0.0
-        row[0], row[1], rate = contact.slope, -1.0, contact.rate
-        if in_space(s):
-            row[2] = contact.slope_across
+        row[1], rate = -1.0, contact.rate
+        for tangent in range(d - 1):
+            row[2 * tangent] = contact.slope[tangent]
     if vary.width == 0.0:
         return rate, 0.0
     F, _, above = node_forces(j, node_motion(j, y, s), ground_motion(now, vary.above), z,

@@ -21,7 +21,6 @@ from fecontact.integrate.brackets import Bracket, between, narrowed
 from fecontact.integrate.rodas5p import dynamics, state, tableau
 from fecontact.integrate.rodas5p.step_length import LAST_STEP
 from fecontact.integrate.rodas5p.variational import Vary
-from fecontact.laws.signatures import normal_at
 from fecontact.system.elastic_sliders import (
     SHORT,
     deflection_of,
@@ -30,14 +29,14 @@ from fecontact.system.elastic_sliders import (
     return_deflection,
     return_to_limits,
 )
+from fecontact.system.node_forces import force_room, normal_force
 from fecontact.system.nodes import (
     change_by,
-    force_room,
     ground_motion,
     ground_moved,
-    in_space,
     memory_of,
     node_motion,
+    size_of,
 )
 
 _ATTEND = Callable[[
@@ -114,13 +113,13 @@ def _touch(low, high, now, j, step, problem, progress, room, y, force, rates):
 @helper
 def _penetration_acceleration(j, contact, rate, acceleration, s):
     """Second rate of the penetration of node j [m/s^2], of the rates of state and ground."""
-    motion = node_motion(j, rate, s)
-    along = motion.along_rate - ground_moved(0, j, acceleration[0], acceleration[1], s)
-    found = contact.slope * along + contact.curvature * contact.slip**2 - motion.height_rate
-    if in_space(s):
-        across = motion.across_rate - ground_moved(2, j, acceleration[0], acceleration[1], s)
-        found += (contact.slope_across * across + contact.curvature_across * contact.slip_across**2
-                  + 2.0 * contact.twist * contact.slip * contact.slip_across)
+    rates, slip = node_motion(j, rate, s).speeds, contact.slip
+    found = -rates[1]
+    for tangent in range(s.rows.shape[1] - 1):
+        along = rates[2 * tangent] - ground_moved(tangent, j, acceleration[0], acceleration[1], s)
+        bend = contact.curvature[tangent]
+        found += contact.slope[tangent] * along + slip[tangent] * (bend[0] * slip[0]
+                                                                   + bend[1] * slip[1])
     return found
 
 
@@ -130,15 +129,15 @@ def _since_touch(j, contact, deepening, earlier, s):
 
     The time is -1 if it is longer than ``earlier``; ``deepening`` is u''.
     """
-    u, v, p = contact.penetration, contact.rate, s.normal_parameters[j]
-    now = normal_at(s.normal[j])(u, v, p)[0]
-    before = normal_at(s.normal[j])(u - v * earlier, v - deepening * earlier, p)[0]
+    u, v = contact.penetration, contact.rate
+    now = normal_force(j, u, v, s)[0]
+    before = normal_force(j, u - v * earlier, v - deepening * earlier, s)[0]
     if not _begins(before, now):
         return -1.0, False
     low, high = 0.0, earlier
     for _ in range(_TRIALS):
         middle = 0.5 * (low + high)
-        found = normal_at(s.normal[j])(u - v * middle, v - deepening * middle, p)[0]
+        found = normal_force(j, u - v * middle, v - deepening * middle, s)[0]
         if _begins(found, now):
             high = middle
         else:
@@ -153,16 +152,14 @@ def _begin_columns(j, i, through, deepening, t, y, g, problem, vary, force, rate
     Contact begins at t_b: the penetration passes a level, or the normal force comes ``through``
     zero with the rate F_u u' + F_v u''; ``deepening`` is u''. g are the derivatives of node forces.
     """
-    s, v, p = problem.system, vary.variation, problem.system.normal_parameters[j]
-    tangents = 2 if in_space(s) else 1
+    s, v, tangents = problem.system, vary.variation, problem.system.rows.shape[1] - 1
     first = 2 * len(problem.control.largest) + j * s.memory.max() + tangents * i
     F, pressing, contact = pressing_at(j, y, ground_motion(t, s), s, force, rates)
-    _, by_depth, by_rate = normal_at(s.normal[j])(contact.penetration, contact.rate, p)
+    _, by_depth, by_rate = normal_force(j, contact.penetration, contact.rate, s)
     rate = by_depth * contact.rate + by_rate * deepening if through else contact.rate
     for c in range(len(v.columns)):
-        motion = node_motion(j, v.columns[c], s)
-        change = (contact.slope * motion.along - motion.height
-                  + contact.slope_across * motion.across)
+        places = node_motion(j, v.columns[c], s).places
+        change = contact.slope[0] * places[0] - places[1] + contact.slope[1] * places[2]
         if through:
             change = F / pressing * change_by(g.partial[j, tangents + 1], j, v.columns[c], s)
         if vary.width != 0.0 and c == len(v.columns) - 1:
@@ -170,9 +167,8 @@ def _begin_columns(j, i, through, deepening, t, y, g, problem, vary, force, rate
             up, _, above = pressing_at(j, y, over, vary.above, force, rates)
             down, _, below = pressing_at(j, y, under, vary.below, force, rates)
             change += (up - down if through else above.penetration - below.penetration) / vary.width
-        v.columns[c, first] = contact.slip * change / rate
-        if tangents == 2:
-            v.columns[c, first + 1] = contact.slip_across * change / rate
+        for k in range(tangents):
+            v.columns[c, first + k] = contact.slip[k] * change / rate
 
 
 @routine
@@ -187,23 +183,25 @@ def _begin_contact(
     s, y, changed = problem.system, progress.state, False
     count = problem.control.slider_counts[j]
     _, pressing, contact = pressing_at(j, y, ground_motion(t, s), s, force, rates)
-    speed = np.hypot(contact.slip, contact.slip_across) if in_space(s) else abs(contact.slip)
+    slip, tangents = contact.slip, s.rows.shape[1] - 1
+    speed = size_of(slip)
     deepening = _penetration_acceleration(j, contact, progress.rate, acceleration, s)
     z, scales = memory_of(j, y, s), problem.control.memory_scale
     for i in range(count):
         limit = limit_of(j, i, count, pressing, s)
-        first, time = 2 * i if in_space(s) else i, since
+        first, time, moves = tangents * i, since, False
         if speed * since > limit:
             time = max(since, _LEAST * scales[j * s.memory.max() + first] / speed)
-        along, across = contact.slip * time, contact.slip_across * time
-        if z[first] == along and (not in_space(s) or z[first + 1] == across):
+        for k in range(tangents):
+            moves |= z[first + k] != slip[k] * time
+        if not moves:
             continue
         if len(vary.variation.columns):
             _begin_columns(j, i, through, deepening, t, y, progress.gradients, problem, vary, force,
                            rates)
-        z[first], changed = along, True
-        if in_space(s):
-            z[first + 1] = across
+        for k in range(tangents):
+            z[first + k] = slip[k] * time
+        changed = True
     return changed
 
 
@@ -280,7 +278,7 @@ def _columns(j, i, count, limit, size, t, y, g, problem, vary, force, rates):
     ``y`` is the state before it returns, g the derivatives of the node forces there.
     """
     s, v = problem.system, vary.variation
-    tangents = 2 if in_space(s) else 1
+    tangents = s.rows.shape[1] - 1
     first = 2 * len(problem.control.largest) + j * s.memory.max() + tangents * i
     z, p = memory_of(j, y, s), s.friction_parameters[j]
     slope = p[1 + count + i] / p[1 + i]

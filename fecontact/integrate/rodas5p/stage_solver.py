@@ -24,7 +24,8 @@ from fecontact.core.records import Matrix, allocate
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.dynamics import change_of, project
-from fecontact.system.nodes import AXES, MEMORY, MODES, NODES, friction_entry, slip_entry
+from fecontact.system.node_forces import friction_entry, slip_entry
+from fecontact.system.nodes import AXES, MEMORY, MODES, NODES
 from fecontact.system.polynomial_forces import add_polynomial_stiffness, has_polynomial
 
 

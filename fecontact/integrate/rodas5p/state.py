@@ -14,12 +14,11 @@ from fecontact.integrate.rodas5p.step_length import LAST_ROOT
 from fecontact.integrate.step_loop import STEP, TIME
 from fecontact.system.nodes import (
     AXES,
-    CONTACT_FIELDS,
+    COMBINATIONS,
     MEMORY,
     MODES,
     NODES,
     SIZE,
-    TOLD,
     GroundMotion,
     SystemArrays,
 )
@@ -218,22 +217,6 @@ class Room(NamedTuple):
     sums: Annotated[Array, 2, SIZE, tableau.STAGES]
 
 
-def gradients_for(
-    nodes: int, states: int, dimension: int, *, told: int = TOLD,
-    polynomial: tuple[int, int] = (0, 0),
-) -> motion.Gradients:
-    """Zeros for so many contact nodes with so many internal variables each.
-
-    ``polynomial`` is the shape (D, m) of G in :mod:`fecontact.system.polynomial_forces`. ``told``
-    is the number of entries for the contact of a node in space. Derivatives are not computed if it
-    leaves no entries for them.
-    """
-    length = 2 * (4 + states) + told if dimension == 3 else 3 + states
-    return allocate(motion.Gradients, {NODES: nodes, MEMORY: states, AXES: dimension,
-                                       motion.FRICTION_ENTRIES: length},
-                    polynomial=np.zeros(polynomial))
-
-
 def room_for(
     modes: int, nodes: int, states: int, dimension: int, blocks: Blocks, combinations: int = 0,
 ) -> Room:
@@ -241,14 +224,11 @@ def room_for(
 
     ``combinations`` is the number D of :mod:`fecontact.system.polynomial_forces`.
     """
-    polynomial = combinations, modes
     return allocate(
-        Room, {MODES: modes, NODES: nodes, MEMORY: states, AXES: dimension},
+        Room, {MODES: modes, NODES: nodes, MEMORY: states, AXES: dimension,
+               COMBINATIONS: combinations},
         near=near_blocks(blocks),
-        reduced=stage_solver.reduced_for(modes, nodes, states, dimension),
-        scratch=gradients_for(nodes, states, dimension, told=CONTACT_FIELDS + 1,
-                              polynomial=polynomial),
-        gradients_after=gradients_for(nodes, states, dimension, polynomial=polynomial))
+        reduced=stage_solver.reduced_for(modes, nodes, states, dimension))
 
 
 def output_for(times: Array, size: int, nodes: int) -> Output:
@@ -263,9 +243,8 @@ def progress_for(
 ) -> Progress:
     """A run that is about to start."""
     states = (len(state) - 2 * modes) // max(nodes, 1)
-    made = allocate(Progress, {MODES: modes, NODES: nodes, MEMORY: states},
-                    state=np.array(state, dtype=float),
-                    gradients=gradients_for(nodes, states, dimension,
-                                            polynomial=(combinations, modes)))
+    made = allocate(Progress, {MODES: modes, NODES: nodes, MEMORY: states, AXES: dimension,
+                               COMBINATIONS: combinations},
+                    state=np.array(state, dtype=float))
     made.numbers[TIME], made.numbers[STEP] = time, step
     return made

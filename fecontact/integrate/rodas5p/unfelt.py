@@ -23,8 +23,7 @@ from fecontact.integrate.courses import (
     changes,
 )
 from fecontact.integrate.rodas5p import state as run_arrays
-from fecontact.laws.signatures import friction_at, normal_at
-from fecontact.system.nodes import in_space
+from fecontact.system.node_forces import normal_force, plane_friction
 
 _UNFELT = Callable[[
     run_arrays.Step, int, run_arrays.Problem, run_arrays.Progress, run_arrays.Room,
@@ -55,7 +54,7 @@ def _matters(impulse, column, h, blocks, control, progress):
 @helper
 def _push(j, u, v, s):
     """Normal force of node j."""
-    return normal_at(s.normal[j])(u, v, s.normal_parameters[j])[0]
+    return normal_force(j, u, v, s)[0]
 
 
 @helper
@@ -78,11 +77,10 @@ def _unfelt_rub(j, inside, F, slip, ends, s):
 
     ``ends`` is the largest slip velocity at ends of the step that belong to the stretch.
     """
-    rub, p = friction_at(s.friction[j]), s.friction_parameters[j]
-    force = abs(rub(slip, F, p)[0])
+    force = abs(plane_friction(j, slip, F, s)[0])
     if inside:
-        return force + abs(rub(-slip, F, p)[0])
-    return force if force > 2.0 * abs(rub(ends, F, p)[0]) else 0.0
+        return force + abs(plane_friction(j, -slip, F, s)[0])
+    return force if force > 2.0 * abs(plane_friction(j, ends, F, s)[0]) else 0.0
 
 
 @helper
@@ -127,7 +125,7 @@ def _first_unfelt(step, again, problem, progress, room):
     for column in range(2 * n):
         what, j = (SLIP, column) if column < n else (GAP, column - n)
         if room.courses[DOUBT, column] == 0.0 or (
-                what == SLIP and (s.memory[j] > 0 or in_space(s))):
+                what == SLIP and (s.memory[j] > 0 or s.rows.shape[1] > 2)):
             continue
         for level in range(levels.shape[0] if what == GAP else 1):
             shift = levels[level, j] if what == GAP else 0.0

@@ -31,6 +31,7 @@ from fecontact.integrate.rodas5p.memory_saltation import switch_memory
 from fecontact.system.elastic_sliders import keep_sides, set_sides, widen_scales
 from fecontact.system.nodes import (
     AXES,
+    COMBINATIONS,
     MEMORY,
     MODES,
     NODES,
@@ -144,15 +145,11 @@ def variation_for(
     of the parameter whose column comes last: 2e-5 of its value; zero without.
     """
     directions = 2 * dimension + states if columns else 1
-    polynomial = combinations, modes
-    gradients = {
-        name: run_arrays.gradients_for(nodes, states, dimension, polynomial=polynomial)
-        for name in ("inside", "ahead", "behind", "usual", "between")}
+    sizes = {COLUMNS: columns, DIRECTIONS: directions, MODES: modes, NODES: nodes, MEMORY: states,
+             AXES: dimension, COMBINATIONS: combinations}
     made = allocate(
-        Variation, {COLUMNS: columns, DIRECTIONS: directions, MODES: modes, NODES: nodes,
-                    MEMORY: states, AXES: dimension},
-        tolerance=tolerance, faded=faded, **gradients,
-        bends=run_arrays.gradients_for(directions * nodes, states, dimension))
+        Variation, sizes, tolerance=tolerance, faded=faded,
+        bends=allocate(dynamics.Gradients, {**sizes, NODES: directions * nodes}))
     np.fill_diagonal(made.columns, 1.0)
     if width:
         # A tenth of the state's own sizes, if the parameter changed by all of its value.

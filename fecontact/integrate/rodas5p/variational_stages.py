@@ -15,23 +15,14 @@ from fecontact.core.compiled import helper, routine
 from fecontact.integrate.courses import STEEPEST
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.system.elastic_sliders import deflection_of
-from fecontact.system.kernels import node_gradients
-from fecontact.system.nodes import (
-    NodeMotion,
-    friction_entry,
-    ground_moved,
-    in_space,
-    memory_of,
-    node_contact,
-    slip_entry,
-)
+from fecontact.system.node_forces import friction_entry, node_gradients, slip_entry
+from fecontact.system.nodes import NodeMotion, ground_moved, memory_of, node_contact
 from fecontact.system.polynomial_forces import (
     add_polynomial_product,
     add_polynomial_stiffness,
     has_polynomial,
     set_polynomial_change,
 )
-from fecontact.system.space_nodes import contact_in_space, laws_of
 
 # Products of matrices with more multiplications than these go to BLAS.
 _LARGE = 2000
@@ -54,7 +45,7 @@ def learn(here, usual):
             for k in range(here.partial.shape[2]):
                 usual.partial[j, row, k] = max(usual.partial[j, row, k],
                                                abs(here.partial[j, row, k]))
-        for k in range(dynamics.friction_length(here)):
+        for k in range(here.force.shape[1]):
             usual.force[j, k] = max(usual.force[j, k], abs(here.force[j, k]))
         for k in range(width):
             for row in range(states):
@@ -77,10 +68,12 @@ def set_paths(step, acceleration, s, blocks, stages, v):
         part = tableau.TIME[i] * step.h
         for j in range(n):
             for axis in range(d):
-                paths[i, axis, j] = w[0, axis * n + j] - part * ground_moved(
-                    axis, j, first, second, s)
-                paths[i, d + axis, j] = w[1, axis * n + j] - part * ground_moved(
-                    axis, j, acceleration[0], acceleration[1], s)
+                paths[i, axis, j], paths[i, d + axis, j] = w[0, axis * n + j], w[1, axis * n + j]
+            for tangent in range(d - 1):
+                axis = 2 * tangent
+                paths[i, axis, j] -= part * ground_moved(tangent, j, first, second, s)
+                paths[i, d + axis, j] -= part * ground_moved(
+                    tangent, j, acceleration[0], acceleration[1], s)
             for k in range(states):
                 paths[i, 2 * d + k, j] = stages[i, 2 * m + j * states + k]
 
@@ -104,7 +97,7 @@ def _reach(direction, j, y, s, control, v):
         states, own = v.paths.shape[1] - motions, direction - motions
         reach = min(reach, control.memory_scale[j * states + own])
         if control.slider_counts[j] > 0:
-            element = own // 2 if in_space(s) else own
+            element = own // (s.rows.shape[1] - 1)
             reach = min(reach, deflection_of(memory_of(j, y, s), element, s))
     return _PART * reach if _PART * reach > _SHORTEST else 0.0
 
@@ -122,17 +115,14 @@ def _onward(direction, j, motion, acceleration, step, s, v, between, rate):
         return rate[2 * len(v.none) + j * states + direction - 2 * d]
     if direction >= d:
         axis = direction - d
-        return between[1, axis * n + j] - ground_moved(axis, j, acceleration[0], acceleration[1], s)
-    if in_space(s):
-        contact = contact_in_space(motion, step.moved, laws_of(j, s), s.sides[j],
-                                   s.profile_parameters)
-    else:
-        contact = node_contact(j, motion, step.moved, s)
+        rate_of_speed = between[1, axis * n + j]
+        return rate_of_speed if axis == 1 else rate_of_speed - ground_moved(
+            axis // 2, j, acceleration[0], acceleration[1], s)
+    contact = node_contact(j, motion, step.moved, s)
     if direction == 1:
         return -contact.rate
-    slope, slip = ((contact.slope, contact.slip) if direction == 0 else
-                   (contact.slope_across, contact.slip_across))
-    return slope * contact.rate if slope != 0.0 else slip
+    slope = contact.slope[direction // 2]
+    return slope * contact.rate if slope != 0.0 else contact.slip[direction // 2]
 
 
 @routine
@@ -143,17 +133,17 @@ def _gradients_aside(direction, e, j, motion, moved, z, s, v, out):
     """
     states, motions = out.rates.shape[1], out.partial.shape[2]
     first, d = 2 * len(v.none) + j * states, motions // 2
-    aside = NodeMotion(motion.along + (e if direction == 0 else 0.0),
-                       motion.height + (e if direction == 1 else 0.0),
-                       motion.along_rate + (e if direction == d else 0.0),
-                       motion.height_rate + (e if direction == d + 1 else 0.0),
-                       motion.across + (e if direction == 2 and d > 2 else 0.0),
-                       motion.across_rate + (e if direction == 5 and d > 2 else 0.0))
+    places, speeds = motion.places, motion.speeds
+    offset = NodeMotion(
+        (places[0] + (e if direction == 0 else 0.0), places[1] + (e if direction == 1 else 0.0),
+         places[2] + (e if direction == 2 and d > 2 else 0.0)),
+        (speeds[0] + (e if direction == d else 0.0), speeds[1] + (e if direction == d + 1 else 0.0),
+         speeds[2] + (e if direction == 5 and d > 2 else 0.0)))
     changed, before = first + direction - motions, 0.0
     if direction >= motions:
         before = z[changed]
         z[changed] += e
-    node_gradients(j, aside, moved, z[first : first + s.memory[j]], s, out.force[j], out.rates[j],
+    node_gradients(j, offset, moved, z[first : first + s.memory[j]], s, out.force[j], out.rates[j],
                    out.partial[j])
     if direction >= motions:
         z[changed] = before
@@ -189,7 +179,7 @@ def _set_bend(j, row, factor, forward, here, v):
                 forward, usual.partial[j, k, c])
     if states == 0:
         return
-    for k in range(dynamics.friction_length(here)):
+    for k in range(here.force.shape[1]):
         out.force[row, k] = _difference(ahead.force[j, k], here.force[j, k], behind.force[j, k],
                                         factor, forward, usual.force[j, k])
     for k in range(states):
@@ -238,7 +228,7 @@ def set_ahead(i, y, s, stages, v):
     n, entries = paths.shape[2], g.partial.shape[1] * g.partial.shape[2]
     partial = g.partial.reshape((n, entries))
     changes = bends.partial.reshape((len(bends.partial), entries))
-    length = dynamics.friction_length(g) if states > 0 else 0
+    length = g.force.shape[1] if states > 0 else 0
     partial[:] = 0.0
     g.force[:, :length] = 0.0
     g.rates[:] = 0.0
@@ -276,7 +266,7 @@ def set_between(above, here, below, width, central, usual, out):
                 out.partial[j, row, k] = _between(
                     above.partial[j, row, k], here.partial[j, row, k], below.partial[j, row, k],
                     width, central, usual.partial[j, row, k])
-        for k in range(dynamics.friction_length(here)):
+        for k in range(here.force.shape[1]):
             out.force[j, k] = _between(above.force[j, k], here.force[j, k], below.force[j, k],
                                        width, central, usual.force[j, k])
         for row in range(states):

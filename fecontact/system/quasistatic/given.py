@@ -111,23 +111,14 @@ def travelling(system: ContactSystem) -> SystemArrays:
 
 def travelled(system: ContactSystem, travel: Array) -> Array:
     """Distance (n,), in space (n, 2), that the other side of each node has travelled [m]."""
-    arrays = travelling(system)
-    along = travel[0] * arrays.sliding
-    if len(travel) == 1:
-        return np.asarray(along)
-    across = arrays.sliding_across
-    return np.column_stack([along + travel[1] * across[1],
-                            travel[0] * across[0] + travel[1] * across[2]])
+    found = travelling(system).sliding[:, :, : len(travel)] @ travel
+    return np.asarray(found[:, 0] if len(travel) == 1 else found)
 
 
 def travel_forces(system: ContactSystem, forces: Array) -> Array:
     """Forces (..., k) on the body along the travels, of nodes (..., n, k) against tangents [N]."""
-    arrays = travelling(system)
-    if forces.shape[-1] == 1:
-        return np.asarray(-forces[..., 0] @ arrays.sliding)[..., None]
-    across = arrays.sliding_across
-    return -np.stack([forces[..., 0] @ arrays.sliding + forces[..., 1] @ across[0],
-                      forces[..., 0] @ across[1] + forces[..., 1] @ across[2]], axis=-1)
+    k = forces.shape[-1]
+    return -np.einsum("...jt,jtk->...k", forces, travelling(system).sliding[:, :, :k])
 
 
 def _sides(system: ContactSystem) -> tuple[list[MotionSource], list[MotionSource]]:

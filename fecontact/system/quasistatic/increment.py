@@ -23,16 +23,13 @@ import numpy as np
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import Vector
-from fecontact.laws.signatures import normal_at
+from fecontact.system.node_forces import normal_gradients, tangent_force
 from fecontact.system.nodes import (
     GroundMotion,
     NodeMotion,
     SystemArrays,
-    in_space,
-    moved_across,
-    moved_along,
+    ground_travel,
     node_contact,
-    tangent_force,
 )
 from fecontact.system.polynomial_forces import (
     add_polynomial,
@@ -50,13 +47,6 @@ from fecontact.system.quasistatic.pose import (
     Pose,
     Room,
     Sliders,
-)
-from fecontact.system.space_nodes import (
-    WAVES_X,
-    WAVES_Y,
-    contact_in_space,
-    laws_of,
-    scale_under,
 )
 
 # Out-of-balance force that counts as rounding, relative to the forces that cancel, and the most
@@ -79,103 +69,61 @@ _SLIDES = 1e-14
 
 
 @helper
-def _node(j, q, moved, s):
-    """Displacements of node j along its first tangent and its second one, and where it is."""
+def _motion(j, q, s):
+    """Motion of node j at rest."""
     x, height, across = 0.0, 0.0, 0.0
     for i in range(len(q)):
         x += s.rows[j, 0, i] * q[i]
         height += s.rows[j, 1, i] * q[i]
-    if in_space(s):
+    if s.rows.shape[1] > 2:
         for i in range(len(q)):
             across += s.rows[j, 2, i] * q[i]
-        motion = NodeMotion(x, height, 0.0, 0.0, across, 0.0)
-        return x, across, contact_in_space(motion, moved, laws_of(j, s), s.sides[j],
-                                           s.profile_parameters)
-    return x, across, node_contact(j, NodeMotion(x, height, 0.0, 0.0, 0.0, 0.0), moved, s)
+    return NodeMotion((x, height, across), (0.0, 0.0, 0.0))
 
 
 @helper
-def _press(j, contact, s, out):
-    """F of node j and the force that friction sees under it.
+def _rub(j, tangents, pressing, sliders, pose, room, total, out):
+    """Fill ``total`` (d - 1,) with the forces of the sliders of node j along its tangents.
 
-    Fills out[1] and out[3] with their derivatives to displacements along the axes.
+    Places g of the node along its tangents stand in ``pose.node``. Fills rows 0 and 2 of ``out``
+    with the derivatives of the forces to displacements along the axes, by those of the pressing
+    force in its row d.
     """
-    F, F_u, _ = normal_at(s.normal[j])(contact.penetration, 0.0, s.normal_parameters[j])
-    out[1, 0], out[1, 1], out[1, 2] = F_u * contact.slope, -F_u, F_u * contact.slope_across
-    sign = 1.0 if F >= 0.0 else -1.0
-    pressing = abs(F)
-    for k in range(3):
-        out[3, k] = sign * out[1, k]
-    if s.friction_scale != 0 and s.on_ground[j] and F != 0.0:
-        a, b = 1.0, 0.0
-        if in_space(s):
-            a, b = s.sides[j, WAVES_X], s.sides[j, WAVES_Y]
-        scale, slope = scale_under(contact, a, b, s.friction_scale, s.friction_scale_parameters)
-        for k in range(3):
-            out[3, k] *= scale
-        out[3, 0] += a * slope * pressing
-        out[3, 2] += b * slope * pressing
-        pressing *= scale
-    return F, pressing
-
-
-@helper
-def _rub(j, g, g_across, pressing, sliders, pose, room, out):
-    """Sums of the forces of the sliders of node j along its tangents.
-
-    Fills out[0] and out[2] with their derivatives to displacements along the axes.
-    """
-    elements = sliders.stiffness.shape[1]
-    tangents = pose.force.shape[1] // elements
-    along, across = 0.0, 0.0
-    for k in range(3):
-        out[0, k], out[2, k] = 0.0, 0.0
-    for e in range(elements):
+    d = tangents + 1
+    for k in range(tangents):
+        total[k] = 0.0
+        for axis in range(d):
+            out[2 * k, axis] = 0.0
+    for e in range(sliders.stiffness.shape[1]):
         stiffness, limit, first = sliders.stiffness[j, e], sliders.limit[j, e], tangents * e
-        R = room.multiplier[j, first] + stiffness * (g - pose.left[j, first])
-        if tangents == 1:
-            if abs(R) <= limit * pressing:
-                out[0, 0] += stiffness
-            else:
-                sign = 1.0 if R > 0.0 else -1.0
-                R = sign * limit * pressing
-                out[0, 0] += sign * limit * out[3, 0]
-                out[0, 1] += sign * limit * out[3, 1]
-            pose.force[j, first] = R
-            along += R
-            continue
-        R2 = room.multiplier[j, first + 1] + stiffness * (g_across - pose.left[j, first + 1])
-        size = math.hypot(R, R2)
-        if size <= limit * pressing:
-            out[0, 0] += stiffness
-            out[2, 2] += stiffness
-        else:
-            a, b = R / size, R2 / size
-            turn = limit * pressing * stiffness / size
-            R, R2 = limit * pressing * a, limit * pressing * b
-            for k in range(3):
-                out[0, k] += limit * a * out[3, k]
-                out[2, k] += limit * b * out[3, k]
-            out[0, 0] += turn * b * b
-            out[0, 2] -= turn * a * b
-            out[2, 0] -= turn * a * b
-            out[2, 2] += turn * a * a
-        pose.force[j, first], pose.force[j, first + 1] = R, R2
-        along += R
-        across += R2
-    return along, across
+        R, size = pose.force[j, first : first + tangents], 0.0
+        for k in range(tangents):
+            g = pose.node[j, PLACE + PER_TANGENT * k]
+            R[k] = room.multiplier[j, first + k] + stiffness * (g - pose.left[j, first + k])
+            size = math.hypot(size, R[k])
+        sticks = size <= limit * pressing
+        turn = 0.0 if sticks or tangents == 1 else limit * pressing * stiffness / size
+        for k in range(tangents):
+            a = 0.0 if sticks else R[k] / size
+            out[2 * k, 2 * k] += stiffness if sticks else turn
+            for axis in range(d):
+                out[2 * k, axis] += limit * a * out[d, axis]
+            for other in range(tangents):
+                out[2 * k, 2 * other] -= turn * a * (0.0 if sticks else R[other] / size)
+        for k in range(tangents):
+            if not sticks:
+                R[k] = limit * pressing * R[k] / size
+            total[k] += R[k]
 
 
 @helper
-def _lean(F, contact, out):
+def _lean(F, contact, d, out):
     """Add what contact forces along the surface change to the derivatives of a node."""
-    for k in range(3):
-        out[0, k] += contact.slope * out[1, k]
-        out[2, k] += contact.slope_across * out[1, k]
-    out[0, 0] += F * contact.curvature
-    out[0, 2] += F * contact.twist
-    out[2, 0] += F * contact.twist
-    out[2, 2] += F * contact.curvature_across
+    for tangent in range(d - 1):
+        for axis in range(d):
+            out[2 * tangent, axis] += contact.slope[tangent] * out[1, axis]
+        for other in range(d - 1):
+            out[2 * tangent, 2 * other] += F * contact.curvature[tangent][other]
 
 
 @helper
@@ -219,6 +167,7 @@ def evaluate(
             size += abs(part)
         residual[i] = total
         room.before[i] = room.acting[i] = size
+    tangents, total = d - 1, room.total
     gradient, force = np.empty_like(s.polynomial_rows), np.zeros(m)
     if has_polynomial(s):
         add_polynomial(q, s, gradient, force)
@@ -227,24 +176,26 @@ def evaluate(
             room.before[i] += abs(force[i])
             room.acting[i] += abs(force[i])
     for j in range(n):
-        x, across, contact = _node(j, q, moved, s)
-        F, pressing = _press(j, contact, s, out)
-        gone = moved_along(j, moved.travel, moved.second_travel, s)
-        gone_across = 0.0
-        if in_space(s):
-            gone_across = moved_across(j, moved.travel, moved.second_travel, s)
-        R, R2 = _rub(j, x - gone, across - gone_across, pressing, sliders, pose, room, out)
-        T = tangent_force(F, R, contact.slope, s)
+        motion = _motion(j, q, s)
+        contact = node_contact(j, motion, moved, s)
+        F, pressing = normal_gradients(j, contact, s, out)
         node[j, FORCE], node[j, PRESSING], node[j, PENETRATION] = F, pressing, contact.penetration
-        node[j, PLACE], node[j, AGAINST], node[j, LEANING] = x - gone, T, F * contact.slope
+        for k in range(tangents):
+            node[j, PLACE + PER_TANGENT * k] = motion.places[2 * k] - ground_travel(k, j, moved, s)
+        _rub(j, tangents, pressing, sliders, pose, room, total, out)
         if s.follows_surface:
-            _lean(F, contact, out)
+            _lean(F, contact, d, out)
         # Springs round off with the displacements whose difference they feel.
         springs = 0.0
         for e in range(sliders.stiffness.shape[1]):
             springs += sliders.stiffness[j, e]
-        rounding = _SPRINGS * (springs * (abs(x) + abs(gone)) + _stretched(j, 0, sliders, pose))
-        _push(s.rows[j, 1], F, s.rows[j, 0], T, rounding, room)
+        for k in range(tangents):
+            second, gone = PER_TANGENT * k, ground_travel(k, j, moved, s)
+            T = tangent_force(F, total[k], contact.slope[k], s)
+            node[j, AGAINST + second], node[j, LEANING + second] = T, F * contact.slope[k]
+            rounding = _SPRINGS * (springs * (abs(motion.places[2 * k]) + abs(gone))
+                                   + _stretched(j, k, sliders, pose))
+            _push(s.rows[j, 1], F if k == 0 else 0.0, s.rows[j, 2 * k], T, rounding, room)
         if derive:
             for axis in range(d):
                 answer, sign = room.answers[j, axis], -1.0 if axis == 1 else 1.0
@@ -253,14 +204,6 @@ def evaluate(
                 for other in range(d):
                     for i in range(m):
                         answer[i] += sign * out[axis, other] * s.rows[j, other, i]
-        if in_space(s):
-            T = tangent_force(F, R2, contact.slope_across, s)
-            second = PER_TANGENT
-            node[j, PLACE + second], node[j, AGAINST + second] = across - gone_across, T
-            node[j, LEANING + second] = F * contact.slope_across
-            rounding = _SPRINGS * (springs * (abs(across) + abs(gone_across))
-                                   + _stretched(j, 1, sliders, pose))
-            _push(s.rows[j, 2], 0.0, s.rows[j, 2], T, rounding, room)
     for i in range(m):
         terms += room.before[i] ** 2 / room.scale[i]
     if derive:

@@ -15,8 +15,8 @@ import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Block, IntegerVector, Matrix, Vector
-from fecontact.laws.signatures import normal_at
-from fecontact.system.nodes import GroundMotion, SystemArrays, in_space, moved_across, moved_along
+from fecontact.system.node_forces import normal_force
+from fecontact.system.nodes import GroundMotion, SystemArrays, ground_moved
 from fecontact.system.polynomial_forces import (
     add_polynomial_forces,
     has_polynomial,
@@ -86,7 +86,7 @@ def _apply(given, s, load):
         load[i] = given[i]
         for axis in range(d):
             load[i] += given[m + axis] * s.drive_stiffness[axis] * s.drive_shapes[axis, i]
-    return GroundMotion(given[m + d], 0.0, given[m + d + 1] if in_space(s) else 0.0, 0.0)
+    return GroundMotion(given[m + d], 0.0, given[m + d + 1] if d > 2 else 0.0, 0.0)
 
 
 @helper
@@ -95,7 +95,7 @@ def _pressed_energy(j, before, after, s):
     total = 0.0
     for k in range(len(_PLACES)):
         u = before + _PLACES[k] * (after - before)
-        total += _WEIGHTS[k] * normal_at(s.normal[j])(u, 0.0, s.normal_parameters[j])[0]
+        total += _WEIGHTS[k] * normal_force(j, u, 0.0, s)[0]
     return total * (after - before)
 
 
@@ -189,12 +189,12 @@ def _works(old, new, given, s, out):
         out[_DRIVE] += 0.5 * s.drive_stiffness[axis] * stretch * (
             given[1, m + axis] - given[0, m + axis])
     travelled, second = given[1, m + d] - given[0, m + d], 0.0
-    if in_space(s):
+    if d > 2:
         second = given[1, m + d + 1] - given[0, m + d + 1]
     for j in range(len(old.node)):
-        out[_TRAVEL] += _moving(j, 0, moved_along(j, travelled, second, s), old, new, s)
-        if in_space(s):
-            out[_TRAVEL] += _moving(j, 1, moved_across(j, travelled, second, s), old, new, s)
+        for tangent in range(d - 1):
+            gone = ground_moved(tangent, j, travelled, second, s)
+            out[_TRAVEL] += _moving(j, tangent, gone, old, new, s)
 
 
 @routine
@@ -230,15 +230,16 @@ def _measure(
         part[len(WORKS) + j] = lost
         # By the trapezoidal rule F du is F y_R' dg - F dy.
         F = 0.5 * (old.node[j, FORCE] + new.node[j, FORCE])
-        along, across = _surface_work(j, 0, old, new), 0.0
-        if in_space(s):
-            across = _surface_work(j, 1, old, new)
-        lifted = 0.0
+        along, size, lifted = 0.0, 0.0, 0.0
+        for tangent in range(s.rows.shape[1] - 1):
+            part_along = _surface_work(j, tangent, old, new)
+            along += part_along
+            size += abs(part_along)
         for i in range(len(old.q)):
             lifted += s.rows[j, 1, i] * (new.q[i] - old.q[i])
         before, after = old.node[j, PENETRATION], new.node[j, PENETRATION]
-        gap += _pressed_energy(j, before, after, s) - along - across + F * lifted
-        pressed += abs(F * (after - before)) + abs(along) + abs(across)
+        gap += _pressed_energy(j, before, after, s) - along + F * lifted
+        pressed += abs(F * (after - before)) + size
     if has_polynomial(s):
         kept, work = _polynomial_work(old.q, new.q, s)
         gap += kept - work

@@ -41,8 +41,9 @@ class Room(NamedTuple):
     """Workspace of Newton's method; ``scale`` (m,) are typical stiffnesses of the modes.
 
     ``acting`` (m,) sums the magnitudes of the forces on each mode; ``answers`` (n, d, m) are minus
-    the forces on the nodes along their axes by the modes, ``partial`` (4, 3) the derivatives of T,
-    F, T across and the pressing force of a node to its displacements.
+    the forces on the nodes along their axes by the modes, ``partial`` (d + 1, 2 d) the derivatives
+    of T, F, T across and the pressing force of a node to its displacements and velocities, and
+    ``total`` (d - 1,) the forces of its sliders.
     """
 
     scale: Vector
@@ -55,6 +56,7 @@ class Room(NamedTuple):
     answers: Block
     matrix: Matrix
     partial: Matrix
+    total: Vector
     pivots: IntegerVector
 
 
@@ -74,5 +76,5 @@ def room_for(m: int, n: int, sliders: int, tangents: int, scale: Array) -> Room:
     start, acting, residual, step, before = np.zeros((5, m))
     return Room(np.ascontiguousarray(scale, dtype=float), start, acting, residual, step, before,
                 np.zeros((n, sliders * tangents)), np.zeros((n, 1 + tangents, m)), np.zeros((m, m)),
-                np.zeros((4, 3)),
+                np.zeros((2 + tangents, 2 * (1 + tangents))), np.zeros(tangents),
                 np.zeros(m, np.int64))

@@ -17,7 +17,6 @@ from fecontact.laws.friction.planar import along_slip, clear
 from fecontact.laws.signatures import friction_law, planar_friction_law, signal
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import kernels
-from fecontact.system.arrays import with_sides
 from fecontact.system.complex_modes import unstable_count
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.friction_memory import settled
@@ -180,7 +179,7 @@ def equilibrium_coordinates(
     # On level ground, and with its normal vertical, contact forces have no part along the surface.
     slides = bool(arrays.follows_surface and ground.wavy and arrays.rows[:, ::2].any()
                   and not standing)
-    upright = with_sides(arrays._replace(follows_surface=0))
+    upright = arrays._replace(follows_surface=0)
     reach = [_PART_OF_RANGE * np.abs(one.ranges).max(axis=1)
              for one in system.basis.large_deflections]
     problem = Balance(upright, time, system.penetration_scale,
@@ -227,14 +226,14 @@ def at_rest(
     arrays: SystemArrays, travel: float, second_travel: float = 0.0
 ) -> SystemArrays:
     """Arrays of a system without friction, on ground at rest that has travelled [m]."""
-    return with_sides(arrays._replace(
+    return arrays._replace(
         friction=np.full_like(arrays.friction, _frictionless.address),
         memory=np.zeros_like(arrays.memory),
         bristle_stiffness=np.zeros((2, len(arrays.gap), 0)), ground_motion=_still.address,
         planar=np.full_like(arrays.planar, along_slip.address),
         ground_motion_parameters=np.array([travel], dtype=float),
         second_motion=_still.address if len(arrays.planar) else 0,
-        second_motion_parameters=np.array([second_travel], dtype=float)))
+        second_motion_parameters=np.array([second_travel], dtype=float))
 
 
 @one_blas_thread

@@ -23,16 +23,10 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Block, Matrix, Vector
 from fecontact.core.types import Array, Integers
-from fecontact.laws.signatures import friction_at, normal_at
+from fecontact.laws.signatures import normal_at
 from fecontact.system.kernels import normal_values
-from fecontact.system.nodes import (
-    SystemArrays,
-    ground_motion,
-    in_space,
-    node_contact,
-    node_motion,
-    pressing_force,
-)
+from fecontact.system.node_forces import normal_force, plane_friction, pressing_force
+from fecontact.system.nodes import SystemArrays, ground_motion, node_contact, node_motion
 
 # Distance from a kink in w up to which forces are means.
 _REACH = 2.0
@@ -103,27 +97,26 @@ def _add_node(j, n, contact, change, far, s, f, A, widths, derivatives):
     """Add the change of a normal force to the rates f (d,) and their Jacobian A (d, d)."""
     dF, dF_u, dF_v, by_width = change
     m = s.rows.shape[2]
-    F, F_u, F_v = normal_at(s.normal[j])(contact.penetration, contact.rate,
-                                         s.normal_parameters[j])
+    F, F_u, F_v = normal_force(j, contact.penetration, contact.rate, s)
+    ground, curvature, slip = contact.slope[0], contact.curvature[0][0], contact.slip[0]
     new = F + dF
     # Change of friction, its derivatives to slip and place, and of the pressing force to F.
     dR, dR_v, by_F, by_change = 0.0, 0.0, 0.0, 0.0
     if s.memory[j] == 0:
         R, R_v, R_F = 0.0, 0.0, 0.0
-        law, p = s.friction[j], s.friction_parameters[j]
         if F != 0.0:
             scale = pressing_force(j, contact, F, s) / abs(F)
-            R, R_v, R_F = friction_at(law)(contact.slip, scale * abs(F), p)
+            R, R_v, R_F = plane_friction(j, slip, scale * abs(F), s)
             R_F *= scale if F >= 0.0 else -scale
         dR, dR_v, by_F = -R, -R_v, -R_F
         if new != 0.0:
             scale = pressing_force(j, contact, new, s) / abs(new)
             side = 1.0 if new * far >= 0.0 else -1.0
-            R, R_v, R_F = friction_at(law)(contact.slip, scale * abs(new), p)
+            R, R_v, R_F = plane_friction(j, slip, scale * abs(new), s)
             dR, dR_v = dR + side * R, dR_v + side * R_v
             R_F *= side * (scale if new >= 0.0 else -scale)
             by_F, by_change = by_F + R_F, R_F
-    slope = contact.slope if s.follows_surface else 0.0
+    slope = ground if s.follows_surface else 0.0
     dT = dR + slope * dF
     for i in range(m):
         f[m + i] += s.rows[j, 1, i] * dF - s.rows[j, 0, i] * dT
@@ -132,13 +125,13 @@ def _add_node(j, n, contact, change, far, s, f, A, widths, derivatives):
     for i in range(m):
         widths[i, n] += (s.rows[j, 1, i] - s.rows[j, 0, i] * (by_change + slope)) * by_width
     # Derivatives to x, y, x', y' of the node.
-    u_x, v_x = contact.slope, contact.curvature * contact.slip
+    u_x, v_x = ground, curvature * slip
     for k in range(m):
         tx, ty = s.rows[j, 0, k], s.rows[j, 1, k]
-        u_q, v_q, v_w = u_x * tx - ty, v_x * tx, contact.slope * tx - ty
+        u_q, v_q, v_w = u_x * tx - ty, v_x * tx, ground * tx - ty
         F_q, F_w = dF_u * u_q + dF_v * v_q, dF_v * v_w
         T_q = (by_F * (F_u * u_q + F_v * v_q) + (by_change + slope) * F_q
-               + (contact.curvature * tx * dF if s.follows_surface else 0.0))
+               + (curvature * tx * dF if s.follows_surface else 0.0))
         T_w = by_F * F_v * v_w + (by_change + slope) * F_w + dR_v * tx
         for i in range(m):
             A[m + i, k] += s.rows[j, 1, i] * F_q - s.rows[j, 0, i] * T_q
@@ -159,7 +152,7 @@ def add_kinks(
     """
     if derivatives:
         widths[:, :] = 0.0
-    if in_space(s) or len(onsets) == 0:
+    if s.rows.shape[1] > 2 or len(onsets) == 0:
         return
     for n in range(len(t)):
         moved = ground_motion(t[n], s)

@@ -6,14 +6,9 @@ import numpy as np
 
 from fecontact.core.compiled import kernel
 from fecontact.core.records import Block, Vector
-from fecontact.system.kernels import given_at, node_forces
-from fecontact.system.nodes import (
-    SystemArrays,
-    force_room,
-    memory_of,
-    node_motion,
-    tangent_force,
-)
+from fecontact.system.kernels import given_at
+from fecontact.system.node_forces import axis_force, force_room, node_forces
+from fecontact.system.nodes import SystemArrays, memory_of, node_motion
 
 
 @kernel
@@ -29,7 +24,7 @@ def forces_at_rest(
     the largest mean of the forces of loads and contact at rest for the last place, relative to the
     largest force; and the largest change of the mean of the loads, relative to the largest load.
     """
-    n, _, m = s.rows.shape
+    n, d, m = s.rows.shape
     P, N, states = len(places), len(tau), s.memory.max()
     force, rates = force_room(s)
     load, still = np.empty(m), np.zeros(2 * m + n * states)
@@ -46,11 +41,12 @@ def forces_at_rest(
             for i in range(m):
                 rest[c, i] = load[i]
             for j in range(n):
-                F, R, contact = node_forces(j, node_motion(j, still, s), moved,
-                                            memory_of(j, still, s), s, force, rates)
-                T = tangent_force(F, R, contact.slope, s)
-                for i in range(m):
-                    rest[c, i] += s.rows[j, 1, i] * F - s.rows[j, 0, i] * T
+                node = node_forces(j, node_motion(j, still, s), moved, memory_of(j, still, s), s,
+                                   force, rates)
+                for axis in range(d):
+                    push = axis_force(axis, node, force, rates, s)
+                    for i in range(m):
+                        rest[c, i] += s.rows[j, axis, i] * push
         for i in range(m):
             for j in range(m):
                 matrices[place, 0, i, j] = s.stiffness[i, j]

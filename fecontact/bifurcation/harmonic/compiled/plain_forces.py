@@ -64,7 +64,7 @@ def _node_motion(j, e):
     m, N = e.springs.shape[1], len(e.tau)
     for n in range(N):
         node[0, n], node[1, n], node[2, n] = 0.0, 0.0, 0.0
-    slip = -s.sliding[j] * ground_motion(0.0, s).speed
+    slip = -s.sliding[j, 0, 0] * ground_motion(0.0, s).speed
     for n in range(N):
         node[2, n] = slip
     for i in range(m):
@@ -147,7 +147,7 @@ def plain_forces(derivatives, h, e):
         _node_motion(j, e)
         level = -s.gap[j]
         if s.on_ground[j]:
-            level += ground_at(s.profile)(s.abscissa[j], s.profile_parameters)[0]
+            level += ground_at(s.profile)(s.places[j, 0], s.profile_parameters)[0]
         rubs = False
         for i in range(m):
             rubs = rubs or s.rows[j, 0, i] != 0.0
