@@ -81,6 +81,18 @@ def plane_friction(j, slip, pressing, s):
 
 
 @helper
+def friction_along(j, e, slip, pressing, s):
+    """Friction force of node j against a slip velocity along the unit vector e, and derivatives.
+
+    By a law without memory; in the plane e is 1 or -1, and the law may differ for these.
+    """
+    if s.rows.shape[1] == 2 and e[0] < 0.0:
+        R, R_v, R_F = plane_friction(j, -slip, pressing, s)
+        return -R, R_v, -R_F
+    return plane_friction(j, slip, pressing, s)
+
+
+@helper
 def set_friction(j, slip, pressing, z, p, s, force, rates):
     """Fill ``force`` and ``rates`` with the friction of node j, by its law with parameters p."""
     if s.rows.shape[1] > 2:

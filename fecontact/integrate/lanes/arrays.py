@@ -49,7 +49,7 @@ class LaneSystem(NamedTuple):
     load_shapes: Annotated[Array, ANY, MODES, WIDTH]
     rows: Annotated[Array, NODES, 2, MODES, WIDTH]
     gap: Annotated[Array, NODES, WIDTH]
-    sliding: Annotated[Array, NODES, WIDTH]
+    sliding: Annotated[Array, NODES, 1, 2, WIDTH]
     normal_parameters: Annotated[Array, NODES, ANY, WIDTH]
     friction_parameters: Annotated[Array, NODES, ANY, WIDTH]
     ground_motion_parameters: Annotated[Array, ANY, WIDTH]

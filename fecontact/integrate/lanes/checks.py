@@ -89,7 +89,7 @@ def slip_error(error, speed, s, control, w):
         slip = spread(0.0)
         for i in range(m):
             slip += read(s.rows[j, 0, i]) * read(difference[m + i])
-        distance = magnitude(read(w.speeds[j]) - read(s.sliding[j]) * speed)
+        distance = magnitude(read(w.speeds[j]) - read(s.sliding[j, 0, 0]) * speed)
         part = magnitude(slip) / (_SLIP_PART * (read(control.slip_scale[j]) + distance))
         touching = magnitude(read(w.forces[j, FORCE])) > 0.0
         error = chosen(touching & (part > error), part, error)
@@ -124,7 +124,7 @@ def next_kink(s, control, progress, within):
         fall = (read(progress.forces[j, BY_PLACE]) * v + read(progress.forces[j, BY_RATE]) * a)
         lift = -force / fall
         first = chosen(pressed & (fall < 0.0) & (lift < first), lift, first)
-        slip = read(progress.speeds[j]) - read(s.sliding[j]) * speed
+        slip = read(progress.speeds[j]) - read(s.sliding[j, 0, 0]) * speed
         towards = chosen(slip > 0.0, -x, x)
         slow, size = read(control.slow[j]), magnitude(slip)
         stop = (size - slow) / towards
@@ -164,7 +164,7 @@ def restless(h, s, control, progress, w):
     speed = read(progress.ground)
     some = mask_of(0)
     for j in range(n):
-        spread_ = magnitude(read(s.sliding[j])) * read(control.numbers[QUICKEST]) * h
+        spread_ = magnitude(read(s.sliding[j, 0, 0])) * read(control.numbers[QUICKEST]) * h
         k1, k2, k3 = _course(s.rows[j, 1], 0, w.dense)
         first, last = read(progress.places[n + j]), read(w.places[n + j])
         low, high, monotone = _range(first, last, k1, k2, k3)
@@ -178,7 +178,7 @@ def restless(h, s, control, progress, w):
             some = some | ((mixed | (bottom < felt)) & ~monotone)
             touching = touching | (bottom < 0.0) | mask_of(-1 if level > 0 else 0)
         k1, k2, k3 = _course(s.rows[j, 0], m, w.dense)
-        passing = read(s.sliding[j]) * speed
+        passing = read(s.sliding[j, 0, 0]) * speed
         first, last = read(progress.speeds[j]) - passing, read(w.speeds[j]) - passing
         low, high, monotone = _range(first, last, k1, k2, k3)
         largest = larger(-low, high) + spread_

@@ -94,7 +94,7 @@ def set_rate(y, speed, s, load, places, speeds, forces, rate):
     project(s, y, places, speeds)
     _accelerate(y, s, load, rate)
     for j in range(n):
-        slip = read(speeds[j]) - read(s.sliding[j]) * speed
+        slip = read(speeds[j]) - read(s.sliding[j, 0, 0]) * speed
         F = node_lanes_at(s.normal[j])(-read(places[n + j]) - read(s.gap[j]),
                                        -read(speeds[n + j]), s.normal_parameters[j])[0]
         R = node_lanes_at(s.friction[j])(slip, magnitude(F), s.friction_parameters[j])[0]
@@ -109,7 +109,7 @@ def set_rate_and_forces(y, speed, s, load, places, speeds, forces, rate):
     project(s, y, places, speeds)
     _accelerate(y, s, load, rate)
     for j in range(n):
-        slip = read(speeds[j]) - read(s.sliding[j]) * speed
+        slip = read(speeds[j]) - read(s.sliding[j, 0, 0]) * speed
         F, by_place, by_rate = node_lanes_at(s.normal[j])(
             -read(places[n + j]) - read(s.gap[j]), -read(speeds[n + j]), s.normal_parameters[j])
         R, by_slip, by_force = node_lanes_at(s.friction[j])(slip, magnitude(F),
@@ -183,5 +183,5 @@ def set_time_rate(t, later, speed, s, forces, out):
         return
     acceleration = (ground_speed(later, s) - speed) * per_time
     for j in range(n):
-        push = read(s.sliding[j]) * acceleration * read(forces[j, BY_SLIP])
+        push = read(s.sliding[j, 0, 0]) * acceleration * read(forces[j, BY_SLIP])
         add_load(push, s.rows[j, 0], out)

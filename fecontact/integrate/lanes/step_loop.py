@@ -187,7 +187,7 @@ def _unfelt_part(lane, t, h, target, b, problem, progress, room):
         return 1.0
     n, _, m = s.rows.shape
     for j in range(n):
-        s.gap[j], s.sliding[j, 0, 0] = b.system.gap[j, lane], b.system.sliding[j, lane]
+        s.gap[j], s.sliding[j, 0, 0] = b.system.gap[j, lane], b.system.sliding[j, 0, 0, lane]
         control.slip_scale[j] = b.control.slip_scale[j, lane]
         for level in range(len(control.levels)):
             control.levels[level, j] = b.control.levels[level, j, lane]

@@ -227,12 +227,10 @@ def start(
         loop = partial(run_for(problem), Data(*data, workspace, room_for(problem), watch))
     else:
         from fecontact.integrate.nonsmooth import time_stepping
-        from fecontact.integrate.nonsmooth.space_contact import in_space
-        from fecontact.integrate.nonsmooth.stepping_room import IN_PLANE
         from fecontact.integrate.nonsmooth.stepping_room import room_for as stepping_room
         _require_no_events(events)
         loop = partial(time_stepping.run_steps, time_stepping.Data(
-            *data, workspace, stepping_room(problem, in_space() if solid else IN_PLANE)))
+            *data, workspace, stepping_room(problem)))
     return Run(loop, course, output, kept, watch, method)
 
 

@@ -29,7 +29,9 @@ from fecontact.integrate.nonsmooth.problem import (
     PRESSING,
     RATE,
     SLIP,
+    SLIP_OF,
     SLOPE,
+    SLOPE_OF,
     STICK,
     NonsmoothProblem,
     Workspace,
@@ -96,16 +98,21 @@ def contact_powers(moved, s, nodes, friction, elastic, out):
 
     ``elastic`` says whether the normal forces come from the normal laws.
     """
-    for j in range(len(nodes)):
-        force, R, speed = nodes[j, FORCE], friction[j], ground_speed(0, j, moved, s)
-        out[BELT_NORMAL] += belt_normal_power(force, nodes[j, SLOPE], nodes[j, SLIP], speed, s)
-        out[BELT_FRICTION] -= R * speed
+    n = len(nodes)
+    for j in range(n):
+        force, rubbed = nodes[j, FORCE], 0.0
+        for k in range(s.rows.shape[1] - 1):
+            R, speed = friction[k * n + j], ground_speed(k, j, moved, s)
+            slip, slope = nodes[j, SLIP_OF[k]], nodes[j, SLOPE_OF[k]]
+            out[BELT_NORMAL] += belt_normal_power(force, slope, slip, speed, s)
+            out[BELT_FRICTION] -= R * speed
+            rubbed += R * slip
         if elastic and nodes[j, RATE] != 0.0:
             # Damping may bring the force to zero while the spring is still compressed.
             stored = normal_force(j, nodes[j, PENETRATION], 0.0, s)[0]
             out[CONTACT_DAMPING] += (force - stored) * nodes[j, RATE]
-        out[POWER_COUNT + j] = R * nodes[j, SLIP]
-        out[FRICTION] += out[POWER_COUNT + j]
+        out[POWER_COUNT + j] = rubbed
+        out[FRICTION] += rubbed
 
 
 @helper
@@ -132,7 +139,8 @@ def observe_forces(moved, Y, p, nodes):
                 grip = 0.0
         nodes[j, FORCE], nodes[j, PRESSING] = force, pressing_force(j, contact, force, s)
         nodes[j, PENETRATION], nodes[j, RATE] = contact.penetration, contact.rate
-        nodes[j, SLIP], nodes[j, SLOPE] = contact.slip[0], contact.slope[0]
+        for k in range(s.rows.shape[1] - 1):
+            nodes[j, SLIP_OF[k]], nodes[j, SLOPE_OF[k]] = contact.slip[k], contact.slope[k]
         nodes[j, GRIP] = grip
         nodes[j, CURVED] = contact.curvature[0][0] * contact.slip[0] * contact.slip[0]
 

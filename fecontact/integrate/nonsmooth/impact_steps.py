@@ -51,7 +51,6 @@ from fecontact.integrate.nonsmooth.problem import (
     pace,
     pass_break,
 )
-from fecontact.integrate.nonsmooth.space_contact import contact_of
 from fecontact.integrate.nonsmooth.space_impulses import (
     ImpactRoom,
     find_impulses,
@@ -72,7 +71,7 @@ from fecontact.integrate.step_loop import (
 )
 from fecontact.system.kernels import body_acceleration, given_at
 from fecontact.system.node_forces import friction_scale, plane_friction
-from fecontact.system.nodes import ground_motion, ground_speed
+from fecontact.system.nodes import ground_motion, ground_speed, node_contact, node_motion
 from fecontact.system.powers import (
     BELT_FRICTION,
     BELT_NORMAL,
@@ -141,7 +140,7 @@ def _observe_nodes(t, Y, closed, quick, p, room):
     moved = ground_motion(t, s)
     struck = False
     for j in range(n):
-        contact = contact_of(j, middle, moved, s)
+        contact = node_contact(j, node_motion(j, middle, s), moved, s)
         room.touching[j] = 1 if closed[j] or contact.penetration >= 0.0 else 0
         if not room.touching[j]:
             continue
@@ -261,7 +260,7 @@ def _too_deep(t, Y, closed, limits, p, room):
     for j in range(len(closed)):
         if closed[j]:
             continue
-        depth = contact_of(j, Y, moved, s).penetration
+        depth = node_contact(j, node_motion(j, Y, s), moved, s).penetration
         if depth > 0.0:
             allowed = 0.0
             for i in range(s.rows.shape[2]):

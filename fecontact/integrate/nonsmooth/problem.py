@@ -30,6 +30,8 @@ STEEP, CREEP = 1e36, 1e-18
 NODE_COLUMNS, SPACE_NODE_COLUMNS = 9, 11
 (FORCE, PRESSING, PENETRATION, RATE, SLIP, SLOPE, CURVED, LIMIT, GRIP, SLIP_ACROSS,
  SLOPE_ACROSS) = range(SPACE_NODE_COLUMNS)
+# Columns along both tangents.
+SLIP_OF, SLOPE_OF = (SLIP, SLIP_ACROSS), (SLOPE, SLOPE_ACROSS)
 
 # Status of a cluster; a slipping one has the sign of its slip velocity, +1 or -1.
 OPEN, STICK, FIXED = 0, 2, 3

@@ -30,8 +30,7 @@ from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import IntegerMatrix, IntegerVector, Matrix, Vector
 from fecontact.integrate.nonsmooth.problem import NonsmoothProblem
-from fecontact.integrate.nonsmooth.space_contact import contact_of
-from fecontact.system.nodes import ground_motion
+from fecontact.system.nodes import ground_motion, node_contact, node_motion
 from fecontact.system.powers import POWER_COUNT
 
 _SWEEPS = 20000
@@ -238,7 +237,7 @@ def put_on_ground(t, Y, closed, p, room):
     factorise(room.matrix, m, room.pivots)
     deepest = 0.0
     for j in range(n):
-        contact = contact_of(j, middle, moved, s)
+        contact = node_contact(j, node_motion(j, middle, s), moved, s)
         room.touching[j] = 1 if closed[j] or contact.penetration > margin else 0
         set_rows(j, contact, p, room)
         room.rest[j] = margin - contact.penetration

@@ -10,7 +10,12 @@ until nothing creeps (augmented Lagrangian). Nodes whose stick the others bring 
 no trouble: the equations for V stay regular, and only the way in which such nodes share a force
 remains open; each keeps what it carried when it came to rest, as far as its limit allows.
 
-In space R_j and v_j are vectors, see :mod:`fecontact.integrate.nonsmooth.space_contact`.
+In space R_j and v_j are vectors along both tangents,
+
+    |R| <= mu(0+) F  where v = 0,    R = mu(|v|) F v / |v|  else,
+
+and R is the projection of ``lambda + r v`` on the disc of stick, or beyond it the force of slip in
+its direction e. Once lambda has become R, e is the direction of v.
 
 References
 ----------
@@ -19,18 +24,16 @@ solution methods, Computer Methods in Applied Mechanics and Engineering 92 (1991
 """
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper
 from fecontact.core.records import Block, Matrix, Vector
 from fecontact.integrate.nonsmooth.equations import free_acceleration, stick_limit
-from fecontact.integrate.nonsmooth.problem import CREEP, NonsmoothProblem
-from fecontact.system.node_forces import normal_gradients, plane_friction, tangent_force
-from fecontact.system.nodes import GroundMotion, node_contact, node_motion
+from fecontact.integrate.nonsmooth.problem import CREEP
+from fecontact.system.node_forces import friction_along, normal_gradients, tangent_force
+from fecontact.system.nodes import node_contact, node_motion, size_of
 from fecontact.system.polynomial_forces import (
     add_polynomial_stiffness,
     has_polynomial,
@@ -40,6 +43,8 @@ from fecontact.system.polynomial_forces import (
 # Stiffness that holds a sticking node during Newton's iteration, relative to its inertia.
 GRIP = 1e6
 ROUNDING = 2e-8
+# Part of the softness against rounding that is enough for a node in space.
+_FINER = 1e-4
 _ITERATIONS = 60
 # Newton steps without shortening.
 _HASTY = 8
@@ -65,14 +70,12 @@ class Hold(NamedTuple):
 
     ``grip`` is r, ``multiplier`` is lambda, and ``side`` the sign of the slip of each node at the
     last evaluation, zero for stick. In space the last two are vectors (2 n,), of all first and then
-    of all second components, the latter of length one in slip, and ``linearise`` is the address of
-    :data:`fecontact.integrate.nonsmooth.space_contact.linearise_in_space`.
+    of all second components, the latter of length one in slip.
     """
 
     grip: Vector
     multiplier: Vector
     side: Vector
-    linearise: int
 
 
 class NewtonRoom(NamedTuple):
@@ -95,13 +98,6 @@ class NewtonRoom(NamedTuple):
     polynomial: Matrix
 
 
-# Evaluates the contact of a stage in space: number of nodes under force, and creep velocity.
-LINEARISE = Callable[[
-    Stage, GroundMotion, NonsmoothProblem, Hold, int, NewtonRoom, Vector,
-], tuple[float, float]]
-_linearise_at = function_at(LINEARISE)
-
-
 def newton_room_for(
     nodes: int, modes: int, tangents: int = 1, combinations: int = 0
 ) -> NewtonRoom:
@@ -115,58 +111,122 @@ def newton_room_for(
 
 
 @helper
+def _grip(j, g, hold, s):
+    """Parameter r of node j in stick, in space larger where rounding limits it.
+
+    Across a fast belt slip velocities are small, and nodes must come to rest in shorter steps.
+    """
+    if s.rows.shape[1] == 2 or hold.grip[j] == 0.0:
+        return hold.grip[j]
+    inertia = 0.0
+    for axis in range(0, s.rows.shape[1], 2):
+        total = 0.0
+        for i in range(s.rows.shape[2]):
+            total += s.rows[j, axis, i] * s.rows[j, axis, i]
+        inertia = max(inertia, total)
+    softest = inertia * g / GRIP
+    return 1.0 / (softest + _FINER * max(1.0 / hold.grip[j] - softest, 0.0))
+
+
+@helper
+def along_tangents(values, j, n):
+    """Entries of node j in an array (n,), in space (2 n,), along the tangents."""
+    return values[j], values[n + j] if len(values) > n else 0.0
+
+
+@helper
+def _set_friction(j, contact, pressing, g, p, hold, turning, partial, force):
+    """Fill ``force`` and ``hold.side`` of node j; returns its creep velocity.
+
+    Fills rows 0 and 2 of ``partial`` (d + 1, 2 d) with the derivatives of the friction force to V
+    along the axes, by those of the pressing force in its row d. The creep velocity is one that
+    there must not be: of a sticking node, or of slip athwart its friction; infinite when the node
+    has changed between stick and slip.
+    """
+    s, side, slip = p.system, hold.side, contact.slip
+    n, d, _ = s.rows.shape
+    grip, limit = _grip(j, g, hold, s), stick_limit(j, pressing, p)
+    for k in range(d - 1):
+        force[k * n + j] = hold.multiplier[k * n + j] + grip * slip[k]
+    trial, before = along_tangents(force, j, n), along_tangents(side, j, n)
+    size, on = size_of(trial), trial[0] * before[0] + trial[1] * before[1]
+    stuck = before[0] == 0.0 and before[1] == 0.0
+    sticks = size <= limit
+    if turning == KEPT:
+        sticks = stuck
+    elif turning == HESITANT and on < 0.0:
+        sticks = True
+    if sticks:
+        for k in range(d - 1):
+            side[k * n + j] = 0.0
+            for axis in range(d):
+                partial[2 * k, axis] = grip if axis == 2 * k else 0.0
+        return size_of(slip) if stuck else math.inf
+    e, turns = before, size > 0.0 and (turning != KEPT or on > 0.0)
+    if turns:
+        e = (trial[0] / size, trial[1] / size)
+    creep = math.inf if before[0] * e[0] + before[1] * e[1] <= 0.0 else 0.0
+    speed = e[0] * slip[0] + e[1] * slip[1]
+    R, R_v, R_F = friction_along(j, e, max(speed, CREEP), pressing, s)
+    if speed < 0.0:
+        creep = max(creep, size_of(slip))
+        R_v = 0.0
+    # Slip too slow to turn the trial force ends before its direction matters.
+    if grip * speed > limit:
+        creep = max(creep, abs(e[0] * slip[1] - e[1] * slip[0]))
+    # The force of slip turns with the trial force.
+    around = R * grip / size if turns and d > 2 else 0.0
+    for k in range(d - 1):
+        side[k * n + j], force[k * n + j] = e[k], R * e[k]
+        for axis in range(d):
+            partial[2 * k, axis] = R_F * e[k] * partial[d, axis]
+        for other in range(d - 1):
+            partial[2 * k, 2 * other] += (R_v - around) * e[k] * e[other]
+        partial[2 * k, 2 * k] += around
+    return creep
+
+
+@helper
 def _linearise(stage, moved, p, hold, turning, room, force):
     """Contact of one stage: accelerations, friction forces and rows of the Jacobian.
 
-    Adds modal contact forces to ``room.balance``, fills ``force`` (n,) with R, and ``active`` and
-    ``gradients`` of the room. KEPT nodes stay on their side; HESITANT ones that would turn their
-    slip around are first tried as sticking, or the iteration would jump across stick for ever.
-    Returns the number of nodes under force and the largest creep velocity of a sticking node,
-    infinite when a node has changed between stick and slip.
+    Adds modal contact forces to ``room.balance``, fills ``force`` (n,), in space (2 n,), with R,
+    and ``active`` and ``gradients`` of the room. KEPT nodes stay on their side; HESITANT ones that
+    would turn their slip around are first tried as sticking, or the iteration would jump across
+    stick for ever. Returns the number of nodes under force and the largest creep velocity.
     """
-    s, g, side, partial = p.system, stage.g, hold.side, room.partial
-    n, _, m = s.rows.shape
+    s, g, partial = p.system, stage.g, room.partial
+    n, d, m = s.rows.shape
     count, creep = 0, 0.0
     for j in range(n):
-        force[j] = 0.0
+        for k in range(d - 1):
+            force[k * n + j] = 0.0
         contact = node_contact(j, node_motion(j, stage.Y, s), moved, s)
         F, pressing = normal_gradients(j, contact, s, partial)
         if F == 0.0:
             continue
-        slip = contact.slip[0]
-        along, away = g * partial[1, 0] + partial[1, 2], g * partial[1, 1] + partial[1, 3]
-        limit = stick_limit(j, pressing, p)
-        trial = hold.multiplier[j] + hold.grip[j] * slip
-        turned = trial if abs(trial) > limit else 0.0
-        if turning == KEPT:
-            turned = side[j]
-        if turned == 0.0 or (turning == HESITANT and turned * side[j] < 0.0):
-            R, R_along, R_away = trial, hold.grip[j], 0.0
-            creep = max(creep, abs(slip)) if turned == side[j] == 0.0 else math.inf
-            side[j] = 0.0
-        else:
-            sense = 1.0 if turned > 0.0 else -1.0
-            if side[j] != sense:
-                creep = math.inf
-            side[j] = sense
-            R, R_v, R_F = plane_friction(j, sense * max(sense * slip, CREEP), pressing, s)
-            if sense * slip < 0.0:
-                creep = max(creep, abs(slip))
-                R_v = 0.0
-            R_along = R_v + R_F * (g * partial[2, 0] + partial[2, 2])
-            R_away = R_F * (g * partial[2, 1] + partial[2, 3])
-        force[j] = R
-        slope = contact.slope[0]
-        T = tangent_force(F, R, slope, s)
-        if s.follows_surface:
-            R_along += slope * along + g * F * contact.curvature[0][0]
-            R_away += slope * away
-        for i in range(m):
-            tx, ty = s.rows[j, 0, i], s.rows[j, 1, i]
-            room.balance[i] += ty * F - tx * T
-            room.active[count, 0, i], room.active[count, 1, i] = tx, ty
-            room.gradients[count, 0, i] = R_along * tx + R_away * ty
-            room.gradients[count, 1, i] = -along * tx - away * ty
+        for row in (1, d):
+            for axis in range(d):
+                partial[row, axis] = g * partial[row, axis] + partial[row, d + axis]
+        creep = max(creep, _set_friction(j, contact, pressing, g, p, hold, turning, partial, force))
+        for k in range(d - 1):
+            if s.follows_surface:
+                for axis in range(d):
+                    partial[2 * k, axis] += contact.slope[k] * partial[1, axis]
+                for other in range(d - 1):
+                    partial[2 * k, 2 * other] += g * F * contact.curvature[k][other]
+        for axis in range(d):
+            push, sign = F, -1.0
+            if axis != 1:
+                k, sign = axis // 2, 1.0
+                push = -tangent_force(F, force[k * n + j], contact.slope[k], s)
+            for i in range(m):
+                total = 0.0
+                for other in range(d):
+                    total += partial[axis, other] * s.rows[j, other, i]
+                room.balance[i] += s.rows[j, axis, i] * push
+                room.active[count, axis, i] = s.rows[j, axis, i]
+                room.gradients[count, axis, i] = sign * total
         count += 1
     return count, creep
 
@@ -178,11 +238,7 @@ def _evaluate(stage, p, hold, turning, room, force):
     for i in range(m):
         Y[i] = stage.start[i] + stage.g * Y[m + i]
     moved = free_acceleration(stage.t, Y, p.system, room.balance)
-    if p.system.rows.shape[1] > 2:
-        found, creep = _linearise_at(hold.linearise)(stage, moved, p, hold, turning, room, force)
-        count = int(found)
-    else:
-        count, creep = _linearise(stage, moved, p, hold, turning, room, force)
+    count, creep = _linearise(stage, moved, p, hold, turning, room, force)
     for i in range(m):
         room.residual[i] = stage.known[i] + stage.g * room.balance[i] - Y[m + i]
     return count, creep

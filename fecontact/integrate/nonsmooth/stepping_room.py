@@ -1,25 +1,13 @@
-"""Workspace of implicit steps with set-valued friction; addresses of functions in space."""
+"""Workspace of implicit steps with set-valued friction."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from fecontact.core.records import Matrix, Vector
 from fecontact.integrate.bernstein import DEPTH, fit
-from fecontact.integrate.nonsmooth.problem import (
-    NonsmoothProblem,
-    Step,
-    Workspace,
-    node_columns,
-    tangents,
-)
-from fecontact.integrate.nonsmooth.stage_newton import (
-    Hold,
-    NewtonRoom,
-    newton_room_for,
-)
-from fecontact.system.nodes import GroundMotion
+from fecontact.integrate.nonsmooth.problem import NonsmoothProblem, node_columns, tangents
+from fecontact.integrate.nonsmooth.stage_newton import Hold, NewtonRoom, newton_room_for
 from fecontact.system.powers import POWER_COUNT
 
 STAGES = 3
@@ -31,20 +19,6 @@ SLOWEST, IN_A_ROW, UNSOLVED = range(TRIES)
 THIRDS = fit(np.arange(4) / 3.0)
 
 
-class InSpace(NamedTuple):
-    """Addresses of what is different in space; see `nonsmooth.space_contact`."""
-
-    observe: int
-    powers: int
-    slips_back: int
-    linearise: int
-
-
-IN_PLANE = InSpace(0, 0, 0, 0)
-OBSERVE = Callable[[GroundMotion, Vector, NonsmoothProblem, Matrix], None]
-POWERS = Callable[[GroundMotion, NonsmoothProblem, Matrix, Vector, Vector], None]
-
-
 class Room(NamedTuple):
     """Workspace of implicit steps.
 
@@ -52,8 +26,6 @@ class Room(NamedTuple):
     ----------
     newton, hold : NewtonRoom, Hold
         Workspace and stick variables of the stages.
-    space : InSpace
-        Addresses of functions that are different in space.
     states, accelerations, forces, rates : (3, 2 m), (3, m), (3, n), (3, p + n) arrays
         Of the stages: Y, q'', friction forces, in space (3, 2 n), and powers.
     start, known : (m,) arrays
@@ -74,7 +46,6 @@ class Room(NamedTuple):
 
     newton: NewtonRoom
     hold: Hold
-    space: InSpace
     states: Matrix
     accelerations: Matrix
     forces: Matrix
@@ -93,17 +64,14 @@ class Room(NamedTuple):
     halves: Matrix
 
 
-SLIPS_BACK = Callable[[int, Step, NonsmoothProblem, Workspace, float, Room], float]
-
-
-def room_for(problem: NonsmoothProblem, space: InSpace = IN_PLANE) -> Room:
+def room_for(problem: NonsmoothProblem) -> Room:
     """Workspace for a problem."""
     n, _, m = problem.system.rows.shape
     size, k = m + POWER_COUNT + n, tangents(problem)
     start, known = np.zeros((2, m))
     before, after = np.zeros((2, size))
     return Room(newton_room_for(n, m, k, len(problem.system.polynomial_rows)),
-                Hold(np.zeros(n), np.zeros(k * n), np.zeros(k * n), space.linearise), space,
+                Hold(np.zeros(n), np.zeros(k * n), np.zeros(k * n)),
                 np.zeros((STAGES, 2 * m)), np.zeros((STAGES, m)), np.zeros((STAGES, k * n)),
                 np.zeros((STAGES, size - m)), start, known, np.zeros(m + size), before, after,
                 np.zeros((n, node_columns(problem))), np.zeros(k * n),

@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.bernstein import NOWHERE, first_below
 from fecontact.integrate.nonsmooth.equations import contact_powers, observe
@@ -26,8 +25,7 @@ from fecontact.integrate.nonsmooth.problem import (
     LIMIT,
     PENETRATION,
     RATE,
-    SLIP,
-    SLIP_ACROSS,
+    SLIP_OF,
     SLIP_SIZE,
     Limits,
     NonsmoothProblem,
@@ -41,9 +39,6 @@ from fecontact.integrate.nonsmooth.problem import (
 from fecontact.integrate.nonsmooth.stage_newton import GRIP, ROUNDING, Stage, solve_stage
 from fecontact.integrate.nonsmooth.stepping_room import (
     IN_A_ROW,
-    OBSERVE,
-    POWERS,
-    SLIPS_BACK,
     SLOWEST,
     STAGES,
     THIRDS,
@@ -64,9 +59,6 @@ from fecontact.integrate.step_loop import (
 from fecontact.system.nodes import ground_motion, ground_speed
 from fecontact.system.polynomial_forces import add_polynomial_product, has_polynomial
 from fecontact.system.powers import body_powers
-
-_observe_at, _powers_at = function_at(OBSERVE), function_at(POWERS)
-_slips_back_at = function_at(SLIPS_BACK)
 
 GAMMA = 0.43586652150845899942
 A21 = 0.5 * (1.0 - GAMMA)
@@ -97,14 +89,6 @@ class Data(NamedTuple):
 
 
 @helper
-def _observe(moved, Y, p, nodes, room):
-    if p.system.rows.shape[1] > 2:
-        _observe_at(room.space.observe)(moved, Y, p, nodes)
-    else:
-        observe(moved, Y, p, nodes)
-
-
-@helper
 def _fastest_side(moved, p):
     """Largest speed of what slides under the nodes."""
     s, fastest = p.system, 0.0
@@ -117,23 +101,34 @@ def _fastest_side(moved, p):
 
 
 @helper
-def _slips_back(j, h, p, w, tolerance, room):
-    """Part of a step at which node j slips back between ends with slip of one sense; or 1."""
-    s, b, speed = p.system, room.cubic, room.speed
-    factor = s.sliding[j, 0, 0]
-    first, last = room.old[j, SLIP], w.nodes[j, SLIP]
-    if not (room.old[j, FORCE] != 0.0 and w.nodes[j, FORCE] != 0.0 and first * last > 0.0
-            and min(abs(first), abs(last)) > tolerance):
+def _slips_back(j, step, p, w, tolerance, room):
+    """Part of a step at which node j slips back between ends with slip of one sense; or 1.
+
+    Along the direction of the slip at the begin.
+    """
+    s, b, speed, old, h = p.system, room.cubic, room.speed, room.old, step.h
+    first, last, rise, fall = 0.0, 0.0, 0.0, 0.0
+    for k in range(s.rows.shape[1] - 1):
+        first = math.hypot(first, old[j, SLIP_OF[k]])
+    if old[j, FORCE] == 0.0 or w.nodes[j, FORCE] == 0.0 or first <= tolerance:
         return 1.0
-    sign = 1.0 if first > 0.0 else -1.0
-    rise, fall = 0.0, 0.0
-    for i in range(s.rows.shape[2]):
-        rise += s.rows[j, 0, i] * room.before[i]
-        fall += s.rows[j, 0, i] * room.accelerations[STAGES - 1, i]
-    b[0], b[3] = first + factor * speed[0], last + factor * speed[3]
+    speed[:] = 0.0
+    for k in range(s.rows.shape[1] - 1):
+        e = old[j, SLIP_OF[k]] / first
+        last += e * w.nodes[j, SLIP_OF[k]]
+        for i in range(s.rows.shape[2]):
+            rise += e * s.rows[j, 2 * k, i] * room.before[i]
+            fall += e * s.rows[j, 2 * k, i] * room.accelerations[STAGES - 1, i]
+        for third in range(4):
+            moved = ground_motion(step.t + h * third / 3.0, s)
+            for i in range(4):
+                speed[i] += THIRDS[i, third] * e * ground_speed(k, j, moved, s)
+    if last <= tolerance:
+        return 1.0
+    b[0], b[3] = first + speed[0], last + speed[3]
     b[1], b[2] = b[0] + h * rise / 3.0, b[3] - h * fall / 3.0
     for i in range(4):
-        b[i] = sign * (b[i] - factor * speed[i]) + tolerance
+        b[i] += tolerance - speed[i]
     back = first_below(b, room.halves)
     if back == NOWHERE:
         return 1.0
@@ -163,19 +158,10 @@ def _passed_over(step, p, limits, tolerance, w, room):
 
     Between the ends cubics count. Reversals below ``tolerance`` are left out.
     """
-    for i in range(4):
-        room.speed[i] = 0.0
-        for k in range(4):
-            room.speed[i] += THIRDS[i, k] * ground_motion(step.t + step.h * k / 3.0,
-                                                           p.system).speed
     shorter = 1.0
     for j in range(len(room.old)):
-        if p.system.rows.shape[1] > 2:
-            back = _slips_back_at(room.space.slips_back)(j, step, p, w, tolerance, room)
-        else:
-            back = _slips_back(j, step.h, p, w, tolerance, room)
-        shorter = min(shorter, back)
-        shorter = min(shorter, _touches(j, step.h, p, w, limits, room))
+        shorter = min(shorter, _slips_back(j, step, p, w, tolerance, room),
+                      _touches(j, step.h, p, w, limits, room))
     return shorter
 
 
@@ -214,7 +200,7 @@ def _fill(row, output, step, data):
     for i in range(2 * m, len(Y)):
         states[row, i] = (early * ((1.0 + 2.0 * x) * Y[i] + x * h * before[i - m])
                           + late * ((3.0 - 2.0 * x) * new[i] + (x - 1.0) * h * after[i - m]))
-    _observe(ground_motion(time, p.system), states[row], p, w.nodes, room)
+    observe(ground_motion(time, p.system), states[row], p, w.nodes)
     output.normal[row] = w.nodes[:, FORCE]
     for j in range(len(progress.carried)):
         output.friction[row, j] = ((1.0 - x) * progress.carried[j]
@@ -316,12 +302,9 @@ def _set_rates(step, p, w, room):
     for k in range(STAGES):
         moment = min(step.t + NODES[k] * step.h, step.latest)
         moved = ground_motion(moment, p.system)
-        _observe(moved, room.states[k], p, w.nodes, room)
+        observe(moved, room.states[k], p, w.nodes)
         body_powers(moment, room.states[k], p.system, room.rates[k])
-        if p.system.rows.shape[1] > 2:
-            _powers_at(room.space.powers)(moved, p, w.nodes, room.forces[k], room.rates[k])
-        else:
-            contact_powers(moved, p.system, w.nodes, room.forces[k], True, room.rates[k])
+        contact_powers(moved, p.system, w.nodes, room.forces[k], True, room.rates[k])
 
 
 @helper
@@ -353,7 +336,7 @@ def _attempt(step, last, smallest, data):
     n, _, m = p.system.rows.shape
     length, slowest = step.h, tries[SLOWEST]
     moved = ground_motion(step.t, p.system)
-    _observe(moved, Y, p, w.nodes, room)
+    observe(moved, Y, p, w.nodes)
     room.old[:] = w.nodes
     quick = largest[SLIP_SIZE] + _fastest_side(moved, p)
     _prepare(step, quick, p, progress, w, room)
@@ -387,9 +370,9 @@ def _attempt(step, last, smallest, data):
     if _NEAR < part < 1.0 - _NEAR and _slip_changes(w, room):
         return CUT, part * length
     for j in range(n):
-        slip = abs(w.nodes[j, SLIP])
-        if p.system.rows.shape[1] > 2:
-            slip = math.hypot(slip, w.nodes[j, SLIP_ACROSS])
+        slip = 0.0
+        for k in range(p.system.rows.shape[1] - 1):
+            slip = math.hypot(slip, w.nodes[j, SLIP_OF[k]])
         largest[SLIP_SIZE] = max(largest[SLIP_SIZE], slip)
     _set_end(length, m, progress, room)
     if counts[STEPS] == 0:
