@@ -13,6 +13,7 @@ from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system import kernels as kernels
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.node_forces import normal_values
 
 Integers = NDArray[np.intp]
 Nodes = int | str | None
@@ -159,7 +160,7 @@ class ContactMotion:
         arrays = self.trajectory.system.arrays
         count = penetration.size // len(self.nodes)
         force, slope = np.empty(penetration.size), np.empty(penetration.size)
-        kernels.normal_values(
+        normal_values(
             np.tile(arrays.normal[self.nodes], count), penetration.reshape(-1), rate.reshape(-1),
             np.tile(arrays.normal_parameters[self.nodes], (count, 1)), force, slope)
         return force.reshape(penetration.shape)

@@ -23,8 +23,8 @@ that the first ones are the same in the plane.
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel
-from fecontact.core.records import Block, IntegerVector, Matrix, Vector
-from fecontact.laws.signatures import normal_at, signal_at
+from fecontact.core.records import Block, Matrix, Vector
+from fecontact.laws.signatures import signal_at
 from fecontact.system.node_forces import axis_force, force_room, friction_entry, node_forces
 from fecontact.system.nodes import SystemArrays, ground_motion, memory_of, node_motion
 from fecontact.system.polynomial_forces import add_polynomial_forces, has_polynomial
@@ -164,12 +164,3 @@ def contact_history(times: Vector, states: Matrix, s: SystemArrays, out: Block) 
     """Fill out (N, n, 6), in space (N, n, 8), with `contact_state` at N times."""
     for k in range(len(times)):
         contact_state(times[k], states[k], s, out[k])
-
-
-@kernel
-def normal_values(
-    addresses: IntegerVector, u: Vector, v: Vector, p: Matrix, force: Vector, slope: Vector,
-) -> None:
-    """Fill force and dF/du (k,) of the normal laws of k nodes at their penetrations and rates."""
-    for j in range(len(u)):
-        force[j], slope[j], _ = normal_at(addresses[j])(u[j], v[j], p[j])

@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.core.compiled import helper
+from fecontact.core.compiled import helper, kernel
+from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.laws.friction.planar import direction
 from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, planar_at
 from fecontact.system.nodes import NodeContact, node_contact
@@ -54,7 +55,13 @@ def slip_entry(tangent, states):
 @helper
 def normal_force(j, u, v, s):
     """Normal force of node j at a penetration and its rate, and its derivatives to these."""
-    return normal_at(s.normal[j])(u, v, s.normal_parameters[j])
+    return normal_force_with(s.normal_parameters[j], j, u, v, s)
+
+
+@helper
+def normal_force_with(p, j, u, v, s):
+    """Normal force of node j, and its derivatives, by its law with parameters p."""
+    return normal_at(s.normal[j])(u, v, p)
 
 
 @helper
@@ -190,3 +197,12 @@ def node_gradients(j, motion, moved, z, s, force, rates, out):
             for other in range(d - 1):
                 out[axis, 2 * other] -= F * contact.curvature[tangent][other]
     return NodeForces(F, pressing, contact)
+
+
+@kernel
+def normal_values(
+    addresses: IntegerVector, u: Vector, v: Vector, p: Matrix, force: Vector, slope: Vector,
+) -> None:
+    """Fill force and dF/du (k,) of the normal laws of k nodes at their penetrations and rates."""
+    for j in range(len(u)):
+        force[j], slope[j], _ = normal_at(addresses[j])(u[j], v[j], p[j])

@@ -11,11 +11,12 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.types import Array
-from fecontact.laws.signatures import ground_at, normal_at, signal_at, surface_at
+from fecontact.laws.signatures import ground_at, signal_at, surface_at
 from fecontact.system.node_forces import (
     friction_entry,
     friction_onset,
     friction_scale,
+    normal_force_with,
     set_friction,
     slip_entry,
 )
@@ -208,8 +209,8 @@ def node_rates(j, node, z, shifts, s, laws, force, partial, room, out):
     for k in range(len(shifts)):
         F_p += partial[1, k] * shifts[k]
     for k in range(len(laws.normal)):
-        F_p += _WEIGHTS[k] / (12.0 * h) * normal_at(s.normal[j])(
-            contact.penetration, contact.rate, laws.normal[k, j])[0]
+        F_p += _WEIGHTS[k] / (12.0 * h) * normal_force_with(
+            laws.normal[k, j], j, contact.penetration, contact.rate, s)[0]
     pressing_p = _pressing_rate(j, node, F_p, shifts, s, laws)
     # Friction is zero without a normal force, but may be about to begin.
     begins, onset = s.memory[j] == 0 and F == 0.0 and F_p != 0.0, (0.0, 0.0)

@@ -18,7 +18,7 @@ CODE = """
 import numpy as np
 from fecontact.core.compiled import KERNELS
 from fecontact.core.stored_code import prebuilt
-from fecontact.system.kernels import normal_values
+from fecontact.system.node_forces import normal_values
 normal_values.ready()
 there = prebuilt()
 print(sum(normal_values.stats.cache_hits.values()), sum(normal_values.stats.cache_misses.values()),
@@ -44,7 +44,7 @@ def package(tmp_path_factory):
     family = folder / stored_code.PACKAGE / FAMILY
     found = ready(**stored_code.compiled_for(FAMILY), FECONTACT_KERNELS_FOLDER=family)
     assert found == (0, 1, "None")
-    assert list(family.rglob("kernels.normal_values.*.nbc"))
+    assert list(family.rglob("node_forces.normal_values.*.nbc"))
     kernels.say_made_with(family, FAMILY)
     return folder
 

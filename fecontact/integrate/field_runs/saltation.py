@@ -13,18 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.compiled import kernel
-from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.integrate.events import ContactEvents
 from fecontact.integrate.rodas5p.driver import start
 from fecontact.integrate.run_limits import largest_motions
 from fecontact.integrate.step_runs import finish
 from fecontact.laws.base import NormalLaw
-from fecontact.laws.signatures import normal_at
 from fecontact.system import kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import slider_counts
+from fecontact.system.node_forces import normal_values
 
 # Parts of the penetration scale: how far from a level forces are examined, within what an event is
 # at a level, and by what nodes are moved for derivatives of their penetration.
@@ -57,13 +55,6 @@ class Passage:
         return np.asarray(columns + self.jump[:, None] * ahead)
 
 
-@kernel
-def _fill_forces(law: int, u: Vector, v: Vector, p: Matrix, out: Vector) -> None:
-    """Fill out (n,) with F of nodes at penetrations u and rates v."""
-    for j in range(len(u)):
-        out[j] = normal_at(law)(u[j], v[j], p[j])[0]
-
-
 def jumping_nodes(system: ContactSystem) -> NDArray[np.bool_]:
     """Whether the normal force (n,) of each node jumps where it begins or ends, at some rate."""
     found = np.zeros(system.basis.contact_nodes, dtype=np.bool_)
@@ -81,9 +72,10 @@ def _jumps(
 ) -> NDArray[np.bool_]:
     """Whether forces (n,) differ across a level as much as from a thousand times closer to it."""
     def across(by: float) -> Array:
-        out = np.empty((2, len(level)))
+        out, slope = np.empty((2, len(level))), np.empty(len(level))
         for row, side in zip(out, (by, -by), strict=True):
-            _fill_forces(law.kernel.address, level + side, rate, table, row)
+            normal_values(np.full(len(level), law.kernel.address), level + side, rate, table, row,
+                          slope)
         return np.abs(out[0] - out[1])
 
     # Laws without an onset name a level beyond all forces, where these have no difference.

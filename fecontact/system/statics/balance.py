@@ -8,6 +8,7 @@ from fecontact.core.types import Array
 from fecontact.system import kernels
 from fecontact.system.friction_memory import settled
 from fecontact.system.jacobian import jacobian
+from fecontact.system.node_forces import normal_values
 from fecontact.system.nodes import SystemArrays
 from fecontact.system.polynomial_forces import polynomial_energy, polynomial_stiffness_at
 
@@ -73,8 +74,8 @@ class Balance:
     def normal(self, penetration: Array) -> tuple[Array, Array]:
         """Normal forces (n,) and their slopes at rest."""
         force, slope = np.empty(len(penetration)), np.empty(len(penetration))
-        kernels.normal_values(self.arrays.normal, penetration, np.zeros(len(penetration)),
-                              self.arrays.normal_parameters, force, slope)
+        normal_values(self.arrays.normal, penetration, np.zeros(len(penetration)),
+                      self.arrays.normal_parameters, force, slope)
         return force, slope
 
     def force(self, q: Array, load: float) -> Array:

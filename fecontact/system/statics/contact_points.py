@@ -28,10 +28,10 @@ from fecontact.fem.pairing import Pairing
 from fecontact.laws.base import FrictionLaw, NodeLaw, NormalLaw
 from fecontact.laws.check import require_sound
 from fecontact.laws.friction_curve import static_coefficient
-from fecontact.system import kernels
 from fecontact.system.arrays import LawGroup, groups_of_laws, law_table
 from fecontact.system.gap import Gap, gap_values
 from fecontact.system.interfaces import Interface, PointPairing
+from fecontact.system.node_forces import normal_values
 from fecontact.system.quasistatic.sliders import require_springs
 
 NormalLaws = TypeAliasType("NormalLaws", NormalLaw | Mapping[str, NormalLaw])
@@ -74,8 +74,8 @@ class ContactPoints:
         force, slope = np.empty(n), np.empty(n)
         if n:
             addresses, parameters = self._table
-            kernels.normal_values(addresses, np.ascontiguousarray(penetration), np.zeros(n),
-                                  parameters, force, slope)
+            normal_values(addresses, np.ascontiguousarray(penetration), np.zeros(n),
+                          parameters, force, slope)
         return force, slope
 
     def stored_energy(self, penetration: Array) -> float:

@@ -23,9 +23,14 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Block, Matrix, Vector
 from fecontact.core.types import Array, Integers
-from fecontact.laws.signatures import normal_at
-from fecontact.system.kernels import normal_values
-from fecontact.system.node_forces import normal_force, plane_friction, pressing_force
+from fecontact.system.node_forces import (
+    friction_entry,
+    normal_force,
+    normal_values,
+    pressing_force,
+    set_friction,
+    slip_entry,
+)
 from fecontact.system.nodes import SystemArrays, ground_motion, node_contact, node_motion
 
 # Distance from a kink in w up to which forces are means.
@@ -63,16 +68,16 @@ def kernel_integrals(y):
 
 
 @helper
-def kink_change(u, v, b, h, law, p):
-    """Change of a normal force near its onset b, with its derivatives to u and v.
+def kink_change(u, v, b, h, j, s):
+    """Change of the normal force of node j near its onset b, with its derivatives to u and v.
 
     Also the part w dF/dw of the latter that is due to the width w, times v; and the force far from
     the onset, on the side where it is larger.
     """
     x, w = u - b, abs(v) * h
     off = _BESIDE * w + _ROUNDING * abs(b)
-    above, above_u, above_v = normal_at(law)(b + off, v, p)
-    below, below_u, below_v = normal_at(law)(b - off, v, p)
+    above, above_u, above_v = normal_force(j, b + off, v, s)
+    below, below_u, below_v = normal_force(j, b - off, v, s)
     jump, bend, jump_v = above - below, above_u - below_u, above_v - below_v
     value, first, second, _ = kernel_integrals(x / w)
     past = 1.0 if x > 0.0 else 0.0
@@ -81,7 +86,7 @@ def kink_change(u, v, b, h, law, p):
     # w grows with |v|.
     by_width = -jump * value * x / (w * w) + bend * (second - first * x / w)
     change_v = jump_v * (first - past) + by_width * (h if v >= 0.0 else -h)
-    one, other = normal_at(law)(b + 3.0 * w, v, p)[0], normal_at(law)(b - 3.0 * w, v, p)[0]
+    one, other = normal_force(j, b + 3.0 * w, v, s)[0], normal_force(j, b - 3.0 * w, v, s)[0]
     return (change, change_u, change_v, by_width * w,
             one if abs(one) > abs(other) else other)
 
@@ -93,49 +98,80 @@ def is_near(u, v, b, h):
 
 
 @helper
+def _add_friction(j, contact, F, part, s, force, by_force):
+    """Add to ``force`` (d - 1, d) a part of the friction of node j under a normal force F.
+
+    For each tangent the force, and its derivatives to the slip velocities; those to F are added to
+    ``by_force`` (2, d - 1), and are its second row.
+    """
+    own, rates, nothing = np.empty(8), np.empty((0, 4)), np.empty(0)
+    pressing = pressing_force(j, contact, F, s)
+    set_friction(j, contact.slip, pressing, nothing, s.friction_parameters[j], s, own, rates)
+    scale = pressing / F if F != 0.0 else 0.0
+    for k in range(len(force)):
+        first = friction_entry(k, 0)
+        force[k, 0] += part * own[first]
+        for other in range(len(force)):
+            force[k, 1 + other] += part * own[first + slip_entry(other, 0)]
+        by_force[1, k] = part * scale * own[first + 2]
+        by_force[0, k] += by_force[1, k]
+
+
+@helper
 def _add_node(j, n, contact, change, far, s, f, A, widths, derivatives):
     """Add the change of a normal force to the rates f (d,) and their Jacobian A (d, d)."""
     dF, dF_u, dF_v, by_width = change
-    m = s.rows.shape[2]
+    _, d, m = s.rows.shape
     F, F_u, F_v = normal_force(j, contact.penetration, contact.rate, s)
-    ground, curvature, slip = contact.slope[0], contact.curvature[0][0], contact.slip[0]
-    new = F + dF
-    # Change of friction, its derivatives to slip and place, and of the pressing force to F.
-    dR, dR_v, by_F, by_change = 0.0, 0.0, 0.0, 0.0
+    new, slip = F + dF, contact.slip
+    # Change of friction with derivatives to slip, to F, and to its change alone.
+    friction, by_force = np.zeros((d - 1, d)), np.zeros((2, d - 1))
     if s.memory[j] == 0:
-        R, R_v, R_F = 0.0, 0.0, 0.0
-        if F != 0.0:
-            scale = pressing_force(j, contact, F, s) / abs(F)
-            R, R_v, R_F = plane_friction(j, slip, scale * abs(F), s)
-            R_F *= scale if F >= 0.0 else -scale
-        dR, dR_v, by_F = -R, -R_v, -R_F
-        if new != 0.0:
-            scale = pressing_force(j, contact, new, s) / abs(new)
-            side = 1.0 if new * far >= 0.0 else -1.0
-            R, R_v, R_F = plane_friction(j, slip, scale * abs(new), s)
-            dR, dR_v = dR + side * R, dR_v + side * R_v
-            R_F *= side * (scale if new >= 0.0 else -scale)
-            by_F, by_change = by_F + R_F, R_F
-    slope = ground if s.follows_surface else 0.0
-    dT = dR + slope * dF
-    for i in range(m):
-        f[m + i] += s.rows[j, 1, i] * dF - s.rows[j, 0, i] * dT
+        _add_friction(j, contact, F, -1.0, s, friction, by_force)
+        _add_friction(j, contact, new, 1.0 if new * far >= 0.0 else -1.0, s, friction, by_force)
+    pushes, by_change = np.empty(d), np.empty(d)
+    pushes[1], by_change[1] = dF, 1.0
+    for k in range(d - 1):
+        by_change[2 * k] = -by_force[1, k]
+        pushes[2 * k] = -friction[k, 0]
+        if s.follows_surface:
+            by_change[2 * k] -= contact.slope[k]
+            pushes[2 * k] -= contact.slope[k] * dF
+    for axis in range(d):
+        for i in range(m):
+            f[m + i] += s.rows[j, axis, i] * pushes[axis]
+            if derivatives:
+                widths[i, n] += s.rows[j, axis, i] * by_change[axis] * by_width
     if not derivatives:
         return
-    for i in range(m):
-        widths[i, n] += (s.rows[j, 1, i] - s.rows[j, 0, i] * (by_change + slope)) * by_width
-    # Derivatives to x, y, x', y' of the node.
-    u_x, v_x = ground, curvature * slip
-    for k in range(m):
-        tx, ty = s.rows[j, 0, k], s.rows[j, 1, k]
-        u_q, v_q, v_w = u_x * tx - ty, v_x * tx, ground * tx - ty
-        F_q, F_w = dF_u * u_q + dF_v * v_q, dF_v * v_w
-        T_q = (by_F * (F_u * u_q + F_v * v_q) + (by_change + slope) * F_q
-               + (curvature * tx * dF if s.follows_surface else 0.0))
-        T_w = by_F * F_v * v_w + (by_change + slope) * F_w + dR_v * tx
-        for i in range(m):
-            A[m + i, k] += s.rows[j, 1, i] * F_q - s.rows[j, 0, i] * T_q
-            A[m + i, m + k] += s.rows[j, 1, i] * F_w - s.rows[j, 0, i] * T_w
+    # Derivatives of u and v, then of the forces, to displacements and velocities along the axes.
+    u_of, v_of, partial = np.empty(d), np.zeros(d), np.empty((d, 2 * d))
+    u_of[1] = -1.0
+    for k in range(d - 1):
+        bend = contact.curvature[k]
+        u_of[2 * k], v_of[2 * k] = contact.slope[k], bend[0] * slip[0] + bend[1] * slip[1]
+    for axis in range(d):
+        for other in range(d):
+            place = by_change[axis] * (dF_u * u_of[other] + dF_v * v_of[other])
+            speed = by_change[axis] * dF_v * u_of[other]
+            if axis != 1:
+                by = by_force[0, axis // 2]
+                place -= by * (F_u * u_of[other] + F_v * v_of[other])
+                speed -= by * F_v * u_of[other]
+                if other != 1:
+                    speed -= friction[axis // 2, 1 + other // 2]
+                    if s.follows_surface:
+                        place -= dF * contact.curvature[axis // 2][other // 2]
+            partial[axis, other], partial[axis, d + other] = place, speed
+    for axis in range(d):
+        for k in range(m):
+            place, speed = 0.0, 0.0
+            for other in range(d):
+                place += partial[axis, other] * s.rows[j, other, k]
+                speed += partial[axis, d + other] * s.rows[j, other, k]
+            for i in range(m):
+                A[m + i, k] += s.rows[j, axis, i] * place
+                A[m + i, m + k] += s.rows[j, axis, i] * speed
 
 
 @kernel
@@ -147,12 +183,12 @@ def add_kinks(
 
     ``onsets`` (k, n) are penetrations of the nodes; with ``derivatives`` the Jacobians J (N, d, d)
     change too, and widths (m, N) is filled with what these contain of velocities times derivatives
-    through the width w, which stays where velocities change with the period. Nodes of plane bodies
-    alone. Friction with memory feels the force of the law.
+    through the width w, which stays where velocities change with the period. Friction with memory
+    feels the force of the law.
     """
     if derivatives:
         widths[:, :] = 0.0
-    if s.rows.shape[1] > 2 or len(onsets) == 0:
+    if len(onsets) == 0:
         return
     for n in range(len(t)):
         moved = ground_motion(t[n], s)
@@ -162,8 +198,7 @@ def add_kinks(
             dF, dF_u, dF_v, by_width, far, found = 0.0, 0.0, 0.0, 0.0, 0.0, False
             for k in range(len(onsets)):
                 if is_near(u, v, onsets[k, j], h):
-                    one, one_u, one_v, one_w, far = kink_change(
-                        u, v, onsets[k, j], h, s.normal[j], s.normal_parameters[j])
+                    one, one_u, one_v, one_w, far = kink_change(u, v, onsets[k, j], h, j, s)
                     dF, dF_u, dF_v = dF + one, dF_u + one_u, dF_v + one_v
                     by_width, found = by_width + one_w, True
             if found:
@@ -174,7 +209,7 @@ def add_kinks(
 def kink_onsets(field: ContactField, values: Array, free: int) -> Array:
     """Penetrations (k, n) of the nodes at which normal laws have kinks; k is zero without any.
 
-    Onsets that move with the free parameter are left out, and so are all of solids.
+    Onsets that move with the free parameter are left out.
     """
     known = _KNOWN.setdefault(field, {})
     others = values.copy()
@@ -204,8 +239,6 @@ def _onsets(field: ContactField, values: Array) -> Array:
     """Onsets (k, n) of all nodes that are kinks, filled up with infinity."""
     system = field.system(values)
     s, n = system.arrays, system.basis.contact_nodes
-    if s.rows.shape[1] > 2:
-        return np.zeros((0, n))
     columns: list[list[float]] = [[] for _ in range(n)]
     for nodes, _, law in system.law_groups("normal"):
         places = np.arange(n)[nodes]

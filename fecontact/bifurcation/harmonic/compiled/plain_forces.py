@@ -9,7 +9,8 @@ import numpy as np
 
 from fecontact.bifurcation.harmonic.compiled.kinks import is_near, kink_change
 from fecontact.core.compiled import helper, routine
-from fecontact.laws.signatures import friction_at, ground_at, normal_at
+from fecontact.laws.signatures import ground_at
+from fecontact.system.node_forces import normal_force, plane_friction
 from fecontact.system.nodes import ground_motion
 from fecontact.system.polynomial_forces import (
     add_polynomial,
@@ -88,8 +89,7 @@ def _near_kinks(j, level, h, e):
         node[8, n] = 0.0
         for k in range(len(e.onsets)):
             if is_near(u, v, e.onsets[k, j], h):
-                F, F_u, F_v, by_width, far = kink_change(u, v, e.onsets[k, j], h, s.normal[j],
-                                                         s.normal_parameters[j])
+                F, F_u, F_v, by_width, far = kink_change(u, v, e.onsets[k, j], h, j, s)
                 node[8, n] += by_width
                 node[3, n] += F
                 node[4, n] -= F_u
@@ -153,8 +153,7 @@ def plain_forces(derivatives, h, e):
             rubs = rubs or s.rows[j, 0, i] != 0.0
         # Derivatives of the normal force to height and rate, of friction to slip and normal force.
         for n in range(N):
-            F, F_u, F_v = normal_at(s.normal[j])(level - node[0, n], -node[1, n],
-                                                 s.normal_parameters[j])
+            F, F_u, F_v = normal_force(j, level - node[0, n], -node[1, n], s)
             if F == 0.0:
                 F_u, F_v = 0.0, 0.0
             node[3, n], node[4, n], node[5, n] = F, -F_u, -F_v
@@ -164,8 +163,7 @@ def plain_forces(derivatives, h, e):
             for n in range(N):
                 F, R, R_v, R_F = node[3, n], 0.0, 0.0, 0.0
                 if F != 0.0:
-                    R, R_v, R_F = friction_at(s.friction[j])(node[2, n], abs(F),
-                                                             s.friction_parameters[j])
+                    R, R_v, R_F = plane_friction(j, node[2, n], abs(F), s)
                 side = node[1, n] if len(e.onsets) > 0 else 1.0
                 node[0, n], node[6, n] = side * R, side * R_v
                 node[7, n] = side * (R_F if F >= 0.0 else -R_F)
