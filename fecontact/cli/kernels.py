@@ -31,7 +31,8 @@ from fecontact.core.stored_code import (
 _BODIES = ("fecontact.laws.sampling", "fecontact.fem.assembly", "fecontact.reduction.modal_basis",
            "fecontact.fem.mesh_files", "fecontact.system.friction_memory",
            "fecontact.system.jacobian")
-_STEPS = ("fecontact.integrate.rodas5p.driver", "fecontact.integrate.rodas5p.unfelt:first_unfelt",
+_STEPS = ("fecontact.integrate.rodas5p.driver",
+          "fecontact.integrate.rodas5p.missed_contacts:first_missed",
           "fecontact.integrate.series.method",
           "fecontact.integrate.rodas5p.method:SMALL", "fecontact.study.study")
 _PARTS = {

@@ -215,9 +215,9 @@ def _rest_under_friction(
     now = system.prescribed_motion.travel(time)[nodes]
     if (ground.wavy or ground.friction_scale_kernel is not None) and (before != now).any():
         away = int(np.argmax(np.abs(now - before).reshape(len(now), -1).max(axis=1)))
-        told, wanted = (", ".join(f"{value:g}" for value in np.atleast_1d(one[away]))
+        found, wanted = (", ".join(f"{value:g}" for value in np.atleast_1d(one[away]))
                         for one in (before, now))
-        raise InputError(f"The ground has travelled {told} m in the state at rest, but {wanted} m "
+        raise InputError(f"The ground has travelled {found} m in the state at rest, but {wanted} m "
                          f"at the start of the run, where it has other heights or friction; end "
                          f"the path of loads where the ground of the run begins, or start the run "
                          f"at another time.")

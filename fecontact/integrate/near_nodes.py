@@ -14,9 +14,9 @@ wanted is checked; if it is too far away, more nodes are taken as near.
 import math
 
 from fecontact.core.compiled import helper, routine
-from fecontact.integrate.courses import HIGHEST
 from fecontact.integrate.rodas5p import dynamics
 from fecontact.integrate.rodas5p.blocks import FEW
+from fecontact.integrate.step_polynomials import HIGHEST
 
 # Chosen for so many times the motion that is expected.
 _AMPLE = 1.5

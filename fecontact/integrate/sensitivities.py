@@ -244,13 +244,13 @@ def _differences(
         moves[:, None])
     sided = sided.swapaxes(2, 3)
     settings["rtol"] = max(settings["rtol"] / _FINER, 1e-12)
-    allowed, doubtful = max(_APART, _COARSE * rtol), []
+    allowed, uncertain = max(_APART, _COARSE * rtol), []
 
     def looked_at(piece: int, ends_at: EndsAt, apart: float, move: float, open_: Sides,
                   what: str) -> tuple[Array, Array]:
         derivative, quotients, certain = _closer(ends_at, moves, apart, allowed, open_)
         if not certain:
-            doubtful.append(f"to {what} from t = {times[piece]:.6g} to {times[piece + 1]:.6g} s")
+            uncertain.append(f"to {what} from t = {times[piece]:.6g} to {times[piece + 1]:.6g} s")
         return derivative / move, quotients / move
 
     for piece in range(pieces):
@@ -288,7 +288,7 @@ def _differences(
 
             forced[piece], _ = looked_at(piece, at_parameter, apart, 0.5 * width, (True, True),
                                          "the parameter")
-    return Sensitivity(times, states, columns, forced, sided, _note(doubtful))
+    return Sensitivity(times, states, columns, forced, sided, _note(uncertain))
 
 
 def _apart(above: Array, middle: Array, below: Array, moves: Array) -> float:
@@ -336,11 +336,11 @@ def _open_sides(
     return not deeper[0], not deeper[1]
 
 
-def _note(doubtful: list[str]) -> str:
-    if not doubtful:
+def _note(uncertain: list[str]) -> str:
+    if not uncertain:
         return ""
     return (f"Differences of set-valued runs to one side are apart from those to the other, "
-            f"{'; '.join(doubtful)}: there is no derivative, for a body breaks away, strikes or "
+            f"{'; '.join(uncertain)}: there is no derivative, for a body breaks away, strikes or "
             f"comes to rest at the start or the end, or an event appears or vanishes nearby; begin "
             f"or end elsewhere.")
 

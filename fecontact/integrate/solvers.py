@@ -265,9 +265,9 @@ class SetValued(Solver):
             longest=longest_step(task.system, task.times, task.max_step), max_step=task.max_step,
             events=task.events, progress=task.progress, keep_steps=task.keep_steps)
         # Options in the statistics make the run reproducible.
-        told = {name: getattr(self, name) for name in (
+        counted = {name: getattr(self, name) for name in (
             "restitution", "impact_law", "tangential_restitution", "static_coefficient")}
-        return replace(found, statistics=found.statistics | told)
+        return replace(found, statistics=found.statistics | counted)
 
 
 @dataclass(frozen=True)

@@ -290,8 +290,8 @@ def checked_sliding(
                              f"{nearest(group, names)}, but there are {choices(names)}.")
         require_kind(f"Interface '{group}'", (SlidingTranslation, SlidingRotation), sliding=one)
     upright = (0.0, 1.0) if basis.dimension == 2 else (0.0, 0.0, 1.0)
-    leaning = basis.normals[basis.ground_nodes] != upright
-    if ground.wavy and leaning.any():
+    tilted = basis.normals[basis.ground_nodes] != upright
+    if ground.wavy and tilted.any():
         raise InputError(f"ContactSystem: waves of the ground need contact nodes whose normal is "
                          f"{(*upright[:-1], 1)}, but some on the ground have others; make the "
                          f"ground flat.")

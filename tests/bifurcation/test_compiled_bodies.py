@@ -20,7 +20,7 @@ from fecontact.bifurcation.fields.contact_field import field_between
 from fecontact.bifurcation.harmonic.compiled import balance as compiled
 from fecontact.bifurcation.harmonic.compiled.arrays import RESTS
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
-from fecontact.bifurcation.harmonic.compiled.strides import Strides
+from fecontact.bifurcation.harmonic.compiled.step_batches import StepBatches
 from fecontact.bifurcation.harmonic.problem import CompiledLinearisation, HarmonicProblem
 from fecontact.bifurcation.harmonic.starts import problem_for, restored
 from fecontact.bifurcation.harmonic.timing import timing_of
@@ -47,24 +47,24 @@ def block(stiffness=1e6, damping=0.02):
 
 
 @pytest.fixture
-def strides(monkeypatch):
+def batches(monkeypatch):
     """Numbers of steps that compiled code has made, one for each call."""
-    made, plain = [], Strides.stride
+    made, plain = [], StepBatches.batch
 
     def counted(self, *given):
         found = plain(self, *given)
         made.append(0 if found is None else len(found.points))
         return found
 
-    monkeypatch.setattr(Strides, "stride", counted)
+    monkeypatch.setattr(StepBatches, "batch", counted)
     return made
 
 
-def test_steps_of_a_body_are_those_of_plain_code(strides, monkeypatch):
+def test_steps_of_a_body_are_those_of_plain_code(batches, monkeypatch):
     """Compiled steps give the response of plain code, although they solve for four modes alone."""
     options = ContinuationOptions(points=25, largest_step=0.05)
     fast = frequency_response(block(), BOUNDS, options=options).branches[0]
-    assert sum(strides) >= 20
+    assert sum(batches) >= 20
     monkeypatch.setattr(CompiledBalance, "of", lambda problem: None)
     slow = frequency_response(block(), BOUNDS, options=options).branches[0]
     field = contact_field(block(), ["drive.frequency_hz"])
@@ -92,7 +92,7 @@ def test_steps_of_a_body_are_those_of_plain_code(strides, monkeypatch):
             np.abs(stored["multipliers"]), abs=1e-7)
 
 
-def test_the_tangent_of_a_compiled_step_is_that_of_all_equations(strides):
+def test_the_tangent_of_a_compiled_step_is_that_of_all_equations(batches):
     """Modes are solved for apart; iteration makes good what that neglects."""
     field = contact_field(block(), ["drive.frequency_hz"])
     options = ContinuationOptions(bounds=BOUNDS, step=0.01, largest_step=0.01)
@@ -101,8 +101,8 @@ def test_the_tangent_of_a_compiled_step_is_that_of_all_equations(strides):
     problem, u, _ = restored(field, response.branches[0].points[0])
     start = start_of(problem, u, options, None, 1.0)
     far = replace(start, u=np.append(start.u[:-1], 1400.0 / TURN))
-    found = problem.strider(options).stride(problem, start, 0.01, 6, far)
-    assert strides[0] >= 3
+    found = problem.batch_maker(options).batch(problem, start, 0.01, 6, far)
+    assert batches[0] >= 3
     room = problem.equations(500.0 / TURN).room
     assert 1 <= room.coupled[0] < 12
     for at in found.points:
@@ -118,14 +118,14 @@ def test_the_tangent_of_a_compiled_step_is_that_of_all_equations(strides):
     assert np.sqrt(weights @ (exact - last) ** 2) < 1e-8
 
 
-def test_contact_as_stiff_as_the_modes_is_left_to_plain_code(strides):
+def test_contact_as_stiff_as_the_modes_is_left_to_plain_code(batches):
     """Modes cannot be solved for separately with such a contact."""
     options = ContinuationOptions(points=4, largest_step=0.05)
     method = HarmonicBalance(9, stability=None)
     found = frequency_response(block(1e11), (2e4 / TURN, 3e4 / TURN), method=method,
                                options=options)
     assert len(found.branches[0]) == 4
-    assert sum(strides) == 0
+    assert sum(batches) == 0
 
 
 def masses(friction):

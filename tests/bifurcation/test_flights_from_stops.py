@@ -34,7 +34,7 @@ from fecontact.bifurcation import (
     periodic_motion,
 )
 from fecontact.bifurcation.events.branches import orbit_from
-from fecontact.bifurcation.events.conditions import DURATION, RATE, Course, of_phase
+from fecontact.bifurcation.events.conditions import DURATION, RATE, PhaseSequence, of_phase
 from fecontact.bifurcation.events.phases import Phase
 from fecontact.integrate import ContactEvents, SetValued
 from fecontact.laws import ConstantFriction, LinearContact
@@ -210,9 +210,9 @@ def test_rates_at_the_ends_of_brief_phases(order, left):
     """A function c s^k (tau - s), s from the begin, has the rate -c tau^k at its end."""
     phase = Phase((), (0,), 0, order=order)
     for part in (2e-6, 9e-6, 1e-4):
-        course = Course(None, (phase,), np.zeros(1), np.zeros((1, 2)), np.array([part, 1.0 - part]),
-                        np.array([[4.0], [1.0]]))
+        sequence = PhaseSequence(None, (phase,), np.zeros(1), np.zeros((1, 2)),
+                                 np.array([part, 1.0 - part]), np.array([[4.0], [1.0]]))
         rate = -12.0 / order**2 * part**order
-        (_, what, *_), found = islice(of_phase(course, 0, rate), 2)
+        (_, what, *_), found = islice(of_phase(sequence, 0, rate), 2)
         assert [what, found.what] == [DURATION, RATE]
         assert found.left == pytest.approx(left, rel=1e-12)

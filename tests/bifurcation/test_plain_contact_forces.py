@@ -19,7 +19,7 @@ from fecontact.bifurcation import (
 )
 from fecontact.bifurcation.fields.contact_field import field_between
 from fecontact.bifurcation.harmonic.compiled.arrays import PLAIN
-from fecontact.bifurcation.harmonic.compiled.strides import Strides
+from fecontact.bifurcation.harmonic.compiled.step_batches import StepBatches
 from fecontact.bifurcation.harmonic.starts import problem_for, restored
 from fecontact.core.errors import InputError
 from fecontact.laws import BilateralPolynomial, ConstantFriction, RoughSurface
@@ -89,13 +89,13 @@ def test_on_waves_they_are_not_plain(make):
 @pytest.mark.parametrize("largest", [0.01, 0.05])
 def test_folds_and_bound_are_met_in_one_call(largest, monkeypatch):
     """Folds of Duffing's oscillator at the published place, whatever the steps are."""
-    made, plain = [], Strides.stride
+    made, plain = [], StepBatches.batch
 
     def counted(self, *given):
         made.append(plain(self, *given))
         return made[-1]
 
-    monkeypatch.setattr(Strides, "stride", counted)
+    monkeypatch.setattr(StepBatches, "batch", counted)
     found = frequency_response(
         duffing_in_y(), BOUNDS, observe=("B", "y"), method=HarmonicBalance(9, stability=None),
         options=ContinuationOptions(points=2000, largest_step=largest)).branches[0]
@@ -125,14 +125,14 @@ def test_folds_and_bound_are_met_in_one_call(largest, monkeypatch):
 @pytest.mark.parametrize("stability", [None, "transitions"])
 def test_compiled_steps_that_end_just_behind_a_fold(stability, monkeypatch):
     """The point before the last is then the regular one at which the last step began."""
-    made, own = [], Strides.stride
+    made, own = [], StepBatches.batch
 
-    def stride(self, problem, here, *given):
+    def batch(self, problem, here, *given):
         found = own(self, problem, here, *given)
         made.append((problem, found))
         return found
 
-    monkeypatch.setattr(Strides, "stride", stride)
+    monkeypatch.setattr(StepBatches, "batch", batch)
     seen = 0
     method = HarmonicBalance(9, stability=stability)
     whole = frequency_response(duffing_in_y(), BOUNDS, observe=("B", "y"), method=method,

@@ -17,7 +17,7 @@ from systems import TURN, impact_oscillator
 from fecontact import AnalysisError, InputError
 from fecontact.bifurcation import Axis, basins, poincare_scan
 from fecontact.bifurcation.attractors import blocks as in_blocks
-from fecontact.bifurcation.attractors.attractor import told_apart
+from fecontact.bifurcation.attractors.attractor import distinguished
 from fecontact.bifurcation.attractors.blocks import Place, work_off
 from fecontact.bifurcation.attractors.labels import Settled
 from fecontact.integrate import strobe
@@ -98,7 +98,7 @@ def test_motions_are_told_apart_as_step_by_step():
     for cuts in ([], [1, 150, 151]):
         parts = [lambda p=p, r=r, s=s: Settled(p, r, s) for p, r, s in zip(
             np.split(points, cuts), np.split(rows, cuts), np.split(still, cuts), strict=True)]
-        labels, attractors = told_apart(parts, size, 1e-3)
+        labels, attractors = distinguished(parts, size, 1e-3)
         assert (np.where(labels < 0, -1, order[labels]) == expected).all()
         for rank, one in zip(order, attractors, strict=True):
             assert one.kind == motions[rank][0]
@@ -110,7 +110,7 @@ def test_motions_are_told_apart_as_step_by_step():
 def test_motions_are_the_same_within_twice_the_tolerance(apart, motions):
     x = np.ones((2, 8, 1))
     x[1] += apart
-    labels, found = told_apart(
+    labels, found = distinguished(
         [lambda: Settled(x, np.full(2, 8), np.zeros(2, dtype=np.int64))], np.ones(1), 1e-3)
     assert len(found) == motions
     assert labels.max() == motions - 1
@@ -120,7 +120,7 @@ def test_a_motion_has_its_least_period():
     """Runs that have not quite settled repeat after two periods; those that have, after one."""
     x = np.ones((3, 8, 1))
     x[0, ::2] += 1.5e-3
-    labels, (motion,) = told_apart(
+    labels, (motion,) = distinguished(
         [lambda: Settled(x, np.full(3, 8), np.zeros(3, dtype=np.int64))], np.ones(1), 1e-3)
     assert (labels == 0).all()
     assert motion.points.tolist() == [[1.0]]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fecontact.bifurcation import ContinuationOptions
-from fecontact.bifurcation.harmonic.compiled.strides import Strides
+from fecontact.bifurcation.harmonic.compiled.step_batches import StepBatches
 
 # One harmonic of one displacement, and the parameter.
 PROBLEM = SimpleNamespace(harmonics=1, periods=1, scales=np.ones(4))
@@ -19,7 +19,7 @@ def before_start(curve, angles):
     u = points[1:]
     weights = np.array([1.0, 0.5, 0.5, 1.0])
     lengths = np.sqrt((weights * np.diff(points, axis=0)**2).sum(axis=1))
-    return Strides(ContinuationOptions())._before_start(
+    return StepBatches(ContinuationOptions())._before_start(
         PROBLEM, first, first, u, np.ones((len(u), 2)), lengths)
 
 

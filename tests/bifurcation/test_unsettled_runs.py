@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fecontact.bifurcation import Axis, basins, vector_field
-from fecontact.bifurcation.attractors.attractor import told_apart
+from fecontact.bifurcation.attractors.attractor import distinguished
 from fecontact.bifurcation.attractors.labels import Settled
 
 RUNS, KEPT = 1000, 32
@@ -13,7 +13,8 @@ RUNS, KEPT = 1000, 32
 def labels_of(points):
     """Labels of runs (E, K, size), and their attractors."""
     rows, still = np.full(len(points), points.shape[1]), np.zeros(len(points), dtype=np.int64)
-    return told_apart([lambda: Settled(points, rows, still)], np.abs(points).max(axis=(0, 1)), 1e-3)
+    sizes = np.abs(points).max(axis=(0, 1))
+    return distinguished([lambda: Settled(points, rows, still)], sizes, 1e-3)
 
 
 @pytest.mark.parametrize(("period", "decay"), [(1, 0.5), (1, 0.92), (3, 0.5), (3, 0.8)])

@@ -12,7 +12,7 @@ import fecontact as fc
 from fecontact import ContactSystem, Drive, Ground, Load, PointLoad, simulate
 from fecontact.integrate import Radau, Rodas5P, step_loop
 from fecontact.integrate.collocation import tableau
-from fecontact.integrate.collocation.courses import first_switch
+from fecontact.integrate.collocation.step_polynomials import first_switch
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.rodas5p.state import WORST_NODE
 from fecontact.integrate.step_loop import REJECTIONS

@@ -192,8 +192,8 @@ def check_open_contact(law, fastest, F, size, p):
     assert not found.force.any()
     assert not found.by_slip.any()
     if law.memory:
-        faded = np.linalg.eigvals(found.rates_by_memory).real
-        assert faded.max() <= -1e3
+        error_floor = np.linalg.eigvals(found.rates_by_memory).real
+        assert error_floor.max() <= -1e3
         still = planar_outputs(law, np.zeros(2), 0.0, z, p)
         assert (still.rates.reshape(-1, 2) * z <= 0.0).all()
         assert (still.rates.reshape(-1, 2) @ unit(0.3) < 0.0).all()

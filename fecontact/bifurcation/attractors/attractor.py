@@ -34,7 +34,7 @@ class Attractor:
     share: float
 
 
-def told_apart(
+def distinguished(
     parts: Iterable[Callable[[], Settled]], scale: Array, tolerance: float,
 ) -> tuple[Integers, tuple[Attractor, ...]]:
     """Label (E,) of each run, and the motions by frequency, the most frequent first.

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fecontact.bifurcation.attractors.attractor import Attractor, told_apart
+from fecontact.bifurcation.attractors.attractor import Attractor, distinguished
 from fecontact.bifurcation.attractors.blocks import Found, Place, work_off
 from fecontact.bifurcation.attractors.labels import Settled
 from fecontact.bifurcation.attractors.marks import mark_of
@@ -196,7 +196,7 @@ def basins(
     with shown(progress, lambda: progress_bar("Running", len(states))) as tell:
         readers = work_off(blocks, place, mark, tell)
     parts = [partial(_settled, read) for read in readers]
-    labels, attractors = told_apart(parts, _scale(moving, states, parts), tolerance)
+    labels, attractors = distinguished(parts, _scale(moving, states, parts), tolerance)
     return Basins(a, b, labels.reshape(len(a), len(b)), attractors)
 
 

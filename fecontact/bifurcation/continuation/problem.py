@@ -66,10 +66,10 @@ class Stride:
     status: BranchStatus | None = None
 
 
-class Strider(Protocol):
+class StepBatchMaker(Protocol):
     """Function object that computes plain steps in batches."""
 
-    def stride(
+    def batch(
         self, problem: Any, here: Any, step: float, most: int, start: Any, header: Any = None
     ) -> Stride | None:
         """At most so many plain steps from a solution; None if the next step is none.
@@ -230,7 +230,7 @@ class Problem(Protocol):
         """
         return None
 
-    def strider(self, options: "ContinuationOptions") -> Strider | None:
+    def batch_maker(self, options: "ContinuationOptions") -> StepBatchMaker | None:
         """Object that computes plain steps of a branch in batches; None for one by one."""
         return None
 

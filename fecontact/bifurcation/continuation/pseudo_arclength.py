@@ -102,17 +102,17 @@ def continuation(
     stops = {options.stop_at} if isinstance(options.stop_at, str) else set(options.stop_at)
     before: Solution | None = None
     halved, whole = 0, step
-    strider = problem.strider(options)
+    batch_maker = problem.batch_maker(options)
     while count < options.points:
-        if strider is not None and halved == 0:
-            stride = strider.stride(problem, here, step, options.points - count, start, header)
-            if stride is not None:
-                yield from stride.points
-                if stride.status is not None:
-                    return End(stride.status)
-                count += stride.count
-                problem, here, before = stride.problem, stride.here, stride.before
-                step = stride.step
+        if batch_maker is not None and halved == 0:
+            batch = batch_maker.batch(problem, here, step, options.points - count, start, header)
+            if batch is not None:
+                yield from batch.points
+                if batch.status is not None:
+                    return End(batch.status)
+                count += batch.count
+                problem, here, before = batch.problem, batch.here, batch.before
+                step = batch.step
                 continue
         # Scales that have grown make the same step longer.
         step = min(step, _longest(problem, here, options), _OVERSHOOT * _room(here, options))

@@ -49,7 +49,7 @@ class Condition(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class PhaseSequence:
     """Phases with their begins (K + 1,), states (K, d) and durations (K,).
 
     ``margins`` (2, 2 k + n) are those of
@@ -69,60 +69,60 @@ class Course:
         return float(self.durations.sum())
 
 
-def conditions(course: Course, rates: list[float]) -> Iterator[Condition]:
+def conditions(sequence: PhaseSequence, rates: list[float]) -> Iterator[Condition]:
     """All conditions of the phases; ``rates`` are those of the event functions at their ends."""
     for i, rate in enumerate(rates):
-        yield from of_phase(course, i, rate)
+        yield from of_phase(sequence, i, rate)
 
 
 def of_phase(
-    course: Course, i: int, rate: float, what: int | None = None, event: int | None = None
+    sequence: PhaseSequence, i: int, rate: float, what: int | None = None, event: int | None = None
 ) -> Iterator[Condition]:
     """Conditions of one phase; ``rate`` is that of the event function at its end.
 
     With ``what`` and ``event`` those that can be of this kind; what others need is not computed.
     """
-    phase, T, duration = course.phases[i], course.period, float(course.durations[i])
+    phase, T, duration = sequence.phases[i], sequence.period, float(sequence.durations[i])
     if what in (None, DURATION):
         yield Condition(duration / T, DURATION, i, phase.event, duration)
     # An event function that is zero at both ends of a phase without duration has no rate there.
     if what in (None, RATE) and phase.event != PERIOD and not (
             abs(duration) < _NO_RATE[phase.order] * T):
-        scale = scales_of(phase, course.margins)[phase.event] * (duration / T) ** phase.order
+        scale = scales_of(phase, sequence.margins)[phase.event] * (duration / T) ** phase.order
         yield Condition(float(-rate * T / scale), RATE, i, phase.event, duration)
     if what in (None, WITHIN) and duration > 0.0:
-        yield from _within(course, i, event)
+        yield from _within(sequence, i, event)
     if what in (None, BEGIN, CROSSING):
-        yield from _at_begin(course, i)
+        yield from _at_begin(sequence, i)
     if what in (None, STRIKE) and phase.strike is not None:
-        begin = float(course.begins[i])
-        state = course.motion.run(begin, np.array([duration]), course.starts[i], phase)[0][-1]
-        for struck, left in course.motion.strike_left(begin + duration, state, phase):
+        begin = float(sequence.begins[i])
+        state = sequence.motion.run(begin, np.array([duration]), sequence.starts[i], phase)[0][-1]
+        for struck, left in sequence.motion.strike_left(begin + duration, state, phase):
             yield Condition(left, STRIKE, i, struck, duration)
 
 
-def sampled(course: Course, i: int, after: Array) -> Array:
+def sampled(sequence: PhaseSequence, i: int, after: Array) -> Array:
     """Margins (N, 2 k + n) of a phase at times (N,) after its begin, in their scales."""
-    phase, motion, begin = course.phases[i], course.motion, float(course.begins[i])
-    states = np.empty((len(after), len(course.starts[i])))
+    phase, motion, begin = sequence.phases[i], sequence.motion, float(sequence.begins[i])
+    states = np.empty((len(after), len(sequence.starts[i])))
     moves = after != 0.0
-    states[~moves] = course.starts[i]
+    states[~moves] = sequence.starts[i]
     if moves.any():
-        states[moves] = motion.run(begin, after[moves], course.starts[i], phase)[0]
-    return motion.observed(begin + after, states, phase)[0] / scales_of(phase, course.margins)
+        states[moves] = motion.run(begin, after[moves], sequence.starts[i], phase)[0]
+    return motion.observed(begin + after, states, phase)[0] / scales_of(phase, sequence.margins)
 
 
-def _within(course: Course, i: int, only: int | None = None) -> Iterator[Condition]:
+def _within(sequence: PhaseSequence, i: int, only: int | None = None) -> Iterator[Condition]:
     """The least value within a phase of each margin, or of one, that has a minimum there."""
-    duration = float(course.durations[i])
+    duration = float(sequence.durations[i])
     # Without an event, what is at the end is at the begin again.
-    parts = _PARTS if course.phases[i].event != PERIOD else np.append(_PARTS[:-1], _ONCE_MORE)
+    parts = _PARTS if sequence.phases[i].event != PERIOD else np.append(_PARTS[:-1], _ONCE_MORE)
     times = duration * parts
-    found = sampled(course, i, times)
-    phase = course.phases[i]
+    found = sampled(sequence, i, times)
+    phase = sequence.phases[i]
     for event in range(found.shape[1]) if only is None else (only,):
         column = found[:, event]
-        between = phase.order and event == phase.event and duration < _SHORT * course.period
+        between = phase.order and event == phase.event and duration < _SHORT * sequence.period
         if between or not np.isfinite(column).all():
             continue
         low = 1 + np.flatnonzero((column[1:-1] < column[:-2]) & (column[1:-1] <= column[2:]))
@@ -131,16 +131,18 @@ def _within(course: Course, i: int, only: int | None = None) -> Iterator[Conditi
         for place in low:
             after, value = float(times[place]), float(column[place])
             if value < _CLOSE:
-                after, value = _minimum(course, i, event, float(times[place - 1]),
+                after, value = _minimum(sequence, i, event, float(times[place - 1]),
                                         float(times[place + 1]))
             yield Condition(value, WITHIN, i, event, after)
 
 
-def _minimum(course: Course, i: int, event: int, first: float, last: float) -> tuple[float, float]:
+def _minimum(
+    sequence: PhaseSequence, i: int, event: int, first: float, last: float,
+) -> tuple[float, float]:
     """Time and value of a minimum between two times, of the polynomial through nine places."""
     nodes = -np.cos(np.pi * np.arange(_PLACES) / (_PLACES - 1))
     middle, half = 0.5 * (first + last), 0.5 * (last - first)
-    values = sampled(course, i, middle + half * nodes)[:, event]
+    values = sampled(sequence, i, middle + half * nodes)[:, event]
     polynomial = np.polynomial.Chebyshev.fit(nodes, values, _PLACES - 1, domain=[-1.0, 1.0])
     turns = [float(root.real) for root in np.atleast_1d(polynomial.deriv().roots())
              if abs(root.imag) < 1e-6 and abs(root.real) <= 1.0]
@@ -149,13 +151,13 @@ def _minimum(course: Course, i: int, event: int, first: float, last: float) -> t
     return middle + half * at, float(polynomial(at))
 
 
-def _at_begin(course: Course, i: int) -> Iterator[Condition]:
+def _at_begin(sequence: PhaseSequence, i: int) -> Iterator[Condition]:
     """Margins at the begin of a phase, except those that its first event has just made zero."""
-    phase, before = course.phases[i], course.phases[i - 1]
+    phase, before = sequence.phases[i], sequence.phases[i - 1]
     if before.event == PERIOD:
         return
-    k, event = course.motion.clusters, before.event
-    margins = sampled(course, i, np.zeros(1))[0]
+    k, event = sequence.motion.clusters, before.event
+    margins = sampled(sequence, i, np.zeros(1))[0]
     cluster = before.cluster()
     turning = [cluster] if cluster is not None and crosses(before, phase) else []
     for place in np.flatnonzero(np.isfinite(margins)).tolist():
@@ -167,7 +169,7 @@ def _at_begin(course: Course, i: int) -> Iterator[Condition]:
             continue
         elif own is not None and place == 2 * own and before.strike is not None and (
                 before.strike.modes[own] == STICK and phase.status[own] in (1, -1)
-                and course.motion.problem.tangential[own] == 0.0):
+                and sequence.motion.problem.tangential[own] == 0.0):
             # A contact that an impact has stopped slips again at once.
             turning.append(own)
             continue
@@ -175,10 +177,10 @@ def _at_begin(course: Course, i: int) -> Iterator[Condition]:
     for cluster in turning:
         held = Phase((*phase.status[:cluster], STICK, *phase.status[cluster + 1 :]), phase.closed,
                      PERIOD)
-        start, begin = course.starts[i], course.begins[i : i + 1]
+        start, begin = sequence.starts[i], sequence.begins[i : i + 1]
         place = crossing_event(cluster, phase)
-        found = course.motion.observed(begin, start[None], held)[0][0, place]
-        scale = friction_scale(course, i, cluster, held)
+        found = sequence.motion.observed(begin, start[None], held)[0][0, place]
+        scale = friction_scale(sequence, i, cluster, held)
         yield Condition(-float(found) / scale, CROSSING, i, place)
 
 
@@ -194,7 +196,8 @@ def crossing_event(cluster: int, phase: Phase) -> int:
     return 2 * cluster + (0 if phase.status[cluster] == 1 else 1)
 
 
-def friction_scale(course: Course, i: int, cluster: int, held: Phase) -> float:
+def friction_scale(sequence: PhaseSequence, i: int, cluster: int, held: Phase) -> float:
     """Limit of stick at the begin of a phase: half the sum of the margins to both sides."""
-    margins = course.motion.observed(course.begins[i : i + 1], course.starts[i][None], held)[0][0]
+    begin, start = sequence.begins[i : i + 1], sequence.starts[i][None]
+    margins = sequence.motion.observed(begin, start, held)[0][0]
     return float(0.5 * (margins[2 * cluster] + margins[2 * cluster + 1])) or 1.0

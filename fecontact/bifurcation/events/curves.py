@@ -15,7 +15,7 @@ from fecontact.bifurcation.events.conditions import (
     DURATION,
     RATE,
     Condition,
-    Course,
+    PhaseSequence,
     of_phase,
 )
 from fecontact.bifurcation.events.linearisation import EventLinearisation
@@ -100,14 +100,14 @@ class BorderCurve(Problem):
         begins, starts = orbit.begins(u).copy(), orbit.starts(u).copy()
         durations = orbit.durations(u).copy()
         starts[i], begins[i], durations[i] = start, begin, tau
-        course = Course(motion, orbit.phases, begins, starts, durations, orbit.margins)
+        sequence = PhaseSequence(motion, orbit.phases, begins, starts, durations, orbit.margins)
         phase, rate = orbit.phases[i], 0.0
         if self.what == RATE:
             state = motion.run(begin, np.array([tau]), start, phase)[0][-1]
             slopes = motion.margin_slopes(begin + tau, state, phase, phase.event)
             rates = motion.observed(np.array([begin + tau]), state[None], phase)[1][0]
             rate = float(slopes[: len(rates)] @ rates + slopes[len(rates)])
-        found = [each.left for each in of_phase(course, i, rate, self.what, self.event)
+        found = [each.left for each in of_phase(sequence, i, rate, self.what, self.event)
                  if (each.what, each.event) == (self.what, self.event)]
         if not found:
             raise AnalysisError("The orbit does not come near its border any more.")

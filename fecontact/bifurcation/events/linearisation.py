@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.events.conditions import Condition, Course, conditions
+from fecontact.bifurcation.events.conditions import Condition, PhaseSequence, conditions
 from fecontact.bifurcation.events.phases import BRIEF, PERIOD, Motion, Phase, scales_of
 from fecontact.bifurcation.orbits.floquet import Floquet, by_falling_modulus
 from fecontact.core.errors import AnalysisError
@@ -298,11 +298,11 @@ class EventLinearisation:
     def conditions(self) -> list[Condition]:
         """Margins of the conditions of the phases."""
         problem = self.problem
-        course = Course(self.motion, problem.phases, self.begins, problem.starts(self.u),
+        sequence = PhaseSequence(self.motion, problem.phases, self.begins, problem.starts(self.u),
                         problem.durations(self.u), problem.margins)
         rates = [float(end.margin_slopes[: len(end.rates)] @ end.rates
                        + end.margin_slopes[len(end.rates)]) for end in self._ends]
-        return list(conditions(course, rates))
+        return list(conditions(sequence, rates))
 
     @property
     def least(self) -> Condition:

@@ -33,7 +33,7 @@ from fecontact.bifurcation.harmonic.compiled.orbit import (
     SOLUTION,
     evaluate,
 )
-from fecontact.bifurcation.harmonic.compiled.strides import Strides
+from fecontact.bifurcation.harmonic.compiled.step_batches import StepBatches
 from fecontact.bifurcation.harmonic.series import differentiated, shifted
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions
 from fecontact.bifurcation.harmonic.stored import StoredOrbits, StoredValues
@@ -336,9 +336,9 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         """Scales of the states that are series."""
         return self.scales[self.layout.columns]
 
-    def strider(self, options: ContinuationOptions) -> Strides | None:
+    def batch_maker(self, options: ContinuationOptions) -> StepBatches | None:
         """Compiled steps, for forced orbits of contact systems."""
-        return Strides.of(self, options) if type(self) is HarmonicProblem else None
+        return StepBatches.of(self, options) if type(self) is HarmonicProblem else None
 
     def extremes(self, u: Array, z: Array) -> tuple[Array, Array]:
         """Smallest and largest value (d,) of each state over the orbit."""

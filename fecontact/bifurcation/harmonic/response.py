@@ -282,7 +282,7 @@ def frequency_response(
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
         try:
-            further = _told(field, observed, row, level_name, float(value))
+            further = _with_level(field, observed, row, level_name, float(value))
             both = low < first < high
             if method is None or isinstance(method, HarmonicBalance):
                 branch = branch_of_response(
@@ -628,7 +628,7 @@ def _require_observable(layout: Layout, row: Array) -> None:
                          "or a velocity.")
 
 
-def _told(
+def _with_level(
     field: VectorField, observed: str, row: Array, level_name: str | None, level: float
 ) -> dict[str, Any]:
     """Attributes of a branch of responses."""

@@ -353,7 +353,7 @@ def require_same(
             apart = np.abs(np.linalg.eigvals(product)[:, None] - multipliers)
             error = float(apart[linear_sum_assignment(apart)].max())
         if not error <= _APART * max(1.0, float(np.abs(multipliers).max())):
-            warnings.warn(f"At {where} the multipliers of the set-valued orbit cannot be told: by "
+            warnings.warn(f"At {where} the multipliers of the set-valued orbit are uncertain: by "
                           f"differences to one side they are {error:.1g} away, for an event "
                           f"appears or vanishes there, as beside complete chatter; take another "
                           f"value of the parameter.", ModelWarning, stacklevel=2)

@@ -178,14 +178,14 @@ class Expansion:
         # Coefficients of folds contain second derivatives only.
         if formula == self.fold or not self._kinks.passages:
             return formula(bends), 0.0
-        found, doubtful = [], []
+        found, perturbed = [], []
         span = self._span()
         for bend, term in zip(bends, self._at.terms, strict=True):
             change, error = self._kinks.second(term.states, self._step(term.states, step), span)
             found.append(bend._replace(second=bend.second + change))
-            doubtful.append(bend._replace(second=bend.second + change + error))
+            perturbed.append(bend._replace(second=bend.second + change + error))
         whole = formula(found)
-        return whole, abs(formula(doubtful).value - whole.value)
+        return whole, abs(formula(perturbed).value - whole.value)
 
     @cached_property
     def _kinks(self) -> JacobianKinks:

@@ -74,7 +74,7 @@ def sweep(
         stored = read_table(folder / "index.csv")
         changes = _changes_of(folder / "sweep.toml", read_study(study), study)
         for case in _chosen(stored, cases):
-            echo(_told(stored, case) + f"\n  {stored.command(case, study, *changes)}")
+            echo(_described(stored, case) + f"\n  {stored.command(case, study, *changes)}")
         return 0
     if not overwrite:
         require_own_page(folder / "index.html")
@@ -153,7 +153,7 @@ def _numbered(value: Any) -> Any:
     return value
 
 
-def _told(table: "SweepTable", case: int) -> str:
+def _described(table: "SweepTable", case: int) -> str:
     """Number of a case with its summaries, or the reason of its failure."""
     reason = table.reasons[case]
     if reason is None:

@@ -11,7 +11,7 @@ derivative of the equations of the step,
 
 whose last term is for the column of a parameter only. It is linear: the Jacobians at the solved
 stages make one matrix for all columns. Forces are smooth within a step, as it ends where they
-switch, so that columns are as accurate as the motion. What their course misses within the step,
+switch, so that columns are as accurate as the motion. What their polynomials miss within the step,
 which it has through the accelerations at its begin too, is their error.
 """
 
@@ -21,7 +21,6 @@ import numpy as np
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.dense_lu import backward, factorise, forward
-from fecontact.integrate.collocation.courses import look
 from fecontact.integrate.collocation.room import Collocation
 from fecontact.integrate.collocation.stages import (
     move_back,
@@ -30,6 +29,7 @@ from fecontact.integrate.collocation.stages import (
     set_stage,
     speed_scale,
 )
+from fecontact.integrate.collocation.step_polynomials import look
 from fecontact.integrate.collocation.tableau import (
     AT_PLACES,
     LOOKS,
@@ -181,7 +181,7 @@ def _size(x, speeds, problem, progress):
 
 @routine
 def _error_at(at, h, problem, progress, room, c, v):
-    """Largest error of a column by what its course misses at one of the places, as a part of it."""
+    """Largest relative error of a column, by what its polynomial misses at one of the places."""
     m, J = c.accelerations.shape[1], room.reduced.J
     speeds, largest = speed_scale(problem, progress), 0.0
     g, to_place = SPEED_PART[at] * h, PLACE_PART[at] * h * h
@@ -222,7 +222,7 @@ def _error_at(at, h, problem, progress, room, c, v):
         size = max(_size(x, speeds, problem, progress),
                    _size(v.after[column], speeds, problem, progress))
         if error > 0.0:
-            largest = max(largest, error / max(size, v.faded * v.norms[1, column]))
+            largest = max(largest, error / max(size, v.error_floor * v.norms[1, column]))
     return largest
 
 
@@ -289,7 +289,7 @@ def propagate(
 ) -> float:
     """Carry the columns over the step whose stages ``c`` holds; return the largest error of one.
 
-    The error is relative to the size of the column, or to the part ``faded`` of its largest size so
+    The error is relative to the size of the column, or to ``error_floor`` times its largest size so
     far. The step continues for its part ``before`` after a switch of forces, which its last stage
     does not feel. The switch is located to the part ``near`` of the step.
     """

@@ -7,15 +7,6 @@ import numpy as np
 
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.collocation.columns import propagate_at
-from fecontact.integrate.collocation.courses import (
-    first_switch,
-    keep_rates,
-    powers_at,
-    set_courses,
-    step_error,
-    value_at,
-    work_error,
-)
 from fecontact.integrate.collocation.room import (
     AGAIN,
     BEGINS,
@@ -25,6 +16,15 @@ from fecontact.integrate.collocation.room import (
     Collocation,
 )
 from fecontact.integrate.collocation.stages import extrapolate, solve_stages
+from fecontact.integrate.collocation.step_polynomials import (
+    first_switch,
+    keep_rates,
+    powers_at,
+    set_polynomials,
+    step_error,
+    value_at,
+    work_error,
+)
 from fecontact.integrate.collocation.tableau import (
     ERROR_POWER,
     POINTS,
@@ -222,14 +222,14 @@ def _next_length(h, error, numbers, iterations):
 def _switch(h, near, solved, error, problem, progress, c):
     """First part of a step at which forces switch, as far as it is known, 2 if none.
 
-    If the step has failed, that may have been why: its course is wrong then, and the switch is
+    If the step has failed, that may have been why: its polynomials are wrong then, the switch is
     where the motion before would meet it. Unless that is not known either. Also whether it is
     known only about, as it is too far ahead.
     """
     extrapolated = error > 1.0 and c.flags[BEGINS] == 0
     if extrapolated:
         extrapolate(h, progress, c)
-        set_courses(h, progress, c)
+        set_polynomials(h, progress, c)
     elif not solved:
         return 2.0, False
     part = first_switch(near, problem, c)
@@ -252,7 +252,7 @@ def _attempt(step, last, smallest, data):
     solved = solve_stages(step.h, before, problem, progress, room, c)
     error = moved = np.inf
     if solved:
-        set_courses(step.h, progress, c)
+        set_polynomials(step.h, progress, c)
         error = moved = step_error(step, problem, progress, room, c)
         if error <= 1.0 and control.work:
             error = max(error, work_error(step, before, problem, progress, room, c))

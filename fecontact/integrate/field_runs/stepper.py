@@ -8,7 +8,6 @@ import numpy as np
 from fecontact.core.checks import require_state
 from fecontact.core.types import Array
 from fecontact.integrate.bernstein import DEPTH
-from fecontact.integrate.courses import COEFFICIENTS
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.field_runs.method import Data, Output, Progress, Room, advance
@@ -22,6 +21,7 @@ from fecontact.integrate.step_loop import (
     STEP,
     TIME,
 )
+from fecontact.integrate.step_polynomials import COEFFICIENTS
 from fecontact.integrate.step_runs import StepRun
 from fecontact.system.fields.one_place import FieldKernel, python_field
 from fecontact.system.fields.vector_field import VectorField

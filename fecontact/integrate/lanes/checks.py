@@ -2,7 +2,7 @@
 
 Checks and their limits are as in :mod:`fecontact.integrate.rodas5p.error_control`,
 :func:`fecontact.integrate.rodas5p.dynamics.next_kink` and
-:mod:`fecontact.integrate.course_bounds`.
+:mod:`fecontact.integrate.polynomial_bounds`.
 """
 
 import numpy as np
@@ -158,7 +158,7 @@ def _range(first, last, k1, k2, k3):
 
 
 @routine
-def restless(h, s, control, progress, w):
+def may_switch(h, s, control, progress, w):
     """Lanes, one bit each, in which a contact may have changed unnoticed within the step."""
     n, m = s.rows.shape[0], s.rows.shape[2]
     speed = read(progress.ground)
@@ -172,10 +172,10 @@ def restless(h, s, control, progress, w):
         touching = magnitude(read(w.forces[j, FORCE])) > 0.0
         for level in range(len(control.levels)):
             shift = read(s.gap[j]) + read(control.levels[level, j])
-            felt = 2.0 * smaller(nearer + shift, spread(0.0))
+            at_ends = 2.0 * smaller(nearer + shift, spread(0.0))
             bottom = low + shift
             mixed = (bottom < 0.0) & (high + shift > 0.0)
-            some = some | ((mixed | (bottom < felt)) & ~monotone)
+            some = some | ((mixed | (bottom < at_ends)) & ~monotone)
             touching = touching | (bottom < 0.0) | mask_of(-1 if level > 0 else 0)
         k1, k2, k3 = _course(s.rows[j, 0], m, w.dense)
         passing = read(s.sliding[j, 0, 0]) * speed
@@ -184,6 +184,6 @@ def restless(h, s, control, progress, w):
         largest = larger(-low, high) + spread_
         width = read(control.slip_scale[j])
         mixed = (low < spread_) & (high > -spread_) & (largest > width)
-        felt = 2.0 * larger(larger(magnitude(first), magnitude(last)), width) + spread_
-        some = some | (touching & (mixed | (largest > felt)) & ~(monotone & (spread_ == 0.0)))
+        at_ends = 2.0 * larger(larger(magnitude(first), magnitude(last)), width) + spread_
+        some = some | (touching & (mixed | (largest > at_ends)) & ~(monotone & (spread_ == 0.0)))
     return some

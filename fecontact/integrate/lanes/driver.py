@@ -10,7 +10,6 @@ import numpy as np
 
 from fecontact.core.checks import require_state
 from fecontact.core.types import Array, Integers
-from fecontact.integrate.courses import QUICKEST
 from fecontact.integrate.lanes import arrays, step_loop
 from fecontact.integrate.lanes.arrays import (
     ATTEMPTS,
@@ -27,6 +26,7 @@ from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Room
 from fecontact.integrate.series.branches import series_pay
 from fecontact.integrate.small_systems import FEW
 from fecontact.integrate.step_loop import FINISHED, RUNNING
+from fecontact.integrate.step_polynomials import QUICKEST
 from fecontact.integrate.step_runs import ENDS
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.ground.motion import constant_speed

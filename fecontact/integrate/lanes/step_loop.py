@@ -19,8 +19,6 @@ from fecontact.core.lanes.vectors import (
     spread,
     write,
 )
-from fecontact.integrate.course_bounds import doubtful
-from fecontact.integrate.courses import QUICKEST, set_courses
 from fecontact.integrate.lanes import arrays, checks, equations, stages
 from fecontact.integrate.lanes.arrays import (
     AGAIN,
@@ -42,12 +40,14 @@ from fecontact.integrate.lanes.arrays import (
     TIME,
     WAITING,
 )
+from fecontact.integrate.polynomial_bounds import needs_search
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.driver import SWITCH_PART as _SWITCH_PART
+from fecontact.integrate.rodas5p.missed_contacts import first_missed_at
 from fecontact.integrate.rodas5p.state import Step
-from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.integrate.small_systems import FEW, Sized
 from fecontact.integrate.step_loop import FINISHED, MINIMUM_STEP, NOT_FINITE
+from fecontact.integrate.step_polynomials import QUICKEST, set_polynomials
 from fecontact.system.nodes import GroundMotion
 
 # How a call returned: so many attempts were made, lanes are free that more runs may take, or all
@@ -175,7 +175,7 @@ def _aim(t, b):
 
 
 @routine
-def _unfelt_part(lane, t, h, target, b, problem, progress, room):
+def _missed_part(lane, t, h, target, b, problem, progress, room):
     """Part of a lane's step to which it has to be shortened; 1 if none.
 
     By the functions for one run, on ``problem``, ``progress`` and ``room``, which take the lane's
@@ -214,10 +214,10 @@ def _unfelt_part(lane, t, h, target, b, problem, progress, room):
     for j in range(2 * n):
         room.nodes[0, j], room.nodes[1, j] = w.places[j, lane], w.speeds[j, lane]
     moved = GroundMotion(0.0, mine.ground[lane], 0.0, 0.0)
-    set_courses(s, problem.blocks, control.ground, progress.state, room.after, room)
-    if doubtful(moved, h, s, control.ground, control.levels, control.slip_scale, room):
+    set_polynomials(s, problem.blocks, control.ground, progress.state, room.after, room)
+    if needs_search(moved, h, s, control.ground, control.levels, control.slip_scale, room):
         one = Step(t, h, target, target, moved, 0.0, False)
-        part = first_unfelt_at(control.unfelt)(one, int(again), problem, progress, room)
+        part = first_missed_at(control.missed)(one, int(again), problem, progress, room)
         if part * h > 100.0 * smallest and part < 1.0:
             return part
     return 1.0
@@ -286,7 +286,7 @@ def _attempt(active, b, runs, problem, progress, room):
     passed = (error <= 1.0) & mask_of(active)
     stages.set_dense(w)
     part, missed = spread(1.0), mask_of(0)
-    doubt = bits(passed & checks.restless(h, s, control, mine, w))
+    doubt = bits(passed & checks.may_switch(h, s, control, mine, w))
     if doubt != 0:
         write(w.work[0, 0], t)
         write(w.right[0], h)
@@ -294,7 +294,7 @@ def _attempt(active, b, runs, problem, progress, room):
         for lane in range(WIDTH):
             w.stage[0, lane] = 1.0
             if (doubt >> lane) & 1:
-                w.stage[0, lane] = _unfelt_part(lane, w.work[0, 0, lane], w.right[0, lane],
+                w.stage[0, lane] = _missed_part(lane, w.work[0, 0, lane], w.right[0, lane],
                                                 w.right[1, lane], b, problem, progress, room)
         part = read(w.stage[0])
         missed = part < 1.0

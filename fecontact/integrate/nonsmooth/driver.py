@@ -199,14 +199,14 @@ def start(
     problem = problem._replace(poisson=int(impact_law == "poisson"))
     method = _chosen(problem, method)
     solid = system.basis.dimension == 3
-    course = kinds.progress_for(problem, rubbing, state, float(times[0]), 0.01 * longest)
+    progress = kinds.progress_for(problem, rubbing, state, float(times[0]), 0.01 * longest)
     limits = kinds.Limits(
         stops_of(system, float(times[0]), float(times[-1])),
         floor_of(system, state, times, longest), rtol, longest)
     if longest == default and method == "event-driven" and restitution is None:
         most = np.inf if max_step is None else float(max_step)
         limits = limits._replace(longest=min(longest_between_events(system, times), most))
-    sizes = len(course.state), len(course.carried), system.basis.contact_nodes
+    sizes = len(progress.state), len(progress.carried), system.basis.contact_nodes
     room = room_for_rows(keep_steps, sum(sizes))
     output, kept = (kinds.Output(rows, *(np.empty((len(rows), size)) for size in sizes))
                     for rows in (times, np.zeros(room)))
@@ -214,7 +214,7 @@ def start(
     loop: Callable[..., int]
     watch = watch_for(system, events, False)
     watch = watch._replace(note=note_events.address if events else 0)
-    data = problem, limits, course, output, kept
+    data = problem, limits, progress, output, kept
     if solid and restitution is not None:
         from fecontact.integrate.nonsmooth import impact_steps
         from fecontact.integrate.nonsmooth.space_impulses import impact_room_for
@@ -231,7 +231,7 @@ def start(
         _require_no_events(events)
         loop = partial(time_stepping.run_steps, time_stepping.Data(
             *data, workspace, stepping_room(problem)))
-    return Run(loop, course, output, kept, watch, method)
+    return Run(loop, progress, output, kept, watch, method)
 
 
 def _require_no_events(events: Sequence[AnyEvent]) -> None:
@@ -372,7 +372,7 @@ def _require_independence(Ty: Array, rows: Array) -> None:
         along = f", and along it in {len(rows)} ways with friction," if len(rows) else ""
         raise InputError(f"The {len(Ty)} contact nodes move normal to the ground{along} by "
                          f"motions that are not independent in {Ty.shape[1]} modes, so that forces "
-                         f"of rigid stops cannot be told apart; use fewer nodes, or more modes.")
+                         f"of rigid stops cannot be distinguished; use fewer nodes, or more modes.")
 
 
 def _chosen(problem: kinds.NonsmoothProblem, method: str) -> str:

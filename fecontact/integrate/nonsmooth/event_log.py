@@ -13,7 +13,6 @@ from collections.abc import Callable
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law, helper, routine
 from fecontact.integrate.bernstein import NOWHERE, from_nested, sign_changes
-from fecontact.integrate.courses import MOST
 from fecontact.integrate.nonsmooth.dop853 import PARTS, interpolate
 from fecontact.integrate.nonsmooth.equations import derivative
 from fecontact.integrate.nonsmooth.event_search import Room
@@ -39,6 +38,7 @@ from fecontact.integrate.rodas5p.event_kernels import (
     event_at,
 )
 from fecontact.integrate.rodas5p.event_kernels import STICK as STICK_BEGINS
+from fecontact.integrate.step_polynomials import MOST
 
 # Kinds of notes: the state at the start, a step or a part of it, a change of contact.
 BEGIN, WITHIN, CHANGED = range(3)

@@ -59,8 +59,8 @@ _PLACES[-1] = 1.0
 _FIT = fit(_PLACES)
 
 _NESTED = of_nested(PARTS)
-# A contact whose force grows so much between the ends of a step was not felt by its stages.
-UNFELT = 10.0
+# A contact whose force grows so much between the ends of a step was missed by its stages.
+MISSED = 10.0
 ROUGHLY = 2.0**-12
 
 
@@ -321,7 +321,7 @@ def _search_nodes(first, forces, step, p, limits, progress, room):
             else:
                 forces = True
             continue
-        above = UNFELT * max(before, pressed(b[PARTS], j, s)) + pressed(
+        above = MISSED * max(before, pressed(b[PARTS], j, s)) + pressed(
             0.01 * limits.rtol * least_depth(j, p, limits), j, s)
         if max(low, high) <= above and p.relief[0] == p.relief[1] == 0.0:
             continue
@@ -337,7 +337,7 @@ def first_changes(step, p, limits, progress, w, room):
     ``room.parts`` is the interpolation of the step, ``room.ends`` the margins at its ends where
     anything holds. NOWHERE for those that do not change; of what comes later nothing is promised.
     Returns the part to which the step has to be shortened because it passes a contact that its
-    stages have not felt, or waves too short for it; 1 if it has not.
+    stages have missed, or waves too short for it; 1 if it has not.
     """
     room.place[:] = NOWHERE
     if p.rigid != 0:

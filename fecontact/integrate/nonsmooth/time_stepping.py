@@ -17,7 +17,7 @@ import numpy as np
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.bernstein import NOWHERE, first_below
 from fecontact.integrate.nonsmooth.equations import contact_powers, observe
-from fecontact.integrate.nonsmooth.event_search import ROUGHLY, UNFELT, first_pressed, pressed
+from fecontact.integrate.nonsmooth.event_search import MISSED, ROUGHLY, first_pressed, pressed
 from fecontact.integrate.nonsmooth.problem import (
     CUTS,
     FORCE,
@@ -145,7 +145,7 @@ def _touches(j, h, p, w, limits, room):
     depth = 0.0
     for i in range(s.rows.shape[2]):
         depth = max(depth, abs(s.rows[j, 1, i]) * limits.floor[i])
-    above = UNFELT * max(pressed(b[0], j, s), pressed(b[3], j, s))
+    above = MISSED * max(pressed(b[0], j, s), pressed(b[3], j, s))
     above += pressed(limits.rtol * depth, j, s)
     if max(pressed(b.min(), j, s), pressed(b.max(), j, s)) > above:
         return first_pressed(b, above, ROUGHLY, j, s, room.halves)

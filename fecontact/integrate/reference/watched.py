@@ -6,12 +6,12 @@ import numpy as np
 
 from fecontact.core.compiled import kernel
 from fecontact.core.types import Array
-from fecontact.integrate.courses import set_courses, set_ends
 from fecontact.integrate.event_arrays import take_events
 from fecontact.integrate.events import Events
 from fecontact.integrate.rodas5p import dynamics
 from fecontact.integrate.rodas5p.event_kernels import Watch, begin, note_events_at
 from fecontact.integrate.rodas5p.state import Problem, Progress, Room, Step
+from fecontact.integrate.step_polynomials import set_ends, set_polynomials
 from fecontact.integrate.task import Task
 from fecontact.system.nodes import ground_motion
 
@@ -91,5 +91,5 @@ def _search(
     step = Step(t, h, t + h, latest, ground_motion(np.nextafter(t, t + h), s), 0.0, False)
     set_ends(t, progress.state, s, problem.blocks, bounds, room.ends)
     dynamics.project(problem.blocks, room.after, room.nodes[0], room.nodes[1])
-    set_courses(s, problem.blocks, bounds, progress.state, room.after, room)
+    set_polynomials(s, problem.blocks, bounds, progress.state, room.after, room)
     return note_events_at(watch.note)(step, problem, progress, room, watch)

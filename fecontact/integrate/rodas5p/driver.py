@@ -19,6 +19,7 @@ from fecontact.integrate.kept_steps import KeptSteps, room_for_rows
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
+from fecontact.integrate.rodas5p.missed_contacts import first_missed
 from fecontact.integrate.rodas5p.propagation import in_parts, propagate_for
 from fecontact.integrate.rodas5p.run import Run
 from fecontact.integrate.rodas5p.sliders import attend
@@ -31,7 +32,6 @@ from fecontact.integrate.rodas5p.state import (
     progress_for,
     room_for,
 )
-from fecontact.integrate.rodas5p.unfelt import first_unfelt
 from fecontact.integrate.rodas5p.variational import Vary, variation_for
 from fecontact.integrate.run_limits import (
     bounded_period,
@@ -242,7 +242,7 @@ def control_for(
         rtol=float(rtol), slip_part=SLIP_PART, switch_part=SWITCH_PART,
         longest=longest_step(system, times, max_step),
         speed_scale=system.velocity_scale, energy_scale=energy,
-        work=int(work), unfelt=first_unfelt.address,
+        work=int(work), missed=first_missed.address,
         sliders=attend.address if counts.any() else 0, slider_counts=counts)
 
 
@@ -266,7 +266,7 @@ def _levels(system: ContactSystem) -> Array:
 
 
 def _ground_bounds(system: ContactSystem, times: Array) -> Array:
-    """Bounds on the motion of the ground, in the order of :mod:`fecontact.integrate.courses`."""
+    """Bounds on the ground, in the order of :mod:`fecontact.integrate.step_polynomials`."""
     ground, motions = system.ground, system.prescribed_motion.motions
     start, end = float(times[0]), float(times[-1])
     low, high, slope = 0.0, 0.0, 0.0

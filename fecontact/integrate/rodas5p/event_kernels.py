@@ -2,7 +2,7 @@
 
 The dense output of a step is examined a few times, and what has changed since the time before is
 narrowed down by bisection. Gaps, slip velocities and what `Crossing` watches are polynomials
-whose changes of sign are known (:mod:`fecontact.integrate.courses`); between two of them they are
+whose changes of sign are known (:mod:`fecontact.integrate.step_polynomials`); between two they are
 looked at too, so that none escapes. Functions of users and the stick of friction with memory are
 known at the looks only.
 """
@@ -18,9 +18,16 @@ from fecontact.core.compiled import compile_law, helper, routine
 from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.integrate import bernstein
-from fecontact.integrate.courses import COEFFICIENTS, GAP, MOST, SLIP, Course, changes
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import tableau
+from fecontact.integrate.step_polynomials import (
+    COEFFICIENTS,
+    GAP,
+    MOST,
+    SLIP,
+    StepPolynomial,
+    changes,
+)
 from fecontact.system import nodes
 from fecontact.system.node_forces import friction_entry, node_forces
 
@@ -344,8 +351,9 @@ def _set_places(step, problem, before, room, watch):
                     what == SLIP and (s.memory[j] > 0 or s.rows.shape[1] > 2)) or (
                     count + MOST > len(watch.changed)):
                 continue
-            course = Course(what, j, shift, step, s, control.ground, room.courses, row)
-            count += changes(b, course, room.halves, watch.changed[count : count + MOST])
+            polynomial = StepPolynomial(what, j, shift, step, s, control.ground, room.polynomials,
+                                        row)
+            count += changes(b, polynomial, room.halves, watch.changed[count : count + MOST])
         _keep_between(count, j, watch)
     set_own_places(before, room, watch)
 

@@ -6,9 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.integrate.course_bounds import doubtful, restless
-from fecontact.integrate.courses import keep_ends, set_courses, set_ends
 from fecontact.integrate.near_nodes import choose_near, set_end
+from fecontact.integrate.polynomial_bounds import may_switch, needs_search
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.error_control import (
     defect_error,
@@ -33,8 +32,9 @@ from fecontact.integrate.rodas5p.event_kernels import (
     next_switch,
     note_events_at,
 )
+from fecontact.integrate.rodas5p.missed_contacts import first_missed_at
 from fecontact.integrate.rodas5p.sliders import BEGIN, END, OUTPUT, SWITCH, attend_at
-from fecontact.integrate.rodas5p.state import CAUTIOUS, UNFELT, Step
+from fecontact.integrate.rodas5p.state import CAUTIOUS, MISSED, Step
 from fecontact.integrate.rodas5p.step_length import (
     REJECTED_LAST,
     growth,
@@ -43,7 +43,6 @@ from fecontact.integrate.rodas5p.step_length import (
     root_of,
     target_of,
 )
-from fecontact.integrate.rodas5p.unfelt import first_unfelt_at
 from fecontact.integrate.rodas5p.variational import (
     Variation,
     Vary,
@@ -66,6 +65,7 @@ from fecontact.integrate.step_loop import (
     Method,
     step_loop,
 )
+from fecontact.integrate.step_polynomials import keep_ends, set_ends, set_polynomials
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump, set_powers
 
@@ -112,11 +112,11 @@ def _begin(t, data):
 
 @routine
 def _resume(t, data):
-    """Nodes and courses at the start of a step."""
+    """Nodes and polynomials at the start of a step."""
     problem, progress = data.problem, data.progress
     set_ends(t, progress.state, problem.system, problem.blocks, problem.control.ground,
              data.room.ends)
-    progress.numbers[UNFELT] = 0.0
+    progress.numbers[MISSED] = 0.0
 
 
 @helper
@@ -262,15 +262,15 @@ def _switch_error(step, G, end, problem, progress, room):
 
 
 @routine
-def _unfelt_part(step, smallest, problem, progress, room):
+def _missed_part(step, smallest, problem, progress, room):
     """Part of the step to which it has to be shortened, as its stages missed a force; 1 if none."""
     s, blocks, control = problem.system, problem.blocks, problem.control
-    again = int(progress.numbers[UNFELT])
-    if restless(step, problem, progress, room) and again < _MOST_AGAIN:
-        set_courses(s, blocks, control.ground, progress.state, room.after, room)
-        if doubtful(step.moved, step.h, s, control.ground, control.levels, control.slip_scale,
+    again = int(progress.numbers[MISSED])
+    if may_switch(step, problem, progress, room) and again < _MOST_AGAIN:
+        set_polynomials(s, blocks, control.ground, progress.state, room.after, room)
+        if needs_search(step.moved, step.h, s, control.ground, control.levels, control.slip_scale,
                     room):
-            part = first_unfelt_at(control.unfelt)(step, again, problem, progress, room)
+            part = first_missed_at(control.missed)(step, again, problem, progress, room)
             if part * step.h > 100.0 * smallest and part < 1.0:
                 return part
     return 1.0
@@ -310,9 +310,9 @@ def _attempt(step, last, smallest, data):
     error = _error_at_end(step, end, problem, progress, room)
     if error <= 1.0:
         tableau.dense_coefficients(room.stages, room.dense)
-        part = _unfelt_part(step, smallest, problem, progress, room)
+        part = _missed_part(step, smallest, problem, progress, room)
         if part < 1.0:
-            numbers[UNFELT] += 1.0
+            numbers[MISSED] += 1.0
             return CUT, step.h * part
         if switched or switches(len(problem.system.gap), problem.blocks.nodes, room.nodes[2],
                                 progress.signs):
@@ -337,7 +337,7 @@ def _attempt(step, last, smallest, data):
     if not error <= 1.0:
         return _refused(step, error, progress, room)
     h = next_length(step.h, root_of(error), control.longest, numbers)
-    numbers[UNFELT] = 0.0
+    numbers[MISSED] = 0.0
     if step.caution > 0.0:
         numbers[CAUTIOUS] = step.caution
     return TAKEN, h
@@ -349,7 +349,7 @@ def _find_end(step, data):
     problem, progress, room, watch = data.problem, data.progress, data.room, data.watch
     s, control = problem.system, problem.control
     if _watched(watch):
-        set_courses(s, problem.blocks, control.ground, progress.state, room.after, room)
+        set_polynomials(s, problem.blocks, control.ground, progress.state, room.after, room)
         return note_events_at(watch.note)(step, problem, progress, room, watch)
     if watch.counts[KINKS]:
         begin(min(step.target, step.latest), room.after, s, control.depth, watch, room.scratch)

@@ -6,7 +6,7 @@ import numpy as np
 
 from fecontact.core.records import ANY, allocate
 from fecontact.core.types import Array, Integers
-from fecontact.integrate import bernstein, courses, step_loop
+from fecontact.integrate import bernstein, step_loop, step_polynomials
 from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.integrate.rodas5p import stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import Blocks, near_blocks
@@ -26,9 +26,9 @@ from fecontact.system.powers import NODE_POWERS, POWER_COUNT, WORKS
 
 # Entries of Progress.numbers, after those of `step_length`. CAUTIOUS is the length of a step that
 # failed, while what made it fail may still lie ahead, else zero. ENERGY is the largest energy or
-# work so far; UNFELT the number of attempts at a step that missed a force.
+# work so far; MISSED the number of attempts at a step that missed a force.
 NUMBERS = 9
-SPEED_SCALE, CAUTIOUS, ENERGY, UNFELT = range(LAST_ROOT + 1, NUMBERS)
+SPEED_SCALE, CAUTIOUS, ENERGY, MISSED = range(LAST_ROOT + 1, NUMBERS)
 # Entries of Progress.counts after those of the step loop: the node at which the error is largest,
 # and switches at one time so far.
 COUNTS = step_loop.COUNTS + 2
@@ -60,15 +60,15 @@ class Control(NamedTuple):
         Penetrations at which normal forces begin or end.
     ground : (5,) array
         Lowest and highest place of the ground, its steepest slope, its largest speed and
-        acceleration, as :mod:`fecontact.integrate.courses` names them.
+        acceleration, as :mod:`fecontact.integrate.step_polynomials` names them.
     rtol, slip_part, switch_part, longest, speed_scale, energy_scale : float
         Relative tolerance, part of the distance from stick to which slip velocities are resolved,
         part of the tolerance allowed where normal forces begin or end within a step, longest
         step [s], velocity and energy below which errors count as if they were this large.
     work : int
         Whether to integrate the powers.
-    unfelt : int
-        Address of :data:`fecontact.integrate.rodas5p.unfelt.first_unfelt`.
+    missed : int
+        Address of :data:`fecontact.integrate.rodas5p.missed_contacts.first_missed`.
     sliders : int
         Address of :data:`fecontact.integrate.rodas5p.sliders.attend`; zero without elastic Coulomb
         elements.
@@ -94,7 +94,7 @@ class Control(NamedTuple):
     speed_scale: float
     energy_scale: float
     work: int
-    unfelt: int
+    missed: int
     sliders: int
     slider_counts: Annotated[Integers, NODES]
 
@@ -182,7 +182,7 @@ class Room(NamedTuple):
     nodes at a point within the step, ``power`` (4, p + 2 n) for a quadrature, ``creeps`` (n, 4)
     for where nodes creep in the step, as
     :func:`fecontact.integrate.rodas5p.error_control.set_creeps` fills it. ``ends`` to ``places``
-    serve to look at the course of a step: the nodes at its ends, its coefficients, those of the
+    serve to look at a step's polynomials: the nodes at its ends, its coefficients, those of the
     nodes, and room for what they may do. ``sums`` (2, size, 8) are what stages add to those after
     them.
     """
@@ -210,10 +210,10 @@ class Room(NamedTuple):
     gradients_after: motion.Gradients
     ends: Annotated[Array, 3, AXES * NODES]
     inner: Annotated[Array, 3, SIZE]
-    courses: Annotated[Array, courses.DOUBT + 1, (2 * AXES - 1) * NODES]
-    bound: Annotated[Array, 3, courses.COEFFICIENTS]
-    halves: Annotated[Array, bernstein.DEPTH, courses.COEFFICIENTS + 1]
-    places: Annotated[Array, courses.MOST]
+    polynomials: Annotated[Array, step_polynomials.SEARCH + 1, (2 * AXES - 1) * NODES]
+    bound: Annotated[Array, 3, step_polynomials.COEFFICIENTS]
+    halves: Annotated[Array, bernstein.DEPTH, step_polynomials.COEFFICIENTS + 1]
+    places: Annotated[Array, step_polynomials.MOST]
     sums: Annotated[Array, 2, SIZE, tableau.STAGES]
 
 

@@ -67,9 +67,9 @@ class Variation(NamedTuple):
         which begins at zero, is controlled.
     stages : (STAGES k, size) array
         U_i of column c in row STAGES c + i.
-    tolerance, faded : float
+    tolerance, error_floor : float
         Largest error of a column in a step that is allowed, relative to its size, or to the part
-        ``faded`` of its largest size so far where that is more.
+        ``error_floor`` of its largest size so far where that is more.
     moved, right : (k, 2 size), (k, size) arrays
         [X_i, x] and the right sides of a stage, column by column.
     pushed : (k, m) array
@@ -94,7 +94,7 @@ class Variation(NamedTuple):
     least: Annotated[Array, COLUMNS]
     stages: Annotated[Array, tableau.STAGES * COLUMNS, SIZE]
     tolerance: float
-    faded: float
+    error_floor: float
     moved: Annotated[Array, COLUMNS, 2 * SIZE]
     pushed: Annotated[Array, COLUMNS, MODES]
     right: Annotated[Array, COLUMNS, SIZE]
@@ -137,7 +137,7 @@ class Vary(NamedTuple):
 
 def variation_for(
     columns: int, modes: int, nodes: int, states: int, dimension: int, width: float,
-    tolerance: float, faded: float, combinations: int = 0,
+    tolerance: float, error_floor: float, combinations: int = 0,
 ) -> Variation:
     """Workspace for so many columns; the first ``size`` of them are the unit matrix.
 
@@ -148,12 +148,12 @@ def variation_for(
     sizes = {COLUMNS: columns, DIRECTIONS: directions, MODES: modes, NODES: nodes, MEMORY: states,
              AXES: dimension, COMBINATIONS: combinations}
     made = allocate(
-        Variation, sizes, tolerance=tolerance, faded=faded,
+        Variation, sizes, tolerance=tolerance, error_floor=error_floor,
         bends=allocate(dynamics.Gradients, {**sizes, NODES: directions * nodes}))
     np.fill_diagonal(made.columns, 1.0)
     if width:
         # A tenth of the state's own sizes, if the parameter changed by all of its value.
-        made.least[-1] = 0.1 * MOVE * 2.0 / (width * faded)
+        made.least[-1] = 0.1 * MOVE * 2.0 / (width * error_floor)
     made.norms[:] = made.least
     return made
 
@@ -255,7 +255,7 @@ def _largest_error(scale, v):
         size = max(before, after)
         v.norms[1, c] = max(v.norms[0, c], size)
         if error > 0.0:
-            largest = max(largest, error / max(size, v.faded * v.norms[1, c]))
+            largest = max(largest, error / max(size, v.error_floor * v.norms[1, c]))
     return largest
 
 
@@ -278,7 +278,7 @@ def propagate(
 ) -> float:
     """Carry the columns over the step whose stages and factors the room holds.
 
-    Returns the largest error of a column relative to its size, or to the part ``faded`` of its
+    Returns the largest error of a column relative to its size, or to ``error_floor`` times its
     largest size so far. ``room.right`` (size,) holds the units of the state. Columns of a parameter
     that are still smaller than ``least`` count as if they had that size.
     """
@@ -362,7 +362,7 @@ def _parts(step, scale, x, forced, J, v):
                 off = max(off, abs(error[k, c]) / scale[k])
             if off > 0.0:
                 expected = max(expected, parts * off / max(
-                    size, v.faded * max(v.norms[0, c], size)))
+                    size, v.error_floor * max(v.norms[0, c], size)))
         if not expected > v.tolerance or parts >= _MOST_PARTS:
             break
         parts = min(_MOST_PARTS, max(parts + 1, int(np.ceil(

@@ -12,8 +12,8 @@ there; this is found once a step, by differences.
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.integrate.courses import STEEPEST
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
+from fecontact.integrate.step_polynomials import STEEPEST
 from fecontact.system.elastic_sliders import deflection_of
 from fecontact.system.node_forces import friction_entry, node_gradients, slip_entry
 from fecontact.system.nodes import NodeMotion, ground_moved, memory_of, node_contact

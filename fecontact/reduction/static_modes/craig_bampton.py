@@ -51,14 +51,14 @@ def craig_bampton(
     fixed = _fixed_interface_modes(system, flexibility.rows.T @ patterns, deflections, motion,
                                    count)
     answers = [] if loads is None else [system.deflection(loads)]
-    squares, shapes = diagonalised(system, _told_apart(
+    squares, shapes = diagonalised(system, _distinguished(
         system, system.without_rigid(np.hstack([deflections, fixed, *answers]))))
     rigid = system.rigid.shape[1]
     return (np.concatenate([np.zeros(rigid), np.sqrt(squares)]),
             np.hstack([system.rigid, shapes]))
 
 
-def _told_apart(system: FreeSystem, vectors: Array) -> Array:
+def _distinguished(system: FreeSystem, vectors: Array) -> Array:
     """Vectors (f, p) of the same span, with similar energies and nearly orthogonal.
 
     Products of nearly dependent vectors lose their differences to rounding, about 1e-16 of their

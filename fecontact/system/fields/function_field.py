@@ -173,10 +173,10 @@ class FunctionField(VectorField):
         """Warn of a complex step that failed at places (d + a,), or raise; see derivatives."""
         if wrong.any():
             self._was_wrong = True
-            told = self.complaint(wrong, active)
+            message = self.complaint(wrong, active)
             if self._required:
-                raise AnalysisError(told)
-            warnings.warn(f"{told} Where the step is wrong, differences take its place.",
+                raise AnalysisError(message)
+            warnings.warn(f"{message} Where the step is wrong, differences take its place.",
                           stacklevel=3)
 
     def kernel(self) -> Any:
@@ -277,11 +277,11 @@ def vector_field(
     if complex_rates is not None:
         made = FunctionField(rates, given, complex_rates, parameters, names, typical, period_of,
                              required)
-        told = _wrong_at_samples(made)
-        if told is None:
+        message = _wrong_at_samples(made)
+        if message is None:
             return made
         if required:
-            raise InputError(told)
+            raise InputError(message)
     return FunctionField(rates, given, None, parameters, names, typical, period_of)
 
 

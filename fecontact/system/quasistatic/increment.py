@@ -38,8 +38,8 @@ from fecontact.system.polynomial_forces import (
 )
 from fecontact.system.quasistatic.pose import (
     AGAINST,
+    ALONG_SURFACE,
     FORCE,
-    LEANING,
     PENETRATION,
     PER_TANGENT,
     PLACE,
@@ -192,7 +192,7 @@ def evaluate(
         for k in range(tangents):
             second, gone = PER_TANGENT * k, ground_travel(k, j, moved, s)
             T = tangent_force(F, total[k], contact.slope[k], s)
-            node[j, AGAINST + second], node[j, LEANING + second] = T, F * contact.slope[k]
+            node[j, AGAINST + second], node[j, ALONG_SURFACE + second] = T, F * contact.slope[k]
             rounding = _SPRINGS * (springs * (abs(motion.places[2 * k]) + abs(gone))
                                    + _stretched(j, k, sliders, pose))
             _push(s.rows[j, 1], F if k == 0 else 0.0, s.rows[j, 2 * k], T, rounding, room)

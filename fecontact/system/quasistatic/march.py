@@ -25,8 +25,8 @@ from fecontact.system.polynomial_forces import (
 from fecontact.system.quasistatic.increment import find_equilibrium
 from fecontact.system.quasistatic.pose import (
     AGAINST,
+    ALONG_SURFACE,
     FORCE,
-    LEANING,
     PENETRATION,
     PER_TANGENT,
     PLACE,
@@ -157,7 +157,7 @@ def _rubbed(j, e, old, new, sliders):
 def _surface_work(j, tangent, old, new):
     """Work of contact forces along the surface, as node j moves along a tangent."""
     k = PER_TANGENT * tangent
-    return 0.5 * (old.node[j, LEANING + k] + new.node[j, LEANING + k]) * (
+    return 0.5 * (old.node[j, ALONG_SURFACE + k] + new.node[j, ALONG_SURFACE + k]) * (
         new.node[j, PLACE + k] - old.node[j, PLACE + k])
 
 

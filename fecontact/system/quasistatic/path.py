@@ -88,8 +88,8 @@ class LoadPath:
                              "values or more for load_scale, forces, motion_x, motion_y, motion_z, "
                              "travel or travel_y.")
         if len(set(lengths.values())) > 1:
-            told = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-            raise InputError(f"LoadPath: all lists need one value for each vertex, but {told}.")
+            given = ", ".join(f"{name} has {length}" for name, length in lengths.items())
+            raise InputError(f"LoadPath: all lists need one value for each vertex, but {given}.")
         self._set_steps()
 
     def _set_steps(self) -> None:

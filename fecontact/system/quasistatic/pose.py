@@ -8,7 +8,7 @@ from fecontact.core.records import Block, IntegerVector, Matrix, Vector
 from fecontact.core.types import Array
 
 # Columns of `Pose.node`; in space the last three follow for the second tangent.
-FORCE, PRESSING, PENETRATION, PLACE, AGAINST, LEANING = range(6)
+FORCE, PRESSING, PENETRATION, PLACE, AGAINST, ALONG_SURFACE = range(6)
 PER_TANGENT = 3
 
 

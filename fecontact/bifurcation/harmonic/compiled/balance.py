@@ -142,10 +142,10 @@ class CompiledBalance:
         places = near.low + (near.high - near.low) * _PLACES
         periods = (problem.periods * problem.turn / places if problem.turn is not None
                    else np.full(len(places), problem.periods * problem.fixed))
-        body, given, told = np.empty((4, m, m)), np.empty((2, N, m)), np.empty(3)
+        body, given, sizes = np.empty((4, m, m)), np.empty((2, N, m)), np.empty(3)
         forces_at_rest(places, periods, problem.series.times, near.flat, near.base, near.slope,
-                       near.arrays, body, given, told)
-        off, mean, change = told.tolist()
+                       near.arrays, body, given, sizes)
+        off, mean, change = sizes.tolist()
         return None if off > _AFFINE else (body, given, mean <= _NOTHING and change <= _NOTHING)
 
     def _steady(self, near: AffineArrays) -> bool:

@@ -14,12 +14,12 @@ from fecontact.system.nodes import SystemArrays, memory_of, node_motion
 @kernel
 def forces_at_rest(
     places: Vector, periods: Vector, tau: Vector, flat: Vector, base: Vector, slope: Vector,
-    s: SystemArrays, body: Block, given: Block, told: Vector,
+    s: SystemArrays, body: Block, given: Block, sizes: Vector,
 ) -> None:
     """Fill body (4, m, m) and given (2, N, m), affine in a parameter p, from its first two places.
 
     These are stiffness and damping, and loads at the samples: values at p = 0 and their slopes. The
-    arrays of the system are ``flat`` = ``base`` + p ``slope``. Entries of ``told`` (3,) are the
+    arrays of the system are ``flat`` = ``base`` + p ``slope``. Entries of ``sizes`` (3,) are the
     largest deviation of the loads from the affine ones over all places, relative to the largest;
     the largest mean of the forces of loads and contact at rest for the last place, relative to the
     largest force; and the largest change of the mean of the loads, relative to the largest load.
@@ -85,6 +85,6 @@ def forces_at_rest(
             for c in range(N):
                 other += loads[place, c, i] / N
             change = max(change, abs(other - last))
-    told[0] = off
-    told[1] = mean / most if mean > 0.0 else 0.0
-    told[2] = change / heaviest if change > 0.0 else 0.0
+    sizes[0] = off
+    sizes[1] = mean / most if mean > 0.0 else 0.0
+    sizes[2] = change / heaviest if change > 0.0 else 0.0

@@ -13,22 +13,22 @@ from collections.abc import Callable
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law, helper
-from fecontact.integrate.courses import (
+from fecontact.integrate.rodas5p import state as run_arrays
+from fecontact.integrate.step_polynomials import (
     COEFFICIENTS,
-    DOUBT,
     GAP,
+    SEARCH,
     SLIP,
-    Course,
+    StepPolynomial,
     at,
     changes,
 )
-from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.system.node_forces import normal_force, plane_friction
 
-_UNFELT = Callable[[
+_MISSED = Callable[[
     run_arrays.Step, int, run_arrays.Problem, run_arrays.Progress, run_arrays.Room,
 ], float]
-first_unfelt_at = function_at(_UNFELT)
+first_missed_at = function_at(_MISSED)
 
 # Smallest missed impulse that counts, as a part of the tolerance.
 _PART = 0.1
@@ -58,7 +58,7 @@ def _push(j, u, v, s):
 
 
 @helper
-def _unfelt_push(j, inside, level, value, ends, brief, s):
+def _missed_normal_force(j, inside, level, value, ends, brief, s):
     """Normal force that a stretch of ``brief`` s hides, where the gap over a level is ``value``.
 
     ``ends`` is the largest gap over the level, of either sign, at ends of the step that belong to
@@ -72,7 +72,7 @@ def _unfelt_push(j, inside, level, value, ends, brief, s):
 
 
 @helper
-def _unfelt_rub(j, inside, F, slip, ends, s):
+def _missed_friction(j, inside, F, slip, ends, s):
     """Friction force that a stretch hides, for a slip velocity under the normal force F.
 
     ``ends`` is the largest slip velocity at ends of the step that belong to the stretch.
@@ -84,7 +84,7 @@ def _unfelt_rub(j, inside, F, slip, ends, s):
 
 
 @helper
-def _largest(begin, end, b, course):
+def _largest(begin, end, b, polynomial):
     """Largest value of a polynomial between two parts of the step, its place, and that at ends.
 
     Only ends of the step itself count; zero where neither lies between the parts.
@@ -92,7 +92,7 @@ def _largest(begin, end, b, course):
     place, largest, ends = begin, 0.0, 0.0
     for look in range(_LOOKS + 1):
         part = begin + (end - begin) * look / _LOOKS
-        value = at(part, b, course)
+        value = at(part, b, polynomial)
         if abs(value) > abs(largest):
             largest, place = value, part
         if (part == 0.0 or part == 1.0) and abs(value) > abs(ends):
@@ -101,16 +101,17 @@ def _largest(begin, end, b, course):
 
 
 @helper
-def _normal_force(place, course, height):
-    """Magnitude of the normal force of the course's node at a part of the step, without damping."""
-    s, n = course.system, len(course.system.gap)
+def _normal_force(place, polynomial, height):
+    """Magnitude of the normal force of a node at a part of the step, without damping."""
+    s, n = polynomial.system, len(polynomial.system.gap)
     for i in range(COEFFICIENTS):
-        height[i] = course.courses[i, n + course.node]
-    gap = Course(GAP, course.node, 0.0, course.step, s, course.bounds, course.courses, course.row)
-    return abs(_push(course.node, -at(place, height, gap), 0.0, s))
+        height[i] = polynomial.coefficients[i, n + polynomial.node]
+    gap = StepPolynomial(GAP, polynomial.node, 0.0, polynomial.step, s, polynomial.bounds,
+                         polynomial.coefficients, polynomial.row)
+    return abs(_push(polynomial.node, -at(place, height, gap), 0.0, s))
 
 
-def _first_unfelt(step, again, problem, progress, room):
+def _first_missed(step, again, problem, progress, room):
     """Part of the step at which to end it because of what it did not feel; 2 if there is nothing.
 
     It is the earliest such place of all nodes: just past the begin of the stretch, or, when this
@@ -124,27 +125,28 @@ def _first_unfelt(step, again, problem, progress, room):
     first = 2.0
     for column in range(2 * n):
         what, j = (SLIP, column) if column < n else (GAP, column - n)
-        if room.courses[DOUBT, column] == 0.0 or (
+        if room.polynomials[SEARCH, column] == 0.0 or (
                 what == SLIP and (s.memory[j] > 0 or s.rows.shape[1] > 2)):
             continue
         for level in range(levels.shape[0] if what == GAP else 1):
             shift = levels[level, j] if what == GAP else 0.0
-            course = Course(what, j, shift, step, s, control.ground, room.courses, row)
-            found = changes(b, course, room.halves, places)
+            polynomial = StepPolynomial(what, j, shift, step, s, control.ground, room.polynomials,
+                                        row)
+            found = changes(b, polynomial, room.halves, places)
             for k in range(found + 1):
                 begin = places[k - 1] if k > 0 else 0.0
                 end = places[k] if k < found else 1.0
                 if begin >= first:
                     break
-                place, largest, ends = _largest(begin, end, b, course)
+                place, largest, ends = _largest(begin, end, b, polynomial)
                 inside, brief = begin > 0.0 and end < 1.0, (end - begin) * step.h
                 force = 0.0
                 if what == GAP:
-                    force = _unfelt_push(j, inside, shift, largest, ends, brief, s)
+                    force = _missed_normal_force(j, inside, shift, largest, ends, brief, s)
                 elif abs(largest) > control.slip_scale[j]:
-                    F = _normal_force(place, course, height)
+                    F = _normal_force(place, polynomial, height)
                     if F > 0.0:
-                        force = _unfelt_rub(j, inside, F, largest, ends, s)
+                        force = _missed_friction(j, inside, F, largest, ends, s)
                 if force > 0.0 and _matters(2.0 / 3.0 * force * brief, column, step.h, blocks,
                                             control, progress):
                     if again == 0 and begin > 0.0:
@@ -154,5 +156,5 @@ def _first_unfelt(step, again, problem, progress, room):
 
 
 # By its address: few steps need it, and it need not be compiled into all.
-first_unfelt = compile_law(_UNFELT, "first_unfelt(step, again, problem, progress, room)",
-                           _first_unfelt)
+first_missed = compile_law(_MISSED, "first_missed(step, again, problem, progress, room)",
+                           _first_missed)

@@ -6,17 +6,17 @@ modes. For few nodes on flat ground it is cheaper to evaluate the coefficients t
 """
 
 from fecontact.core.compiled import helper, routine
-from fecontact.integrate.courses import (
-    DOUBT,
+from fecontact.integrate.near_nodes import reach_out
+from fecontact.integrate.rodas5p import dynamics as motion
+from fecontact.integrate.step_polynomials import (
     FASTEST,
     HIGHEST,
     LOWEST,
     QUICKEST,
+    SEARCH,
     STEEPEST,
     set_heights,
 )
-from fecontact.integrate.near_nodes import reach_out
-from fecontact.integrate.rodas5p import dynamics as motion
 from fecontact.system.nodes import ground_speed
 
 # Largest number of nodes that counts as few.
@@ -24,16 +24,16 @@ _FEW = 4
 
 
 @routine
-def restless(step, problem, progress, room):
-    """True if :func:`doubtful` may return True; costs less.
+def may_switch(step, problem, progress, room):
+    """True if :func:`needs_search` may return True; costs less.
 
     ``room.ends`` and ``room.nodes`` hold the nodes at both ends, ``room.given`` the motion of the
     ground at the end.
     """
     s, control = problem.system, problem.control
     if len(s.gap) <= _FEW and control.ground[STEEPEST] == 0.0:
-        return _restless_nodes(step.moved, step.h, s, problem.blocks, control, room)
-    return _restless_modes(step, problem, progress, room)
+        return _nodes_may_switch(step.moved, step.h, s, problem.blocks, control, room)
+    return _modes_may_switch(step, problem, progress, room)
 
 
 @helper
@@ -47,8 +47,8 @@ def _range(first, last, k1, k2, k3):
 
 
 @helper
-def _restless_nodes(moved, h, s, blocks, control, room):
-    """Tests of :func:`doubtful` for few nodes on flat ground, without slip of open nodes."""
+def _nodes_may_switch(moved, h, s, blocks, control, room):
+    """Tests of :func:`needs_search` for few nodes on flat ground, without slip of open nodes."""
     levels, ends, nodes, dense = control.levels, room.ends, room.nodes, room.dense
     shapes = blocks.shapes
     n, m = len(s.gap), len(control.largest)
@@ -71,9 +71,9 @@ def _restless_nodes(moved, h, s, blocks, control, room):
         touching = nodes[2, n + j] != 0.0
         for level in range(levels.shape[0]):
             shift = s.gap[j] + levels[level, j] - control.ground[HIGHEST]
-            felt = 2.0 * min(min(first, last) + shift, 0.0)
+            at_ends = 2.0 * min(min(first, last) + shift, 0.0)
             mixed = low + shift < 0.0 and high + shift > 0.0
-            some |= (mixed or low + shift < felt) and not monotone
+            some |= (mixed or low + shift < at_ends) and not monotone
             touching |= low + shift < 0.0 or level > 0
         if s.rows.shape[1] > 2:
             continue
@@ -81,14 +81,14 @@ def _restless_nodes(moved, h, s, blocks, control, room):
         low, high, monotone = _range(first, last, r1, r2, r3)
         largest = max(-low, high) + spread
         mixed = low < spread and high > -spread and largest > control.slip_scale[j]
-        felt = 2.0 * max(max(abs(first), abs(last)), control.slip_scale[j]) + spread
-        some |= touching and (mixed or largest > felt) and not (monotone and spread == 0.0)
+        at_ends = 2.0 * max(max(abs(first), abs(last)), control.slip_scale[j]) + spread
+        some |= touching and (mixed or largest > at_ends) and not (monotone and spread == 0.0)
     return some
 
 
 @helper
-def _restless_modes(step, problem, progress, room):
-    """Tests of :func:`doubtful` for many nodes or wavy ground, by bounds on the modes."""
+def _modes_may_switch(step, problem, progress, room):
+    """Tests of :func:`needs_search` for many nodes or wavy ground, by bounds on the modes."""
     s, blocks, control = problem.system, problem.blocks, problem.control
     bounds, levels, ends, nodes, dense = (control.ground, control.levels, room.ends, room.nodes,
                                           room.dense)
@@ -140,8 +140,8 @@ def _restless_modes(step, problem, progress, room):
         low, high = min(first, last) - part, max(first, last) + part
         largest = max(-low, high)
         mixed = low < 0.0 and high > 0.0 and largest > control.slip_scale[j]
-        felt = 2.0 * max(max(abs(first), abs(last)), control.slip_scale[j])
-        some |= touching and (mixed or largest > felt)
+        at_ends = 2.0 * max(max(abs(first), abs(last)), control.slip_scale[j])
+        some |= touching and (mixed or largest > at_ends)
     return some
 
 
@@ -152,30 +152,30 @@ def _departure(k1, k2, k3):
 
 
 @routine
-def doubtful(moved, h, s, bounds, levels, slip_scale, room):
+def needs_search(moved, h, s, bounds, levels, slip_scale, room):
     """True if forces within the step may differ from what the values at its ends suggest.
 
     A gap or slip velocity may change sign more often than its end values show, a contact be twice
     as deep in between, or slip begin and end. ``levels`` (k, n) are the penetrations at which
-    normal forces begin; ``moved`` is the motion of the ground. Row DOUBT of ``room.courses`` marks
-    the quantities concerned.
+    normal forces begin; ``moved`` is the motion of the ground. Row SEARCH of ``room.polynomials``
+    marks the quantities concerned.
     """
-    c = room.courses
+    c = room.polynomials
     n = levels.shape[1]
     for j in range(n):
         if s.rows.shape[1] > 2:
             # Slip velocities turn there, and the error of a step sees it.
-            c[DOUBT, j], c[DOUBT, n + j] = 0.0, 0.0
+            c[SEARCH, j], c[SEARCH, n + j] = 0.0, 0.0
             continue
         spread = abs(s.sliding[j, 0, 0]) * bounds[QUICKEST] * h
         v = s.sliding[j, 0, 0] * moved.speed
         low = min(min(min(c[0, j], c[1, j]), min(c[2, j], c[3, j])), c[4, j]) - v - spread
         high = max(max(max(c[0, j], c[1, j]), max(c[2, j], c[3, j])), c[4, j]) - v + spread
         largest = max(-low, high)
-        felt = 2.0 * max(max(abs(c[0, j] - v), abs(c[4, j] - v)), slip_scale[j])
+        at_ends = 2.0 * max(max(abs(c[0, j] - v), abs(c[4, j] - v)), slip_scale[j])
         mixed = low < 0.0 and high > 0.0 and largest > slip_scale[j]
-        c[DOUBT, j] = 1.0 if mixed or largest > felt + spread else 0.0
-        c[DOUBT, n + j] = 0.0
+        c[SEARCH, j] = 1.0 if mixed or largest > at_ends + spread else 0.0
+        c[SEARCH, n + j] = 0.0
     for level in range(levels.shape[0]):
         for j in range(n):
             k = n + j
@@ -183,12 +183,12 @@ def doubtful(moved, h, s, bounds, levels, slip_scale, room):
             high = max(max(max(c[0, k], c[1, k]), max(c[2, k], c[3, k])), c[4, k])
             top = levels[level, j] - bounds[HIGHEST]
             bottom = levels[level, j] - bounds[LOWEST]
-            felt = 2.0 * min(min(c[0, k], c[4, k]) + bottom, 0.0)
+            at_ends = 2.0 * min(min(c[0, k], c[4, k]) + bottom, 0.0)
             mixed = low + top < 0.0 and high + bottom > 0.0
-            c[DOUBT, k] += 1.0 if mixed or low + top < felt else 0.0
+            c[SEARCH, k] += 1.0 if mixed or low + top < at_ends else 0.0
     some = 0.0
     for j in range(2 * n):
-        some += c[DOUBT, j]
+        some += c[SEARCH, j]
     if some == 0.0:
         return False
     some = 0.0
@@ -197,6 +197,6 @@ def doubtful(moved, h, s, bounds, levels, slip_scale, room):
         if bounds[QUICKEST if j < n else STEEPEST] == 0.0 and (
                 (c[0, j] <= c[1, j] <= c[2, j] <= c[3, j] <= c[4, j])
                 or (c[0, j] >= c[1, j] >= c[2, j] >= c[3, j] >= c[4, j])):
-            c[DOUBT, j] = 0.0
-        some += c[DOUBT, j]
+            c[SEARCH, j] = 0.0
+        some += c[SEARCH, j]
     return some != 0.0

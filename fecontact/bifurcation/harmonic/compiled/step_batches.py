@@ -37,7 +37,7 @@ _SHORTEST = 1e-2
 
 
 @dataclass(eq=False)
-class Strides:
+class StepBatches:
     """Makes plain steps of a :class:`fecontact.bifurcation.harmonic.problem.HarmonicProblem`.
 
     Attributes
@@ -55,14 +55,14 @@ class Strides:
     waits: int = 0
 
     @classmethod
-    def of(cls, problem: Any, options: ContinuationOptions) -> "Strides | None":
+    def of(cls, problem: Any, options: ContinuationOptions) -> "StepBatches | None":
         """Plain steps of a problem; None if they are not made by compiled code."""
         if (problem.compiled is None or options.events
                 or problem.stability not in (None, "transitions")):
             return None
         return cls(options, _FIRST if problem.stability is not None else _WITHOUT_STABILITY)
 
-    def stride(
+    def batch(
         self, problem: Any, here: Solution, step: float, most: int, start: Solution,
         header: BranchHeader | None = None,
     ) -> Stride | None:

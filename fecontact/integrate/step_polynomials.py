@@ -23,8 +23,8 @@ from fecontact.system.nodes import ground_motion, ground_speed, ground_under, no
 
 # Entries of Control.ground: bounds of the ground.
 LOWEST, HIGHEST, STEEPEST, FASTEST, QUICKEST = range(5)
-# Rows of courses: five coefficients, then a mark of doubt.
-COEFFICIENTS, DOUBT = 5, 5
+# Rows of coefficients: five coefficients, then a mark of doubt.
+COEFFICIENTS, SEARCH = 5, 5
 # Quantities of a node.
 SLIP, GAP = range(2)
 
@@ -33,7 +33,7 @@ _FINEST = 2.0**-6
 MOST = 8
 
 
-class Course(NamedTuple):
+class StepPolynomial(NamedTuple):
     """Polynomial of the slip velocity (SLIP) or the gap (GAP) of a node over a step.
 
     Attributes
@@ -44,8 +44,8 @@ class Course(NamedTuple):
         Number that is added.
     step, system : Step, SystemArrays
         The step, and what moves.
-    bounds, courses : arrays
-        Bounds of the ground; results of :func:`set_courses`.
+    bounds, coefficients : arrays
+        Bounds of the ground; results of :func:`set_polynomials`.
     row : (5,) array
         Work arrays.
     """
@@ -56,7 +56,7 @@ class Course(NamedTuple):
     step: Any
     system: Any
     bounds: Array
-    courses: Array
+    coefficients: Array
     row: Array
 
 
@@ -97,14 +97,14 @@ def _project(blocks, v, columns, out):
 
 
 @routine
-def set_courses(s, blocks, bounds, before, after, room):
-    """Fill ``room.courses`` (6, 2 n, 3 n or 4 n) with the coefficients over a step.
+def set_polynomials(s, blocks, bounds, before, after, room):
+    """Fill ``room.polynomials`` (6, 2 n, 3 n or 4 n) with the coefficients over a step.
 
     Velocities of the nodes along the ground, heights with their gap, and where the ground is not
     flat displacements along it, in space along both tangents. ``room.nodes`` holds what
     :func:`fecontact.integrate.rodas5p.dynamics.project` says of the end.
     """
-    out, inner = room.courses, room.inner
+    out, inner = room.polynomials, room.inner
     n = len(s.gap)
     columns = 2 * n
     if bounds[STEEPEST] != 0.0:
@@ -160,28 +160,28 @@ def keep_ends(n, room):
 
 
 @helper
-def ground_part(part, course):
+def ground_part(part, polynomial):
     """Contribution of the ground at a part of the step: height under the node, or its speed."""
-    s, step, row = course.system, course.step, course.row
+    s, step, row = polynomial.system, polynomial.step, polynomial.row
     now = min(step.t + part * step.h, step.latest)
-    if course.what == SLIP:
-        return ground_speed(0, course.node, ground_motion(now, s), s)
-    if course.bounds[STEEPEST] == 0.0:
-        return course.bounds[HIGHEST]
-    if not s.on_ground[course.node]:
+    if polynomial.what == SLIP:
+        return ground_speed(0, polynomial.node, ground_motion(now, s), s)
+    if polynomial.bounds[STEEPEST] == 0.0:
+        return polynomial.bounds[HIGHEST]
+    if not s.on_ground[polynomial.node]:
         return 0.0
     n, d, _ = s.rows.shape
-    along, across = _displaced(part, 2 * n + course.node, course, row), 0.0
+    along, across = _displaced(part, 2 * n + polynomial.node, polynomial, row), 0.0
     if d > 2:
-        across = _displaced(part, 3 * n + course.node, course, row)
-    return _height_at(course.node, along, across, ground_motion(now, s), s)
+        across = _displaced(part, 3 * n + polynomial.node, polynomial, row)
+    return _height_at(polynomial.node, along, across, ground_motion(now, s), s)
 
 
 @helper
-def _displaced(part, column, course, row):
-    """Value of a column of the courses at a part of the step."""
+def _displaced(part, column, polynomial, row):
+    """Value of a column of the coefficients at a part of the step."""
     for k in range(COEFFICIENTS):
-        row[k] = course.courses[k, column]
+        row[k] = polynomial.coefficients[k, column]
     for k in range(COEFFICIENTS - 1, 0, -1):
         for i in range(k):
             row[i] += part * (row[i + 1] - row[i])
@@ -189,66 +189,67 @@ def _displaced(part, column, course, row):
 
 
 @helper
-def at(part, b, course):
+def at(part, b, polynomial):
     """Value of a polynomial at a part of the step.
 
     b (5,) are the coefficients of the node's own motion.
     """
-    return bernstein.value(b, part, course.row) + course.shift - ground_part(part, course)
+    own = bernstein.value(b, part, polynomial.row)
+    return own + polynomial.shift - ground_part(part, polynomial)
 
 
 @helper
-def _set_own(course, b):
+def _set_own(polynomial, b):
     """Fill b (5,) with the coefficients of the node's own motion."""
-    own = course.node
-    if course.what == GAP:
-        own += course.system.gap.shape[0]
+    own = polynomial.node
+    if polynomial.what == GAP:
+        own += polynomial.system.gap.shape[0]
     for k in range(COEFFICIENTS):
-        b[k] = course.courses[k, own]
+        b[k] = polynomial.coefficients[k, own]
 
 
 @helper
-def _ground_bound(course):
+def _ground_bound(polynomial):
     """Largest rate of change of what the ground adds, over the step."""
-    bounds, h = course.bounds, course.step.h
-    if course.what == SLIP:
-        return abs(course.system.sliding[course.node, 0, 0]) * bounds[QUICKEST] * h
-    if bounds[STEEPEST] == 0.0 or not course.system.on_ground[course.node]:
+    bounds, h = polynomial.bounds, polynomial.step.h
+    if polynomial.what == SLIP:
+        return abs(polynomial.system.sliding[polynomial.node, 0, 0]) * bounds[QUICKEST] * h
+    if bounds[STEEPEST] == 0.0 or not polynomial.system.on_ground[polynomial.node]:
         return 0.0
     # The node's own motion over the ground, and that of the ground.
-    n, d, _ = course.system.rows.shape
+    n, d, _ = polynomial.system.rows.shape
     bound = 0.0
     for first in range(2, d + 1):
-        column, most = first * n + course.node, 0.0
+        column, most, c = first * n + polynomial.node, 0.0, polynomial.coefficients
         for k in range(COEFFICIENTS - 1):
-            most = max(most, 4.0 * abs(course.courses[k + 1, column] - course.courses[k, column]))
+            most = max(most, 4.0 * abs(c[k + 1, column] - c[k, column]))
         bound += most
     return bounds[STEEPEST] * (bound + bounds[FASTEST] * h)
 
 
 @helper
-def changes(b, course, halves, places):
+def changes(b, polynomial, halves, places):
     """Fill ``places`` with the parts of the step at which a step polynomial changes its sign.
 
     Returns how many there are. Sets b (5,) to the coefficients of the node's own motion;
     ``halves`` (bernstein.DEPTH, 6) is room.
     """
-    _set_own(course, b)
-    bound = _ground_bound(course)
+    _set_own(polynomial, b)
+    bound = _ground_bound(polynomial)
     if bound > 0.0:
-        return _changes_on_moving_ground(b, bound, course, halves, places)
-    constant = course.shift - ground_part(0.0, course)
+        return _changes_on_moving_ground(b, bound, polynomial, halves, places)
+    constant = polynomial.shift - ground_part(0.0, polynomial)
     for k in range(COEFFICIENTS):
         b[k] += constant
-    found = bernstein.sign_changes(b, halves, course.row, places)
+    found = bernstein.sign_changes(b, halves, polynomial.row, places)
     for k in range(COEFFICIENTS):
         b[k] -= constant
     return found
 
 
 @helper
-def _changes_on_moving_ground(b, bound, course, room, places):
-    shift = course.shift
+def _changes_on_moving_ground(b, bound, polynomial, room, places):
+    shift = polynomial.shift
     bend = 0.0
     for k in range(COEFFICIENTS - 2):
         bend = max(bend, 12.0 * abs(b[k] - 2.0 * b[k + 1] + b[k + 2]))
@@ -256,7 +257,7 @@ def _changes_on_moving_ground(b, bound, course, room, places):
     found, waiting = 0, 1
     room[0, 0], room[0, 1] = 0.0, 1.0
     room[0, 2], room[0, 3] = b[0] + shift, b[COEFFICIENTS - 1] + shift
-    room[0, 4], room[0, 5] = ground_part(0.0, course), ground_part(1.0, course)
+    room[0, 4], room[0, 5] = ground_part(0.0, polynomial), ground_part(1.0, polynomial)
     sign = room[0, 2] - room[0, 4]
     while waiting > 0:
         top = room[waiting - 1]
@@ -267,8 +268,8 @@ def _changes_on_moving_ground(b, bound, course, room, places):
         decided = min(p, q) - reach > middle or max(p, q) + reach < middle
         if not decided and width > _FINEST:
             half = begin + 0.5 * width
-            u = bernstein.value(b, half, course.row) + shift
-            v = ground_part(half, course)
+            u = bernstein.value(b, half, polynomial.row) + shift
+            v = ground_part(half, polynomial)
             top[0], top[1], top[2], top[3], top[4], top[5] = half, 0.5 * width, u, q, v, g
             below = room[waiting]
             below[0], below[1], below[2], below[3], below[4], below[5] = (begin, 0.5 * width, p, u,

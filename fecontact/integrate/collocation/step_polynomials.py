@@ -52,7 +52,7 @@ def value_at(c, k, x):
 
 
 @routine
-def set_courses(h, progress, c):
+def set_polynomials(h, progress, c):
     """Fill the coefficients of displacements and velocities over a step, and its end."""
     m = c.accelerations.shape[1]
     for k in range(m):
