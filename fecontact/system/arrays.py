@@ -178,7 +178,7 @@ def with_motions(arrays: SystemArrays, factors: Array) -> SystemArrays:
 def _sliding(factors: Array) -> Array:
     """Factors (n, d - 1, 2) of both motions along the tangents, from those (k, n) or (k, n, 2)."""
     factors = np.asarray(factors, dtype=float)
-    by_tangent = factors.reshape(len(factors), factors.shape[1], -1)
+    by_tangent = factors if factors.ndim == 3 else factors[:, :, None]
     found = np.zeros((factors.shape[1], by_tangent.shape[2], 2))
     found[:, :, : len(factors)] = by_tangent.transpose(1, 2, 0)
     return found
