@@ -129,12 +129,43 @@ def sliding(**parts):
                           amplitude_x=0.3, frequency_hz=1.3 / TURN), **parts})
 
 
+def sliding_in_space(along_y=1.0, **parts):
+    """The same mass as a solid, which may also move along a second tangent."""
+    rows = np.zeros((6, 3))
+    rows[0, 0] = rows[2, 1] = rows[1, 2] = 1.0
+    stiffness = np.array([[1.0, 0.2, 0.1 * along_y], [0.2, 3.0, 0.0], [0.1 * along_y, 0.0, 5.0]])
+    return ContactSystem(
+        basis_from_matrices(np.eye(3), stiffness, {"contact": rows[None], "B": rows}, dimension=3),
+        **{"normal": LinearContact(30.0, 0.8), "friction": ConstantFriction(0.4, 0.2), "gap": 0.2,
+           "drive": Drive(stiffness_x=1.0, stiffness_z=1.0, damping_z=0.2, amplitude_z=1.0,
+                          amplitude_x=0.3, stiffness_y=along_y, amplitude_y=0.4 * along_y,
+                          frequency_hz=1.3 / TURN), **parts})
+
+
+def test_a_solid_that_moves_in_a_plane_is_a_plane_body():
+    found, motion = [], 0.3 * np.random.default_rng(4).standard_normal((7, 2))
+    for system in (sliding(), sliding_in_space(along_y=0.0)):
+        field = contact_field(system, ["drive.frequency_hz"])
+        m = system.basis.modes
+        problem = problem_for(field, field.values, 0, HarmonicBalance(3, 40), np.ones(2 * m))
+        assert len(problem.onsets) > 0
+        u = np.zeros((7, m))
+        u[:, :2] = motion
+        u = np.append(u.ravel(), field.values[0])
+        found += [np.array(one[: 7 * m]).reshape(7, m)[:, :2]
+                  for one in (problem.linearise(u).residual, Linearised(problem, u).residual)]
+    for one in found[1:]:
+        assert one == pytest.approx(found[0], rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("system", [sliding, sliding_in_space])
 @pytest.mark.parametrize("parameter", ["drive.frequency_hz", "normal.stiffness"])
 @pytest.mark.parametrize("law", [LinearContact(30.0, 0.8), BilateralPlay(20.0, 0.3)])
-def test_derivatives_are_those_of_the_equations(law, parameter):
+def test_derivatives_are_those_of_the_equations(law, parameter, system):
     """Derivatives by compiled code and one by one, against central differences of the residual."""
-    field = contact_field(sliding(normal=law), [parameter])
-    problem = problem_for(field, field.values, 0, HarmonicBalance(3, 40), np.ones(6))
+    field = contact_field(system(normal=law), [parameter])
+    size = 2 * field.system().basis.modes
+    problem = problem_for(field, field.values, 0, HarmonicBalance(3, 40), np.ones(size))
     assert len(problem.onsets) > 0
     u = np.append(0.3 * np.random.default_rng(4).standard_normal(problem.size), field.values[0])
     whole = problem.linearise(u)
