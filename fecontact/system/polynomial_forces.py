@@ -17,7 +17,7 @@ fourth degree, so that with g = Q p and l = L x
 where f collects ``(g_r + l_r) dp_r / dc``, and G (D, m) ``(3 g_r + l_r) / 2`` times the rows of R,
 and ``dp_r / dc`` times those of L. G stands for the second derivatives wherever a method keeps
 them. The arrays are ``polynomial_rows`` R, ``polynomial_pairs`` (i, j), ``polynomial_cubic`` L and
-``polynomial_quartic`` Q of :class:`fecontact.system.nodes.SystemArrays`; without such forces they
+``polynomial_quartic`` Q of :class:`fecontact.system.SystemArrays`; without such forces they
 are empty.
 """
 
