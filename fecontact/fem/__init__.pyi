@@ -2,6 +2,7 @@ from .attachments import PointMass, PointSpring
 from .constraints import Coupling, LinearEquation, Term, Tie
 from .cyclic_symmetry import CyclicSymmetry, SectorNodes
 from .elements.cell_kinds import CellKind
+from .elimination import Elimination
 from .fields import BodyFields, stress_of
 from .material import AnisotropicMaterial
 from .material_axes import CylindricalAxes, MaterialAxes
@@ -21,6 +22,7 @@ __all__ = [
     "CyclicSymmetry",
     "Cylinder",
     "CylindricalAxes",
+    "Elimination",
     "HingeSupport",
     "LapStrip",
     "LinearEquation",

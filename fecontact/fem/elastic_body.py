@@ -437,7 +437,7 @@ class ElasticBody(Summarised):
         """All degrees of freedom from the free ones, sparse (d N, f).
 
         Supports and constraints are eliminated; see
-        :attr:`fecontact.fem.elimination.Elimination.expansion`.
+        :attr:`fecontact.fem.Elimination.expansion`.
         """
         return self.elimination.expansion
 
