@@ -211,6 +211,14 @@ def test_included_files_that_are_missing_cut_off_or_circular(tmp_path, others, m
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("keyword", ["EMBEDDED ELEMENT", "SHELL TO SOLID COUPLING", "FASTENER"])
+def test_joints_that_are_not_read_stop_the_reading(tmp_path, keyword):
+    path = deck(tmp_path, f"{SQUARE}*{keyword}\nA, B\n")
+    with pytest.raises(MeshError, match=rf"a\.inp: The file holds 1 \*{keyword}, which join or "
+                                        r"stiffen bodies and are not read; delete them"):
+        read_mesh(path)
+
+
 def test_elements_lost_at_the_end_of_an_included_file_are_warned_of(tmp_path):
     (tmp_path / "b.inp").write_text("*NODE\n5,0,9\n" + SQUARE)
     path = deck(tmp_path, "*INCLUDE, INPUT=b.inp\n*NSET, NSET=foot\n1,2\n")

@@ -55,7 +55,7 @@ _FACES: dict[int, tuple[tuple[int, ...], ...]] = {
     6: ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
     8: ((0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0))}
 
-# Keywords that stiffen or load the mesh by other means than its plane and solid elements.
+# Keywords that join or stiffen bodies, and stop the reading.
 _UNREAD = ("DISTRIBUTING COUPLING", "SHELL TO SOLID COUPLING", "EMBEDDED ELEMENT",
            "FASTENER", "CONNECTOR SECTION", "JOINT", "USER ELEMENT", "SUBSTRUCTURE PROPERTY",
            "MATRIX ASSEMBLE")
@@ -125,6 +125,11 @@ def read_inp(path: Path) -> RawMesh:
     if not bodies:
         raise MeshError("The file holds no *NODE or no *ELEMENT data.")
     deck.require_end()
+    joining = [f"{deck.keywords[name]} *{name}" for name in _UNREAD if deck.keywords[name]]
+    if joining:
+        raise MeshError(f"The file holds {', '.join(joining)}, which join or stiffen bodies and "
+                        f"are not read; delete them in a copy of the file, and give ties, couplings or "
+                        f"links in their place.")
     for body in bodies:
         for found, what, last in (
                 (body.numbered.moved_nodes, "node", "at another place"),
@@ -143,7 +148,6 @@ def read_inp(path: Path) -> RawMesh:
         warnings.warn(f"{path}: the file{name} ends with *ELEMENT data, and {unused} of "
                       f"{count} nodes belong to no element; if the file is cut off, "
                       f"elements are missing.", ModelWarning, stacklevel=4)
-    unread = [f"{deck.keywords[name]} *{name}" for name in _UNREAD if deck.keywords[name]] + unread
     if unread:
         warnings.warn(f"{path}: the file holds {', '.join(unread)}, which are not read; the mesh "
                       f"has none of their stiffness or mass, so give supports, links and welds "
