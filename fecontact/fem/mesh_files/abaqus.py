@@ -128,8 +128,8 @@ def read_inp(path: Path) -> RawMesh:
     joining = [f"{deck.keywords[name]} *{name}" for name in _UNREAD if deck.keywords[name]]
     if joining:
         raise MeshError(f"The file holds {', '.join(joining)}, which join or stiffen bodies and "
-                        f"are not read; delete them in a copy of the file, and give ties, couplings "
-                        f"or links in their place.")
+                        f"are not read; delete them in a copy of the file, and give ties, "
+                        f"couplings or links in their place.")
     for body in bodies:
         for found, what, last in (
                 (body.numbered.moved_nodes, "node", "at another place"),
