@@ -11,12 +11,13 @@ the limit become those of the limit.
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law, helper, routine
-from fecontact.core.records import Vector
+from fecontact.core.records import Matrix, Vector
 from fecontact.integrate.brackets import Bracket, between, narrowed
 from fecontact.integrate.rodas5p import dynamics, state, tableau
 from fecontact.integrate.rodas5p.step_length import LAST_STEP
@@ -68,25 +69,38 @@ _PAST = 4.0
 _LEAST = 1e-4
 
 
+class View(NamedTuple):
+    """A step that is examined, and work arrays: a state y within it, and what friction fills."""
+
+    step: state.Step
+    problem: state.Problem
+    progress: state.Progress
+    room: state.Room
+    y: Vector
+    force: Vector
+    rates: Matrix
+
+
 @routine
-def _look(part, step, problem, progress, room, y):
-    """Put the state at a part of the step into y; returns the motion of the ground."""
+def _look(part, view):
+    """Put the state at a part of the step into ``view.y``; returns the motion of the ground."""
+    step, before, room, y = view.step, view.progress.state, view.room, view.y
     if part == 0.0:
-        y[:] = progress.state
+        y[:] = before
     elif part == 1.0:
         y[:] = room.after
     else:
-        tableau.interpolated(part, progress.state, room.after, room.dense, y)
-    return ground_motion(min(step.t + part * step.h, step.latest), problem.system)
+        tableau.interpolated(part, before, room.after, room.dense, y)
+    return ground_motion(min(step.t + part * step.h, step.latest), view.problem.system)
 
 
 @routine
-def _excess(part, j, i, step, problem, progress, room, y, force, rates):
+def _excess(part, j, i, view):
     """Excess of element i of node j at a part of the step."""
-    s = problem.system
-    moved = _look(part, step, problem, progress, room, y)
-    _, pressing, _ = pressing_at(j, y, moved, s, force, rates)
-    count = problem.control.slider_counts[j]
+    s, y = view.problem.system, view.y
+    moved = _look(part, view)
+    _, pressing, _ = pressing_at(j, y, moved, s, view.force, view.rates)
+    count = view.problem.control.slider_counts[j]
     return deflection_of(memory_of(j, y, s), i, s) - limit_of(j, i, count, pressing, s)
 
 
@@ -97,12 +111,12 @@ def _begins(before, now):
 
 
 @routine
-def _touch(low, high, now, j, step, problem, progress, room, y, force, rates):
+def _touch(low, high, now, j, view):
     """Part of the step at which the normal force of node j begins, which is ``now`` at ``high``."""
     while high - low > _PRECISION:
         part = 0.5 * (low + high)
-        moved = _look(part, step, problem, progress, room, y)
-        found, _, _ = pressing_at(j, y, moved, problem.system, force, rates)
+        moved = _look(part, view)
+        found, _, _ = pressing_at(j, view.y, moved, view.problem.system, view.force, view.rates)
         if _begins(found, now):
             low = part
         else:
@@ -237,21 +251,19 @@ def _after_touch(step, t, problem, progress, room, vary):
 
 
 @routine
-def _slope(part, j, i, step, problem, progress, room, y, force, rates):
+def _slope(part, j, i, view):
     """Rise of the excess over a small part of the step about another part."""
     low, high = max(part - _ASIDE, 0.0), min(part + _ASIDE, 1.0)
-    return (_excess(high, j, i, step, problem, progress, room, y, force, rates)
-            - _excess(low, j, i, step, problem, progress, room, y, force, rates)) / (high - low)
+    return (_excess(high, j, i, view) - _excess(low, j, i, view)) / (high - low)
 
 
 @routine
-def _root(slopes, low, high, at_low, at_high, j, i, step, problem, progress, room, y, force, rates):
+def _root(slopes, low, high, at_low, at_high, j, i, view):
     """Part of the step at which the excess, or with ``slopes`` its slope, vanishes."""
     bracket, part = Bracket(low, high, at_low, at_high, 0), high
     for _ in range(_TRIALS):
         part = between(bracket)
-        found = (_slope(part, j, i, step, problem, progress, room, y, force, rates) if slopes else
-                 _excess(part, j, i, step, problem, progress, room, y, force, rates))
+        found = _slope(part, j, i, view) if slopes else _excess(part, j, i, view)
         bracket = narrowed(bracket, part, found)
         if found == 0.0 or bracket.high - bracket.low < _PRECISION:
             break
@@ -259,16 +271,15 @@ def _root(slopes, low, high, at_low, at_high, j, i, step, problem, progress, roo
 
 
 @routine
-def _largest(low, high, j, i, step, problem, progress, room, y, force, rates):
+def _largest(low, high, j, i, view):
     """Part of the step, between two, at which an excess is largest."""
-    at_low = _slope(low, j, i, step, problem, progress, room, y, force, rates)
+    at_low = _slope(low, j, i, view)
     if not at_low > 0.0:
         return low
-    at_high = _slope(high, j, i, step, problem, progress, room, y, force, rates)
+    at_high = _slope(high, j, i, view)
     if not at_high < 0.0:
         return high
-    return _root(True, low, high, at_low, at_high, j, i, step, problem, progress, room, y, force,
-                 rates)
+    return _root(True, low, high, at_low, at_high, j, i, view)
 
 
 @routine
@@ -320,6 +331,7 @@ def _switch(step, problem, progress, room, vary):
     states = s.memory.max()
     force, rates = force_room(s)
     y = np.empty(len(progress.state))
+    view = View(step, problem, progress, room, y, force, rates)
     found, places = np.empty((3, n, states)), np.full((n, states), 2.0)
     pushing, starts = np.zeros((3, n)), np.full((n, states), -1.0)
     at_once = np.zeros((n, states), dtype=np.bool_)
@@ -336,7 +348,7 @@ def _switch(step, problem, progress, room, vary):
         part = 1.0 if look == _LOOKS + 1 else (
             1.0 - near if look == _LOOKS else look / _LOOKS)
         before = max(0.0, (look - 2) / _LOOKS)
-        moved = _look(part, step, problem, progress, room, y)
+        moved = _look(part, view)
         now, last, older = found[look % 3], found[(look + 2) % 3], found[(look + 1) % 3]
         for j in range(n):
             count = control.slider_counts[j]
@@ -349,7 +361,7 @@ def _switch(step, problem, progress, room, vary):
                 now[j, i] = deflection_of(z, i, s) - limit_of(j, i, count, pressing, s)
             if look > 0 and _begins(pushing[(look + 2) % 3, j], F):
                 begun = 1.0 - near if look == _LOOKS + 1 else (look - 1) / _LOOKS
-                place = _touch(begun, part, F, j, step, problem, progress, room, y, force, rates)
+                place = _touch(begun, part, F, j, view)
                 if place > nearest:
                     first, least, past = min(first, place), nearest, nearest
                 else:
@@ -357,7 +369,7 @@ def _switch(step, problem, progress, room, vary):
                         j, 0.0, pushing[(look + 2) % 3, j] != 0.0, dynamics.ground_acceleration(
                             t, dynamics.soon(step), step.moved, s),
                         after_t, problem, progress, vary, force, rates)
-                _look(part, step, problem, progress, room, y)
+                _look(part, view)
         if look == 0:
             starts[:, :] = now
             continue
@@ -372,16 +384,13 @@ def _switch(step, problem, progress, room, vary):
                 rise = middle - low if look > 1 else 0.0
                 falls = middle - high > scale and rise > -scale
                 if falls and middle + max(rise, middle - high) > 0.0:
-                    place = _largest(before, part, j, i, step, problem, progress, room, y, force,
-                                     rates)
-                    if (place > near or starts[j, i] > 0.0) and _excess(
-                            place, j, i, step, problem, progress, room, y, force, rates) > 0.0:
+                    place = _largest(before, part, j, i, view)
+                    if (place > near or starts[j, i] > 0.0) and _excess(place, j, i, view) > 0.0:
                         places[j, i] = min(places[j, i], place)
                         first = min(first, place)
                 if begins and middle <= 0.0 < high:
                     begun = 1.0 - near if look == _LOOKS + 1 else (look - 1) / _LOOKS
-                    place = _root(False, begun, part, min(middle, -1e-300), high, j, i, step,
-                                  problem, progress, room, y, force, rates)
+                    place = _root(False, begun, part, min(middle, -1e-300), high, j, i, view)
                     size = deflection_of(memory_of(j, progress.state, s), i, s)
                     if look == 1 and middle >= -0.5 * SHORT * size:
                         # The last step ended just short of where slip begins. Without deflection
@@ -419,7 +428,7 @@ def _at_end(step, problem, progress, room, vary):
     s, control = problem.system, problem.control
     force, rates = force_room(s)
     y = np.empty(len(progress.state))
-    earlier = _look(1.0 - _NEAR_VARIED, step, problem, progress, room, y)
+    earlier = _look(1.0 - _NEAR_VARIED, View(step, problem, progress, room, y, force, rates))
     now = ground_motion(step.latest, s)
     for j in range(len(control.slider_counts)):
         if control.slider_counts[j] == 0:
