@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.fem.equations import (
     HINGE,
@@ -28,6 +29,7 @@ _IMPLIED = 1e-7
 _UNSEEN = 1e-12
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Elimination:
     """All unknowns from those that are left where equations are substituted into each other.

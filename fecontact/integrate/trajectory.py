@@ -329,12 +329,14 @@ class Trajectory(ContactWorks, Summarised):
         for row, c, motion in zip(basis.T[0, : basis.dimension], drive.stiffness, drive.motions,
                                   strict=False):
             spring += 0.5 * c * (q @ row - motion.history(t)[:, 0]) ** 2
+        elastic = 0.5 * ((q @ basis.stiffness_matrix) * q).sum(axis=1)
+        if basis.large_deflections:
+            elastic += polynomial_energy(q, system.arrays)
         bristles = self._bristles[0].sum(axis=1)
         put = dict(zip(POWERS, self.work.T, strict=True))
         return Energies(
             kinetic=0.5 * (rate**2).sum(axis=1),
-            elastic=(0.5 * ((q @ basis.stiffness_matrix) * q).sum(axis=1)
-                     + polynomial_energy(q, system.arrays)),
+            elastic=elastic,
             drive_spring=spring,
             contact=system.stored_energy(self.penetration),
             bristles=bristles,

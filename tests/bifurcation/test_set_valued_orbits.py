@@ -95,7 +95,7 @@ def above_stops(load):
     return problem, np.array([0.0, 0.0, 0.0, 0.0, load])
 
 
-def test_multipliers_beside_complete_chatter_say_that_they_cannot_be_told():
+def test_multipliers_beside_complete_chatter_say_that_they_are_uncertain():
     """A motion that rests on its stops forgets all; where lift-off begins, runs end apart.
 
     The drive lifts with 0.5 * 2.738 = 1.369: it moves nothing under a larger load.
@@ -106,5 +106,5 @@ def test_multipliers_beside_complete_chatter_say_that_they_cannot_be_told():
         assert np.abs(point["multipliers"]).max() < 1e-6
     problem, u = above_stops(1.36899)
     assert np.abs(problem.linearise(u).residual).max() < 1e-9
-    with pytest.warns(ModelWarning, match=r"load.normal = 1\.36899 the .* cannot be told"):
+    with pytest.warns(ModelWarning, match=r"load.normal = 1\.36899 the .* are uncertain"):
         problem.point(u, problem.linearise(u), u)

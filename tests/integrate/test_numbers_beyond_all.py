@@ -60,6 +60,6 @@ def test_a_function_that_is_no_field_is_not_called_a_law():
         vector_field(lambda t, x: x, {"a": 1.0}, 1)
 
 
-def test_multipliers_of_derivatives_that_are_not_finite_cannot_be_told():
-    with pytest.warns(fc.ModelWarning, match="cannot be told"):
+def test_multipliers_of_derivatives_that_are_not_finite_are_uncertain():
+    with pytest.warns(fc.ModelWarning, match="are uncertain"):
         require_same(np.array([0.5, 0.1]), [np.full((2, 1, 2, 2), np.inf)], "speed = 1")

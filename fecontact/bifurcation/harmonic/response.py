@@ -388,7 +388,10 @@ def _started(
                 return begin, *attempt()
             except FecontactError as error:
                 failure = error
-    if isinstance(field, ContactField) and (free_motion := unresisted_motion(field.system(values))):
+    # The supports of a wheel's sector are those of the wheel.
+    resisted = isinstance(failure, InputError) or isinstance(field, WaveField)
+    if isinstance(field, ContactField) and not resisted and (
+            free_motion := unresisted_motion(field.system(values))):
         raise AnalysisError(f"No orbit was found to start from. {free_motion}") from failure
     raise failure
 
