@@ -33,7 +33,7 @@ def numpy_rhs(system: ContactSystem, t: float, y: np.ndarray) -> np.ndarray:
     x, height, x_rate, height_rate = along @ q, away @ q, along @ v, away @ v
     ground, speed = system.ground, system.ground.speed
     k = 2.0 * np.pi / ground.wavelength
-    xi = s.abscissa + x - speed * t
+    xi = s.places[:, 0] + x - speed * t
     slip = x_rate - speed
     u = ground.amplitude * np.sin(k * xi) - height - s.gap
     tilt = ground.amplitude * k * np.cos(k * xi)

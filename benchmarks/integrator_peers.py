@@ -14,9 +14,9 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from fecontact.core.records import allocate
 from fecontact.core.references import borrowed
 from fecontact.integrate.rodas5p import dynamics
-from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.blocks import Blocks, blocks_of
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import nodes
@@ -47,7 +47,9 @@ def _frozen(problem: Problem) -> tuple[Any, Any, Any]:
     n, _, m = arrays.rows.shape
     room = {"given": np.zeros(dynamics.GIVEN), "pull": np.zeros(m),
             "nodes": np.zeros((3, 2 * n))}
-    scratch = run_arrays.gradients_for(n, problem.system.memory, 2)
+    scratch = allocate(dynamics.Gradients, {
+        nodes.NODES: n, nodes.MODES: m, nodes.AXES: 2, nodes.MEMORY: int(arrays.memory.max()),
+        nodes.COMBINATIONS: 0})
     held = {**room, **{f"g{k}": item for k, item in enumerate(scratch)},
             **{f"b{k}": item for k, item in enumerate(blocks_of(problem.system.basis, arrays))},
             **{f"s{k}": item for k, item in enumerate(arrays) if isinstance(item, np.ndarray)}}
@@ -56,12 +58,13 @@ def _frozen(problem: Problem) -> tuple[Any, Any, Any]:
     system = ", ".join(f"s{k}" if isinstance(item, np.ndarray) else str(int(item))
                        for k, item in enumerate(arrays))
     blocks = ", ".join(f"b{k}" for k in range(len(Blocks._fields)))
+    gradients = ", ".join(f"g{k}" for k in range(len(scratch)))
     source = "\n".join([
         "def rate(t, y, out):", *lines,
         f"    s = System({system})",
         "    set_given(t, s, given, pull)",
         f"    set_rate(borrowed(y), s, Blocks({blocks}), given, pull, nodes, "
-        "Gradients(g0, g1, g2), borrowed(out))",
+        f"Gradients({gradients}), borrowed(out))",
         "def jacobian(t, y, out):", *lines,
         f"    fill(t, y, System({system}), out)",
     ])
