@@ -102,7 +102,7 @@ def with_modes(count: int, contacts: int, columns: int) -> fc.ContactSystem:
     """The strip with so many modes, all of them with large deflections, pushed in its middle."""
     face = {"contact": "bottom", "contact_nodes": contacts} if contacts else {"contact": ()}
     laws = {"normal": LinearContact(1e6, 10.0), "friction": ConstantFriction(0.3),
-            "gap": 0.1 * HEIGHT} if contacts else {}
+            "gap": 0.05 * HEIGHT} if contacts else {}
     basis = fc.modal_basis(
         strip(columns), count, B="", C="", damping=0.01,
         large_deflections=LargeDeflections(0.6 * HEIGHT, count, stretching_damping=0.1),
