@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent / "fecontact"
-ROOMS = ("core", "fem", "laws", "reduction", "system", "integrate", "analysis", "bifurcation",
-         "measured", "output", "study", "sweeps", "fitting", "cli")
+ROOMS = ("core", "fem", "half_space", "laws", "reduction", "system", "integrate", "analysis",
+         "bifurcation", "measured", "output", "study", "sweeps", "fitting", "cli")
 # Subpackages that do not import each other, although the one stands above the other.
 STRANGERS = {("laws", "fem"), ("study", "output")}
 # Modules that hold nothing but public names under which people look for them.

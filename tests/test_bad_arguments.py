@@ -1003,8 +1003,8 @@ Mesh([[0,0],[1,0],[0,1],[0.5,0.4]],[[0,1,2],[0,1,3]])
 basins(osc,(Axis("B","y"),np.linspace(0,1,10**5)),(Axis("B","y","velocity"),np.linspace(0,1,10**6)),transient_periods=3)
 """
 
-NAMESPACES = ("fem", "laws", "reduction", "integrate", "analysis", "bifurcation", "measured",
-              "study", "sweeps", "fitting", "system", "plot", "io")
+NAMESPACES = ("fem", "half_space", "laws", "reduction", "integrate", "analysis", "bifurcation",
+              "measured", "study", "sweeps", "fitting", "system", "plot", "io")
 
 
 @pytest.fixture(scope="module")

@@ -414,6 +414,17 @@ def check_large_deflections(names, printed, folder):
     assert names["at"] / names["basis"].frequencies_hz[0] == pytest.approx([1.016, 1.237], abs=0.01)
 
 
+def check_half_spaces(names, printed, folder):
+    # Hertz: a = 1 mm, and the loss of Mindlin and Deresiewicz without friction across the load.
+    assert names["contact"].approach == pytest.approx(1e-6 / 0.05, rel=1e-3)
+    shear = 2.1e11 / 2.6
+    full, part = 0.3 * 6153.8, 1500.0 / (0.3 * 6153.8)
+    loop = 9.0 * 1.7 * full**2 / (10.0 * 1e-3 * shear) * (
+        1.0 - (1.0 - part) ** (5.0 / 3.0)
+        - 5.0 * part / 6.0 * (1.0 + (1.0 - part) ** (2.0 / 3.0)))
+    assert float(printed.split()[-6]) == pytest.approx(loop, rel=0.01)
+
+
 CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,
           "laws.md": check_laws, "frequency-responses.md": check_frequency_responses,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
@@ -426,7 +437,7 @@ CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": che
           "solids.md": check_solids,
           "report.md": check_report, "contact-faces-in-space.md": check_faces_in_space,
           "results.md": check_results, "measurements.md": check_measurements,
-          "fitting.md": check_fitting}
+          "fitting.md": check_fitting, "half-spaces.md": check_half_spaces}
 
 
 def test_every_page_with_code_is_known():

@@ -14,9 +14,8 @@ import pytest
 
 import fecontact
 
-NAMESPACES = ("fem", "laws", "reduction", "integrate", "analysis", "bifurcation", "measured",
-              "study",
-              "sweeps", "fitting", "system", "plot", "io")
+NAMESPACES = ("fem", "half_space", "laws", "reduction", "integrate", "analysis", "bifurcation",
+              "measured", "study", "sweeps", "fitting", "system", "plot", "io")
 PUBLIC = [("fecontact", name) for name in fecontact.__all__ if name not in NAMESPACES] + [
     (f"fecontact.{space}", name) for space in NAMESPACES
     for name in importlib.import_module(f"fecontact.{space}").__all__]

@@ -35,8 +35,8 @@ from fecontact.integrate import ContactEvents
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
 
-SPACES = ("fem", "reduction", "integrate", "analysis", "bifurcation", "measured", "sweeps",
-          "fitting", "system", "io")
+SPACES = ("fem", "half_space", "reduction", "integrate", "analysis", "bifurcation", "measured",
+          "sweeps", "fitting", "system", "io")
 # Classes that users make and hand over, and classes that make read-only copies themselves.
 GIVEN = {"Task", "Axis", "PointPairing", "ReportFrame"}
 
