@@ -5,7 +5,7 @@ from .elements.cell_kinds import CellKind
 from .elimination import Elimination
 from .fields import BodyFields, stress_of
 from .material import AnisotropicMaterial
-from .material_axes import CylindricalAxes, MaterialAxes
+from .material_axes import CurveAxes, CylindricalAxes, MaterialAxes
 from .mesh_files import mesh_from
 from .pairing import Pairing, TwoPassPairing, finer_face, pair_both_faces, pair_faces
 from .pairing_report import PairingReport
@@ -19,6 +19,7 @@ __all__ = [
     "BodyFields",
     "CellKind",
     "Coupling",
+    "CurveAxes",
     "CyclicSymmetry",
     "Cylinder",
     "CylindricalAxes",

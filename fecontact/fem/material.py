@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from fecontact.core.errors import (
 )
 from fecontact.core.types import Array
 from fecontact.core.units import quantity
-from fecontact.fem.material_axes import CylindricalAxes, MaterialAxes, rotated_stiffness
+from fecontact.fem.material_axes import AnyAxes, MaterialAxes, rotated_stiffness
 
 _COMPONENTS = ("11", "22", "33", "12", "23", "13")
 _ASYMMETRIC = 1e-6  # largest difference between two entries that must be equal, relative to C
@@ -122,7 +122,7 @@ class AnisotropicMaterial:
         Symmetric, positive definite [Pa].
     density : float
         rho, positive [kg/m^3].
-    axes : MaterialAxes or CylindricalAxes
+    axes : MaterialAxes, CylindricalAxes or CurveAxes
         Axes of the material; by default those of the body: x, y, z.
     loss_factor : float
         Share of the elastic energy that a cycle dissipates, over 2 pi; zero or above.
@@ -135,13 +135,13 @@ class AnisotropicMaterial:
 
     stiffness: tuple[tuple[float, ...], ...]
     density: float
-    axes: MaterialAxes | CylindricalAxes = field(default_factory=MaterialAxes)
+    axes: AnyAxes = field(default_factory=MaterialAxes)
     loss_factor: float = 0.0
 
     def __post_init__(self) -> None:
         require_positive("AnisotropicMaterial", density=self.density)
         require_not_negative("AnisotropicMaterial", loss_factor=self.loss_factor)
-        require_kind("AnisotropicMaterial", (MaterialAxes, CylindricalAxes), axes=self.axes)
+        require_kind("AnisotropicMaterial", get_args(AnyAxes), axes=self.axes)
         C = as_floats(self.stiffness, "AnisotropicMaterial: stiffness")
         if C.shape != (6, 6) or not np.isfinite(C).all():
             raise InputError(f"AnisotropicMaterial: stiffness must be 6 rows of 6 finite numbers, "
@@ -166,7 +166,7 @@ class AnisotropicMaterial:
         poisson_ratios: tuple[float, float, float],
         shear_moduli: tuple[float, float, float],
         density: float,
-        axes: MaterialAxes | CylindricalAxes | None = None,
+        axes: AnyAxes | None = None,
         loss_factor: float = 0.0,
     ) -> "AnisotropicMaterial":
         """Material of engineering constants, with three planes of symmetry.
@@ -230,7 +230,7 @@ class AnisotropicMaterial:
         poisson_ratios: tuple[float, float],
         shear_modulus: float,
         density: float,
-        axes: MaterialAxes | CylindricalAxes | None = None,
+        axes: AnyAxes | None = None,
         loss_factor: float = 0.0,
     ) -> "AnisotropicMaterial":
         """Material with equal properties in all directions across axis 1, such as fibres along it.

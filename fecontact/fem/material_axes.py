@@ -1,6 +1,8 @@
-"""Axes of materials: constant, or cylindrical about a line; rotation of stiffness and stress."""
+"""Axes of materials: constant, about a line, along a curve; rotation of stiffness and stress."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,6 +15,9 @@ from fecontact.core.units import Unit
 # Components in the order xx, yy, zz, xy, yz, xz.
 _FIRST, _SECOND = np.array([0, 1, 2, 0, 1, 0]), np.array([0, 1, 2, 1, 2, 2])
 _PARALLEL = 1e-9  # sine of the angle between directions that span no plane
+_SAMPLES = 32  # of a curve between two of its points, where the search of the closest place starts
+_STEPS = 20
+_FLAT = 1e-2  # distance to a centre of curvature, relative to the radius, that counts as none
 
 
 @dataclass(frozen=True)
@@ -138,6 +143,132 @@ class CylindricalAxes:
     def scaled(self, scale: float) -> "CylindricalAxes":
         """Axes with lengths in another unit."""
         return replace(self, point=_three(scale * np.array(self.point)))
+
+
+@dataclass(frozen=True)
+class CurveAxes:
+    """Axes of a material along a curve, such as fibres that follow the edge of a part.
+
+    Axis 1 is the tangent t of the curve at its place closest to the centre of each cell, axis 2 is
+    ``third x t`` over its length, axis 3 completes them by the right-hand rule. The curve is the
+    cubic spline through the points over the length of its chords, a line through two points, and
+    closed if the last point is the first one. The axes are then turned about one of themselves.
+
+    Parameters
+    ----------
+    points : two or more (x, y, z)
+        Points of the curve in their order [m]; axis 1 leads from the first one to the last.
+    third : (x, y, z)
+        A direction in the plane of axes 1 and 3, on the side of axis 3.
+    about : 1, 2 or 3
+        Axis about which the axes are turned.
+    angle : float
+        Angle of this turn by the right-hand rule [degrees].
+
+    Raises
+    ------
+    InputError
+        For fewer than two points, successive ones at one place, or values that are not finite.
+    """
+
+    points: Annotated[tuple[Coordinates, ...], Unit("m")] = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    third: Coordinates = (0.0, 0.0, 1.0)
+    about: Literal[1, 2, 3] = 1
+    angle: Annotated[float, Unit("degrees")] = 0.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.points, Sequence | np.ndarray) or len(self.points) < 2:
+            raise InputError(f"CurveAxes: points = {shown(self.points)} must be two or more places "
+                             f"along the curve.")
+        places = [[*as_place(one, "CurveAxes: points"), 0.0][:3] for one in self.points]
+        chords = np.linalg.norm(np.diff(places, axis=0), axis=1)
+        if not (chords > 0.0).all():
+            raise InputError(f"CurveAxes: points {int(np.argmin(chords)) + 1} and "
+                             f"{int(np.argmin(chords)) + 2} lie at one place, "
+                             f"{shown(places[int(np.argmin(chords))])}; leave one of them out.")
+        object.__setattr__(self, "points", tuple(_three(np.array(one)) for one in places))
+        _set_direction(self, "third")
+        _require_turn(self)
+
+    @cached_property
+    def _curve(self) -> Any:
+        """Spline of the place over the sum of the chords."""
+        from scipy.interpolate import CubicSpline
+
+        places = np.array(self.points)
+        along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
+        closed = len(places) > 3 and self.points[0] == self.points[-1]
+        return CubicSpline(along, places, bc_type="periodic" if closed else "not-a-knot")
+
+    def at(self, places: Array) -> Array:
+        """Axes (n, 3, 3) as rows at places (n, 3).
+
+        Raises
+        ------
+        InputError
+            For a place at a centre of curvature, from which all places of an arc are equally far,
+            and where the curve is parallel to ``third``.
+        """
+        tangent = self._curve(self._closest(places), 1)
+        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+        second = np.cross(np.array(self.third), tangent)
+        size = np.linalg.norm(second, axis=1, keepdims=True)
+        self._require(size[:, 0] > _PARALLEL, places, f"the curve is parallel to third = "
+                      f"{shown(self.third)}; give another direction")
+        second /= size
+        return _turned(np.stack([tangent, second, np.cross(tangent, second)], axis=1),
+                       self.about, self.angle)
+
+    def _closest(self, places: Array) -> Array:
+        """Parameters (n,) of the places of the curve that are closest to given ones (n, 3)."""
+        from scipy.spatial import KDTree
+
+        curve, knots = self._curve, self._curve.x
+        samples = np.append(np.linspace(knots[:-1], knots[1:], _SAMPLES, endpoint=False).T.ravel(),
+                            knots[-1])
+        at = np.asarray(KDTree(curve(samples)).query(places)[1])
+        found = samples[at]
+        if curve.extrapolate == "periodic":
+            step = np.diff(samples).max()
+            low, high = found - step, found + step
+        else:
+            low, high = samples[np.maximum(at - 1, 0)], samples[np.minimum(at + 1,
+                                                                           len(samples) - 1)]
+        for _ in range(_STEPS):
+            slope, off = curve(found, 1), curve(found) - places
+            size = (slope**2).sum(axis=1)
+            # Half the second derivative of the squared distance, positive at a minimum.
+            bend = size + (off * curve(found, 2)).sum(axis=1)
+            step = (off * slope).sum(axis=1) / np.maximum(bend, _FLAT * size)
+            before, found = found, np.clip(found - step, low, high)
+            if np.abs(found - before).max(initial=0.0) <= 1e-14 * knots[-1]:
+                break
+        at_end = (curve.extrapolate != "periodic") & np.isin(found, knots[[0, -1]])
+        self._require(at_end | (bend > _FLAT * size), places, "a whole arc of the curve is equally "
+                      "close; mesh the body so that no centre of a cell lies at a centre of "
+                      "curvature")
+        return np.asarray(found)
+
+    def _require(self, good: Any, places: Array, what: str) -> None:
+        if not good.all():
+            where = ", ".join(f"{x:g}" for x in places[np.flatnonzero(~good)[0]])
+            raise InputError(f"CurveAxes: for the centre of a cell, ({where}), {what}.")
+
+    def moved(self, turn: Array, shift: Array) -> tuple["CurveAxes", Array]:
+        """Axes of the turned or mirrored body, and the signs (3,) of its axes against these."""
+        sign = float(np.sign(np.linalg.det(turn)))
+        # ``third`` keeps its side; axis 2 is then the image of axis 2 for the opposite sign.
+        angle = self.angle if sign > 0.0 or self.about == 2 else -self.angle
+        return replace(self, points=tuple(_three(turn @ one + shift) for one in np.array(
+            self.points)), third=_three(turn @ self.third), angle=angle), np.array(
+                [1.0, sign, 1.0])
+
+    def scaled(self, scale: float) -> "CurveAxes":
+        """Axes with lengths in another unit."""
+        return replace(self, points=tuple(_three(scale * np.array(one)) for one in self.points))
+
+
+AnyAxes = MaterialAxes | CylindricalAxes | CurveAxes
 
 
 def rotated_stiffness(stiffness: Array, axes: Array) -> Array:

@@ -7,7 +7,7 @@ from fecontact.core.errors import InputError, choices
 from fecontact.core.tables import convert_fields, located, shown
 from fecontact.core.units import Unit
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
-from fecontact.fem.material_axes import CylindricalAxes, MaterialAxes
+from fecontact.fem.material_axes import AnyAxes, MaterialAxes
 
 _CONSTANTS = ("youngs_modulus", "poisson_ratio", "shear_modulus")
 
@@ -35,10 +35,11 @@ class MaterialSettings:
         In place of these constants 6 rows of 6 numbers, in the order 11, 22, 33, 12, 23, 13 [Pa].
     density : float, optional
         [kg/m^3]; required without ``material``.
-    axes : MaterialAxes or CylindricalAxes, optional
-        ``{first, second}``: directions of axis 1 and in the plane of axes 1 and 2; or ``{point,
-        direction}`` of a line around which axis 1 is radial and axis 2 circumferential. Both in
-        the coordinates of the placed body; x, y, z by default.
+    axes : MaterialAxes, CylindricalAxes or CurveAxes, optional
+        ``{first, second}``: directions of axis 1 and in the plane of axes 1 and 2; ``{point,
+        direction}`` of a line around which axis 1 is radial and axis 2 circumferential; or
+        ``{points, third}`` of a curve along which axis 1 leads. All in the coordinates of the
+        placed body; x, y, z by default.
     loss_factor : float
         For ``damping = "materials"`` of ``[basis]``.
     """
@@ -50,7 +51,7 @@ class MaterialSettings:
     shear_modulus: Annotated[float | tuple[float, ...] | None, Unit("Pa")] = None
     stiffness: Annotated[tuple[tuple[float, ...], ...] | None, Unit("Pa")] = None
     density: Annotated[float | None, Unit("kg/m^3")] = None
-    axes: MaterialAxes | CylindricalAxes | None = None
+    axes: AnyAxes | None = None
     loss_factor: float = 0.0
 
     def __post_init__(self) -> None:

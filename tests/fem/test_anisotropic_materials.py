@@ -25,6 +25,7 @@ from fecontact import (
 )
 from fecontact.fem import (
     AnisotropicMaterial,
+    CurveAxes,
     CylindricalAxes,
     MaterialAxes,
     Ring,
@@ -206,7 +207,9 @@ def test_turned_axes_of_a_turned_body_give_the_same_frequencies(tetrahedra):
     """A body turned with the axes of its material, or mirrored, vibrates as before."""
     mesh = block_mesh((3, 2, 2), (0.1, 0.05, 0.03), tetrahedra=tetrahedra)
     for axes in (TILTED, CylindricalAxes((0.2, -0.4, 0.1), (0.1, 1.0, 2.0), about=1, angle=25.0),
-                 CylindricalAxes((0.2, -0.4, 0.1), (0.1, 1.0, 2.0), about=3, angle=25.0)):
+                 CylindricalAxes((0.2, -0.4, 0.1), (0.1, 1.0, 2.0), about=3, angle=25.0),
+                 *(CurveAxes(((-0.02, 0.01, 0.0), (0.05, 0.03, 0.01), (0.12, 0.0, 0.03)),
+                             (0.1, -0.2, 1.0), about, 25.0) for about in (1, 2, 3))):
         of = fully_anisotropic(axes)
         still = Mesh(mesh.nodes, mesh.cells, cell_groups={"all": np.arange(len(mesh.cells))},
                      materials={"all": of})
@@ -223,15 +226,25 @@ def test_turned_axes_of_a_turned_body_give_the_same_frequencies(tetrahedra):
         assert np.abs(other / expected - 1.0).max() > 1e-2
 
 
-def test_a_pressed_tube_with_cylindrical_axes():
+def circle(count, radius=0.075):
+    """Points of a closed circle about z."""
+    turn = np.linspace(0.0, 2.0 * np.pi, count + 1)[:-1]
+    points = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0.0 * turn], axis=1).tolist()
+    return (*points, points[0])
+
+
+@pytest.mark.parametrize("ring", [
+    AnisotropicMaterial.orthotropic((10e9, 40e9, 10e9), (0.0, 0.0, 0.0), (4e9,) * 3, RHO,
+                                    CylindricalAxes()),
+    AnisotropicMaterial.orthotropic((40e9, 10e9, 10e9), (0.0, 0.0, 0.0), (4e9,) * 3, RHO,
+                                    CurveAxes(circle(48)))])
+def test_a_pressed_tube_with_cylindrical_axes(ring):
     """Lekhnitskii, Anisotropic Plates: a ring in plane stress under inner pressure p.
 
     ``s_r = p c^(k+1) / (1 - c^(2k)) ((r/b)^(k-1) - (r/b)^(-k-1))`` with ``c = a / b`` and
     ``k = sqrt(E_theta / E_r)``.
     """
     mesh = generate(Ring(0.1, 0.05, 0.01, element_size=0.0125, layers=1))
-    ring = AnisotropicMaterial.orthotropic((10e9, 40e9, 10e9), (0.0, 0.0, 0.0), (4e9,) * 3, RHO,
-                                           CylindricalAxes())
     body = ElasticBody(mesh, ring, fixed={"contact": "z"})
     found = static_solution(body, Load(boundaries=(BoundaryLoad("inner", 1e6),)),
                             stress_axes="material")
@@ -239,8 +252,9 @@ def test_a_pressed_tube_with_cylindrical_axes():
     k, c, at = 2.0, 0.5, r / 0.1
     exact = 1e6 * c ** (k + 1) / (1 - c ** (2 * k)) * (at ** (k - 1) - at ** (-k - 1))
     hoop = 1e6 * c ** (k + 1) / (1 - c ** (2 * k)) * k * (at ** (k - 1) + at ** (-k - 1))
-    assert found.stress[:, 0] == pytest.approx(exact, abs=0.08e6)
-    assert found.stress[:, 1] == pytest.approx(hoop, abs=0.12e6)
+    radial, along = (1, 0) if isinstance(ring.axes, CurveAxes) else (0, 1)
+    assert found.stress[:, radial] == pytest.approx(exact, abs=0.08e6)
+    assert found.stress[:, along] == pytest.approx(hoop, abs=0.12e6)
     assert np.abs(found.stress[:, 3]).max() < 0.06e6
 
 
@@ -286,6 +300,66 @@ def test_loss_factors_count_by_elastic_energy():
 # Study files -------------------------------------------------------------------------------------
 
 
+def test_axes_along_a_circle_are_those_around_its_centre():
+    """Axis 1 is circumferential and axis 2 points inwards; the error falls with the third power."""
+    places = np.random.default_rng(5).uniform([-0.1, -0.1, -0.02], [0.1, 0.1, 0.02], (200, 3))
+    places = places[np.hypot(*places[:, :2].T) > 0.02]
+    radial, around, along = np.moveaxis(CylindricalAxes().at(places), 1, 0)
+    exact = np.stack([around, -radial, along], axis=1)
+    errors = [np.abs(CurveAxes(circle(count)).at(places) - exact).max() for count in (12, 24, 48)]
+    assert errors[-1] < 1e-4
+    assert np.log2(np.array(errors[:-1]) / errors[1:]).min() > 2.7
+
+
+def test_axes_along_a_helix():
+    """The tangent of a helix at its closest place, also for places beside it and at its ends."""
+    turn = np.linspace(0.0, 3.0 * np.pi, 121)
+    helix, slope = (np.stack(one, axis=1) for one in (
+        (np.cos(turn), np.sin(turn), 0.2 * turn), (-np.sin(turn), np.cos(turn), 0.2 + 0.0 * turn)))
+    slope /= np.linalg.norm(slope, axis=1, keepdims=True)
+    # Beside it along its principal normal and binormal.
+    normal = -np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
+    axes = CurveAxes(tuple(helix.tolist()), (0.0, 0.0, 2.0))
+    found = axes.at(helix + 0.1 * normal - 0.05 * np.cross(slope, normal))
+    assert found[:, 0] == pytest.approx(slope, abs=1e-4)
+    assert found[:, 1] == pytest.approx(normal, abs=1e-4)
+    assert np.einsum("nai,nbi->nab", found, found) == pytest.approx(
+        np.broadcast_to(np.eye(3), found.shape), abs=1e-12)
+    assert axes.at(helix[:1] - slope[:1])[0, 0] == pytest.approx(slope[0], abs=1e-4)
+    straight = CurveAxes(((0.0, 0.0), (1.0, 1.0)), about=3, angle=90.0).at(np.ones((1, 3)))[0]
+    assert straight == pytest.approx(np.array([[-1, 1, 0], [-1, -1, 0], [0, 0, 2 ** 0.5]])
+                                     / 2 ** 0.5)
+
+
+def test_energies_along_a_curve_are_those_of_the_stiffness():
+    body = ElasticBody(block_mesh((4, 2, 2), (0.1, 0.05, 0.03)), fully_anisotropic(
+        CurveAxes(((0.0, 0.0, 0.0), (0.05, 0.02, 0.0), (0.1, 0.0, 0.01)))))
+    assert len(body.anisotropic[0]) == 16
+    moved = np.random.default_rng(1).standard_normal((body.nodes.size, 4))
+    assert strain_energies(body, moved) == pytest.approx(
+        0.5 * np.einsum("im,im->m", moved, body.stiffness @ moved), rel=1e-10)
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    ({"points": ((0, 0, 0),)}, r"points = \(\(0, 0, 0\),\) must be two or more places"),
+    ({"points": ((0, 0, 0), (1, 0, 0), (1, 0, 0))}, r"points 2 and 3 lie at one place, \[1\.0, 0"),
+    ({"points": ((0, 0, 0), (1, np.nan, 0))}, r"points = \(1, nan, 0\) must be coordinates"),
+    ({"third": (0, 0, 0)}, r"third = \(0, 0, 0\) must be longer than zero"),
+    ({"about": 4}, r"about = 4 must be 1, 2 or 3"),
+    ({"angle": np.inf}, r"angle"),
+])
+def test_bad_curves_are_refused(change, message):
+    with pytest.raises(InputError, match=rf"CurveAxes.*{message}"):
+        CurveAxes(**{"points": ((0, 0, 0), (1, 0, 0)), **change})
+
+
+def test_places_without_axes_along_a_curve_are_refused():
+    with pytest.raises(InputError, match=r"\(0, 0, 0\), a whole arc of the curve is equally close"):
+        CurveAxes(circle(64)).at(np.zeros((1, 3)))
+    with pytest.raises(InputError, match=r"\(1, 1, 1\), the curve is parallel to third = "):
+        CurveAxes(((0, 0, 0), (0, 0, 1))).at(np.ones((1, 3)))
+
+
 def study_of(tmp_path, materials, damping="0.0"):
     return Study.from_toml(
         "[geometry]\nshape = 'solid-block'\nlength = 0.1\nwidth = 0.05\nheight = 0.02\n"
@@ -303,6 +377,13 @@ def test_materials_of_studies(tmp_path):
         E, NU, G, RHO, CylindricalAxes((0.0, 1.0, 0.0)), 0.02)
     assert study.modal_basis().damping_ratios[6:] == pytest.approx(0.01)
     assert Study.from_tables(study.tables()).elastic_body().materials == body.materials
+    along = study_of(tmp_path, table.replace(
+        "point = [0.0, 1.0, 0.0], direction = [0.0, 0.0, 1.0]",
+        "points = [[0.0, 0.0, 0.0], [0.05, 0.02, 0.0], [0.1, 0.0, 0.0]], third = [0, 0, 1]"))
+    assert along.elastic_body().materials[0].axes == CurveAxes(
+        ((0.0, 0.0, 0.0), (0.05, 0.02, 0.0), (0.1, 0.0, 0.0)))
+    assert Study.from_tables(along.tables()).elastic_body().materials == (
+        along.elastic_body().materials)
     fibres = study_of(tmp_path, "[[body.materials]]\nyoungs_modulus = [140e9, 10e9]\n"
                       "poisson_ratio = [0.3, 0.4]\nshear_modulus = 5e9\ndensity = 1600.0\n")
     assert fibres.elastic_body().materials[0] == AnisotropicMaterial.transversely_isotropic(
