@@ -1,7 +1,7 @@
 """Studies from mesh files: bodies, interfaces where surfaces face each other, and what is left."""
 
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
@@ -18,7 +18,9 @@ from fecontact.fem.constraints import Coupling, LinearEquation, Tie, reference_p
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files import read_bodies
+from fecontact.fem.mesh_files.ansys_loads import archive_contents
 from fecontact.fem.mesh_files.deck_contents import DeckContents, deck_contents
+from fecontact.fem.mesh_files.nastran_loads import nastran_contents
 from fecontact.fem.pairing import pair_faces
 from fecontact.system.model_limits import implausible_body
 
@@ -29,6 +31,10 @@ _STIFFNESS = 1e13  # of a proposed contact [Pa/m]: a deflection of 0.1 um under 
 _CONSTRAINTS: Mapping[str, type] = {
     "ties": Tie, "couplings": Coupling, "equations": LinearEquation}
 _MOST_NODES = 16  # of a proposed interface
+# Functions that read loads and supports, by the suffix of the file.
+_CONTENTS: Mapping[str, Callable[[Path], DeckContents]] = {
+    ".inp": deck_contents, ".cdb": archive_contents,
+    **dict.fromkeys((".bdf", ".fem", ".nas"), nastran_contents)}
 
 
 @dataclass(frozen=True)
@@ -83,7 +89,8 @@ class Imported:
                             ("contact", self.contents.contact),
                             ("skipped", self.contents.skipped)):
             if names:
-                yield what, ", ".join(f"{number} *{name}" for name, number in names.items())
+                star = "*" if self.path.suffix.lower() == ".inp" else ""
+                yield what, ", ".join(f"{number} {star}{name}" for name, number in names.items())
         for face, other in self.interfaces:
             yield "interface", f"{face} on {other}"
 
@@ -166,7 +173,8 @@ class Imported:
                 mesh = self.meshes[body]
                 single = {name.upper(): name for name, nodes in mesh.points.items()
                           if len(nodes) == 1}
-                name = (single | _references(mesh)).get(word.upper())
+                names = single | _references(mesh)
+                name = names.get(word.upper()) or names.get(f"NODE {word}")
                 if mesh.dimension == 2:
                     component = _in_plane(component)
                 if name and component:
@@ -175,6 +183,9 @@ class Imported:
                         "point": f"{_name(body)}." * several + name, "component": component,
                         "signal": value * (self.scale if moment else 1.0)})
                     break
+            else:
+                found.notes.append(f"The force on {given} is left out: it is no single point of "
+                                   f"the bodies.")
         distributed = self.contents.distributed
         for surface, value in distributed.pressures:
             held = [(body, name) for body in bodies for name in self.meshes[body].boundaries
@@ -202,8 +213,7 @@ class Imported:
                 found.notes.append(f"Centrifugal force on {name} is left out: it must act on all "
                                    f"cells.")
         for what in dict.fromkeys(distributed.unread):
-            found.notes.append(f"{what} is left out: only P, P1 to P6, GRAV and CENTRIF without "
-                               f"other options are read.")
+            found.notes.append(f"{what} is left out: only {distributed.kinds} are read.")
         return found
 
     def _rotation(self, body: str) -> dict[str, object] | None:
@@ -278,7 +288,8 @@ def imported(path: str | Path, scale: float = 1.0) -> Imported:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ModelWarning)
         meshes = read_bodies(path, scale=scale)
-        contents = deck_contents(path) if path.suffix.lower() == ".inp" else DeckContents()
+        read = _CONTENTS.get(path.suffix.lower())
+        contents = read(path) if read else DeckContents()
         notes = [f"{one.message}" for one in caught if issubclass(one.category, ModelWarning)]
         if has_parts := "" not in meshes:
             who = {name: f"body '{name}'" for name in meshes}

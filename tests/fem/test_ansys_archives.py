@@ -203,8 +203,8 @@ def test_cut_and_empty_archives_are_named(tmp_path):
 def test_loads_and_materials_over_temperature_are_told(tmp_path):
     nodes, bricks = box((1, 1, 1))
     path = archive(tmp_path / "a.cdb", 185, nodes, bricks,
-                   "D,       1,UX  ,  0.00000000    ,  0.00000000    ")
-    with pytest.warns(ModelWarning, match=r"1 supports \(D\), which the study gives"):
+                   "D,       1,UX  ,  0.00000000    ,  0.00000000    \nBF,       1,TEMP,  20.0")
+    with pytest.warns(ModelWarning, match=r"holds 1 body loads \(BF\), which are not read; give"):
         fc.read_mesh(path)
     path = archive(tmp_path / "b.cdb", 185, nodes, bricks,
                    "MPDATA,R5.0, 2,EX  ,       1, 1, 7.0E+10, 6.0E+10,")

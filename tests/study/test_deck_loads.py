@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 from solid_blocks import block_mesh
 
-from fecontact import MeshError, Study, read_mesh, static_solution
+from fecontact import InputError, MeshError, Study, read_mesh, static_solution
+from fecontact.fem.elements.cell_kinds import HEXAHEDRON
+from fecontact.fem.mesh_files.cut_cells import SHAPES
+from fecontact.fem.mesh_files.nastran_loads import nastran_contents
 from fecontact.study.imported import imported
 
 PLACES = np.array([(0.2, 0.1, 0.05), (0.1, 0.1, 0.025)])
@@ -56,10 +59,10 @@ SIDES = ("*DLOAD\nUP, P2, 2e6\n1, P1, -3e6\n3, P1, -3e6\n24, P5, 1.5e6\n24, P4, 
          "24, P5, 1e6\n")
 
 
-def displacement(tmp_path, load, scale=1.0):
+def displacement(tmp_path, load, scale=1.0, file="a.inp", make=deck):
     """Displacements (2, 3) at the places of the deck's study, and the study."""
-    (tmp_path / "a.inp").write_text(deck(load, scale))
-    found = imported(tmp_path / "a.inp", scale)
+    (tmp_path / file).write_text(make(load, scale))
+    found = imported(tmp_path / file, scale)
     assert found.notes == ()
     text = found.toml(tmp_path)
     assert "left out" not in text
@@ -84,6 +87,195 @@ def test_displacements_are_those_of_calculix(load, scale, expected, tmp_path):
                                   abs=1e-6 * np.abs(CALCULIX[expected]).max())
 
 
+# Files of Nastran and Ansys -------------------------------------------------------------------
+
+
+MESH = block_mesh((4, 3, 2), (0.2, 0.1, 0.05))
+HELD = (np.flatnonzero(MESH.nodes[:, 0] < 1e-9) + 1).tolist()
+# Cells of the upper layer, and the corners of their upper faces, from 1 on.
+UP = np.flatnonzero(MESH.nodes[MESH.cells][:, :, 2].max(axis=1) > 0.049) + 1
+TIP, HIGH = (1 + int(np.linalg.norm(MESH.nodes - place, axis=1).argmin()) for place in PLACES)
+
+
+def bulk(load, scale=1.0):
+    """The block as bulk data; ``load`` is the case control, and the cards after a line BULK."""
+    case, _, cards = load.rpartition("BULK\n")
+    text = f"{case}BEGIN BULK\n" + "".join(
+        f"GRID,{k},,{x:.12f},{y:.12f},{z:.12f}\n" for k, (x, y, z) in enumerate(
+            (MESH.nodes / scale).tolist(), 1))
+    for k, row in enumerate((MESH.cells + 1).tolist(), 1):
+        text += f"CHEXA,{k},1,{','.join(map(str, row[:6]))}\n+,{row[6]},{row[7]}\n"
+    held = "".join(f"SPC1,3,123,{node}\n" for node in HELD)
+    return f"{text}{held}{cards}ENDDATA\n"
+
+
+def archive(load, scale=1.0):
+    """The block as an archive of SOLID185."""
+    lines = ["/PREP7", "ET,        1,185", f"NBLOCK,6,SOLID,{len(MESH.nodes):10d},"
+             f"{len(MESH.nodes):10d}", "(3i9,6e21.13e3)"]
+    lines += [f"{k:9d}{0:9d}{0:9d}" + "".join(
+        f"{x:20.13E}".replace("E+", "E+0").replace("E-", "E-0") for x in node)
+        for k, node in enumerate(MESH.nodes / scale, 1)]
+    lines += ["N,R5.3,LOC,       -1,", f"EBLOCK,19,SOLID,{len(MESH.cells):10d},"
+              f"{len(MESH.cells):10d}", "(19i9)"]
+    lines += ["".join(f"{n:9d}" for n in (1, 1, 1, 1, 0, 0, 0, 0, 8, 0, k, *row))
+              for k, row in enumerate((MESH.cells + 1).tolist(), 1)]
+    constants = (2.1e11, 7850.0) if scale == 1.0 else (2.1e5, 7.85e-9)
+    lines += ["       -1", *(f"MPDATA,R5.0, 1,{name},       1, 1, {value:.9E}    ," for name, value
+                             in (("EX", constants[0]), ("NUXY", 0.3), ("DENS", constants[1])))]
+    lines += [f"D,{node:8d},{label}  ,  0.00000000    ,  0.00000000    " for node in HELD
+              for label in ("UX", "UY", "UZ")]
+    return "\n".join([*lines, load.rstrip(), "FINISH", ""])
+
+
+def pload4(pressure, *elements, side=5, number=7):
+    """Cards of a pressure on a side of elements, by two points across it."""
+    facet = HEXAHEDRON.facets[side]
+    return "".join(f"PLOAD4,{number},{element},{pressure},,,,{row[facet[1]]},{row[facet[3]]}\n"
+                   for element, row in ((one, MESH.cells[one - 1] + 1) for one in elements))
+
+
+def sfe(pressure, *elements, face=6, inline=False):
+    """Commands of a pressure on a face of elements, with their values on the same line or below."""
+    value = f"  {pressure:.8E}    "
+    return "".join(f"SFE,{one:8d},{face:4d},PRES,  0," + (
+        f"{','.join([value] * 4)}\n" if inline else f"R5.0\n{value * 4}\n") for one in elements)
+
+
+TOP = HEXAHEDRON.facets.index((4, 5, 6, 7))
+# Sides of cells by the places of their corners: S1 is below, S2 above, S3 ... S6 around.
+AROUND = {number: next(k for k, facet in enumerate(HEXAHEDRON.facets) if {*facet} == {*corners})
+          for number, corners in enumerate(((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 4, 5), (1, 2, 5, 6),
+                                            (2, 3, 6, 7), (0, 3, 4, 7)), start=1)}
+GRAVITY = 9.81 / 7.0  # along 3, -2, -6
+
+
+@pytest.mark.parametrize(("file", "load", "scale", "expected"), [
+    ("a.bdf", pload4(2e6, *UP, side=TOP), 1.0, "ROOF"),
+    ("a.bdf", pload4(2e6, *UP, side=AROUND[2]) + pload4(-3e6, 1, 3, side=AROUND[1])
+     + pload4(2.5e6, 24, side=AROUND[5]) + pload4(2e6, 24, side=AROUND[4])
+     + pload4(2.5e5, 1, side=AROUND[3]), 1.0, "SIDES"),
+    ("a.bdf", f"GRAV,7,,{GRAVITY},3.,-2.,-6.\n", 1.0, "GRAVITY"),
+    ("a.bdf", "LOAD = 12\nBULK\nLOAD,12,2.0,.5,7,-.25,8\n" + pload4(2.0, *UP, side=TOP)
+     + "GRAV,8,0,19620.,0.,0.,1.\nGRAV,9,,5.,1.,0.,0.\n", 1e-3, "MM"),
+    ("a.cdb", sfe(2e6, *UP), 1.0, "ROOF"),
+    ("a.cdb", sfe(2e6, *UP, inline=True) + sfe(-3e6, 1, 3, face=1) + sfe(2.5e6, 24, face=4)
+     + sfe(2e6, 24, face=3) + sfe(2.5e5, 1, face=2), 1.0, "SIDES"),
+    ("a.cdb", f"ACEL,  {-3 * GRAVITY:.8E}    ,  {2 * GRAVITY:.8E}    ,  {6 * GRAVITY:.8E}\n", 1.0,
+     "GRAVITY"),
+    ("a.cdb", sfe(2.0, *UP) + "ACEL,  0.00000000    ,  0.00000000    ,  9810.00000\n", 1e-3, "MM"),
+])
+def test_loads_of_nastran_and_ansys_are_those_of_calculix(file, load, scale, expected, tmp_path):
+    found, study = displacement(tmp_path, load, scale, file, bulk if file == "a.bdf" else archive)
+    # Files of Nastran have no material: that of the study is steel.
+    assert len(study.body.fixed) == 1
+    assert found == pytest.approx(np.array(CALCULIX[expected]),
+                                  abs=2e-6 * np.abs(CALCULIX[expected]).max())
+
+
+@pytest.mark.parametrize(("file", "load"), [
+    ("a.bdf", "LOAD = 12\nBULK\nLOAD,12,4.0,.5,7\n"
+     f"FORCE,7,{TIP},0,10.,3.,0.,-10.\nFORCE*,7,{HIGH},,5.0\n*,0.,5.,0.\n"),
+    ("a.cdb", f"F,{TIP:8d},FX  ,  60.0000000    ,  0.00000000    \nF,{TIP},FZ,-200.\n"
+              f"F,{HIGH},FY,50.\n"),
+])
+def test_forces_of_nastran_and_ansys_are_those_of_a_deck(file, load, tmp_path):
+    """The deck names nodes by their numbers, and holds them so in place of their set."""
+    expected, _ = displacement(
+        tmp_path, f"*CLOAD\n{TIP}, 1, 60.\n{TIP}, 3, -200.\n{HIGH}, 2, 50.\n")
+    found, _ = displacement(tmp_path, load, 1.0, file, bulk if file == "a.bdf" else archive)
+    assert np.abs(expected).max() > 1e-8
+    numbered, study = displacement(
+        tmp_path, f"*NSET, NSET=T\n{TIP},\n*CLOAD\nT, 1, 60.\nT, 3, -200.\n{HIGH}, 2, 50.\n", 1.0,
+        "b.inp", lambda *of: deck(*of).replace("HELD, 1, 3\n", "".join(
+            f"{node}, 1, 3\n" for node in HELD)))
+    assert study.body.fixed == {"BOUNDARY 1-3": "xyz"}
+    assert numbered == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+    assert found == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+
+
+def test_rotation_of_an_archive_is_that_of_a_deck(tmp_path):
+    expected, _ = displacement(tmp_path, "*DLOAD\nEALL, CENTRIF, 2500., 0., 0., 0., 0., 3., 4.\n")
+    found, study = displacement(tmp_path, "OMEGA,  0.0    ,  30.0    ,  40.0\n", 1.0, "a.cdb",
+                                archive)
+    assert study.body.rotation.speed == pytest.approx(50.0)
+    assert found == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+
+
+def test_moments_of_nastran_act_on_points_that_others_follow(tmp_path):
+    end = [k + 1 for k, place in enumerate(MESH.nodes) if place[0] > 0.199]
+    hub = len(MESH.nodes) + 1
+    text = bulk(f"MOMENT,7,{hub},0,2.0,1.,0.,-3.\nRBE2,9,{hub},123456,"
+                f"{','.join(map(str, end[:5]))}\n+,{','.join(map(str, end[5:]))}\n")
+    (tmp_path / "a.bdf").write_text(text.replace(
+        "CHEXA,1,1", f"GRID,{hub},,0.2,0.05,0.025\nCHEXA,1,1"))
+    study = Study.from_toml(imported(tmp_path / "a.bdf").toml(tmp_path), tmp_path / "a.toml")
+    assert [(one.point, one.component, one.signal.value) for one in study.load.forces] == [
+        (f"point {hub}", "phi_x", 2.0), (f"point {hub}", "phi_z", -6.0)]
+
+
+@pytest.mark.parametrize(("file", "load", "sentences"), [
+    ("a.bdf", pload4(2.0, *UP, side=TOP) + pload4(2.0, *UP, side=TOP, number=8),
+     ("Each of the sets of loads '7', '8', of which no LOAD = of the case control names",)),
+    ("a.bdf", "RFORCE,7,1,,3.,0.,0.,1.\nGRAV,7,4,9.81,0.,0.,1.\n" + pload4("1.,2.,3.", 1),
+     ("RFORCE is left out", "GRAV along the axes of the system 4 is left out",
+      "PLOAD4 with a direction or a pressure that varies is left out")),
+    ("a.bdf", "PLOAD4,7,1,2.,,,,1,2\n", ("PLOAD4 on no side of a solid element (the element 1)",)),
+    ("a.bdf", f"SPC,3,{TIP},3,.001\n", ("SPC with displacements other than zero is left out",)),
+    ("a.cdb", f"SFE,1,1,PRES,0,1.,2.,1.,1.\nD,{TIP},UX,.001\nF,{TIP},HEAT,3.\nBF,1,TEMP,20.\n",
+     ("a pressure that varies is left out", "D UX other than zero is left out",
+      "F HEAT is left out", "BF is left out")),
+])
+def test_loads_of_nastran_and_ansys_that_are_not_taken_are_named(file, load, sentences, tmp_path):
+    (tmp_path / file).write_text(bulk(load) if file == "a.bdf" else archive(load))
+    text = imported(tmp_path / file).toml(tmp_path)
+    for sentence in sentences:
+        assert sentence in text, text
+    study = Study.from_toml(text, tmp_path / "a.toml")
+    assert (study.load is None or study.load.gravity, not study.load or study.load.boundaries) in (
+        (None, ()), (True, True))
+
+
+def test_supports_of_several_components_are_groups_of_their_own(tmp_path):
+    (tmp_path / "a.bdf").write_text(bulk(f"SPC1,3,3,{TIP}\n"))
+    mesh = read_mesh(tmp_path / "a.bdf")
+    assert sorted(mesh.points["SPC 3"] + 1) == sorted([*HELD, TIP])
+    assert (mesh.points["SPC 3 3"] + 1).tolist() == [TIP]
+    assert nastran_contents(tmp_path / "a.bdf").supports == (
+        ("SPC 3 123", "x y z"), ("SPC 3 3", "z"))
+    study = Study.from_toml(imported(tmp_path / "a.bdf").toml(tmp_path), tmp_path / "a.toml")
+    assert study.body.fixed == {"SPC 3 123": "xyz", "SPC 3 3": "z"}
+
+
+@pytest.mark.parametrize("corners", [4, 6, 8])
+def test_sides_of_cells_by_two_of_their_points(corners, tmp_path):
+    """By the rule of PLOAD4: for tetrahedra a corner and the one opposite, else across the side."""
+    from fecontact.fem.mesh_files.nastran_loads import _side
+
+    numbers = tuple(range(11, 11 + corners))
+    for facet in SHAPES[corners].facets:
+        wanted = {numbers[k] for k in facet}
+        first = numbers[facet[0]]
+        other = (({*numbers} - wanted).pop() if corners == 4
+                 else numbers[facet[2]] if len(facet) == 4 else None)
+        assert {*_side(numbers, first, other)} == wanted
+
+
+@pytest.mark.parametrize(("file", "load", "message"), [
+    ("a.bdf", "FORCE,7,999,,1.,1.,0.,0.\n", r"FORCE of line \d+ names the point 999"),
+    ("a.bdf", f"FORCE,7,{TIP},,x,1.,0.,0.\n", r"'x' is not a number"),
+    ("a.bdf", "GRAV,7,,9.81,a,0.,1.\n", r"'a' is not a number"),
+    ("a.cdb", "SFE,99,1,PRES,0,2.\n", r"pressure on face 1 of element 99, which no solid"),
+    ("a.cdb", "SFE,1,7,PRES,0,2.\n", r"pressure on face 7 of element 1, which no solid"),
+    ("a.cdb", "ACEL,0,x,0\n", r"ACEL holds the values '0,x,0', which are no numbers"),
+])
+def test_bad_loads_of_nastran_and_ansys(file, load, message, tmp_path):
+    (tmp_path / file).write_text(bulk(load) if file == "a.bdf" else archive(load))
+    with pytest.raises((MeshError, InputError), match=message):
+        read_mesh(tmp_path / file)
+
+
+# Studies --------------------------------------------------------------------------------------
 
 
 def test_the_basis_of_the_study_has_the_loads(tmp_path):
@@ -99,12 +291,14 @@ def test_what_is_not_taken_is_named(tmp_path):
     (tmp_path / "a.inp").write_text(deck(
         "*DLOAD\nUP, GRAV, 9.81, 0., 0., -1.\n2, P1, 5.\nEALL, BX, 3.\n"
         "UP, CENTRIF, 4., 0., 0., 0., 0., 0., 1.\n"
-        "*DLOAD, AMPLITUDE=A\nUP, P2, 1.\n*DSLOAD\nROOF, TRVEC, 1., 0., 0., 1.\n"))
+        "*DLOAD, AMPLITUDE=A\nUP, P2, 1.\n*DSLOAD\nROOF, TRVEC, 1., 0., 0., 1.\n"
+        "*CLOAD\nHELD, 1, 5.\n"))
     text = imported(tmp_path / "a.inp").toml(tmp_path)
     for wanted in ("Gravity on UP is left out: it must act on all cells.",
                    "The pressure on DLOAD-1 is left out: it is no boundary of the bodies.",
                    "Centrifugal force on UP is left out", "*DLOAD BX is left out",
-                   "*DSLOAD TRVEC is left out", "*DLOAD with AMPLITUDE is left out"):
+                   "*DSLOAD TRVEC is left out", "*DLOAD with AMPLITUDE is left out",
+                   "The force on HELD is left out: it is no single point of the bodies."):
         assert wanted in text, wanted
     study = Study.from_toml(text, tmp_path / "a.toml")
     assert (study.load.gravity, study.load.boundaries, study.body.rotation) == (None, (), None)

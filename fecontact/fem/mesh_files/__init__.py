@@ -34,7 +34,9 @@ from fecontact.fem.mesh_files.ansys import read_cdb
 from fecontact.fem.mesh_files.gmsh import read_msh, write_msh
 from fecontact.fem.mesh_files.groups import Box, named_boundaries, named_constraints, named_points
 from fecontact.fem.mesh_files.med import read_med
+from fecontact.fem.mesh_files.nastran_cards import grid_rows
 from fecontact.fem.mesh_files.nastran_constraints import add_constraints
+from fecontact.fem.mesh_files.nastran_loads import add_load_groups
 from fecontact.fem.mesh_files.raw import RawMesh, body_mesh
 from fecontact.fem.pretension import cut_along
 
@@ -401,7 +403,10 @@ def _read_nastran(path: Path) -> RawMesh:
         raise MeshError("The file has no line ENDDATA, so it may be cut off; add one if it is "
                         "complete.")
     raw = _raw_mesh(_by_meshio("nastran", io.StringIO(text)))
-    add_constraints(path, text, raw)
+    row = grid_rows(path)
+    raw.numbers = np.array(list(row), np.int64)
+    add_constraints(path, text, row, raw)
+    add_load_groups(path, text, row, raw)
     return raw
 
 

@@ -35,9 +35,10 @@ from fecontact.fem.mesh_files.abaqus_constraints import (
     sections_of,
 )
 from fecontact.fem.mesh_files.abaqus_keywords import Deck, Options
-from fecontact.fem.mesh_files.abaqus_loads import LOADS, DistributedLoads
+from fecontact.fem.mesh_files.abaqus_loads import LOADS, add_loads, groups_of_nodes
 from fecontact.fem.mesh_files.abaqus_materials import Given, material, orientation
 from fecontact.fem.mesh_files.abaqus_temperatures import is_temperature, temperature_of
+from fecontact.fem.mesh_files.distributed_loads import DistributedLoads
 from fecontact.fem.mesh_files.raw import NODES, PLANE, SOLID, RawMesh
 
 _PLANE = re.compile(r"(?:C(?:PS|PE|PEG|GPE)|DC2D|AC2D|M3D|R3D|SFM3D|STRI|S)(\d)")
@@ -443,8 +444,11 @@ class _Assembly:
             case "SURFACE" if options.get("TYPE", "ELEMENT").upper() == "ELEMENT":
                 self._add_surface(options["NAME"], lines)
             case _ if keyword in LOADS and not self.first_step_ended:
-                for name, sides in self.loads.add(keyword, options, lines).items():
+                for name, sides in add_loads(self.loads, keyword, options, lines).items():
                     self._add_surface(name, [f"{word}, S{side}" for word, side in sides])
+            case "BOUNDARY" | "CLOAD" if part is not None and not self.first_step_ended:
+                for name, node in groups_of_nodes(keyword, lines):
+                    self._add_set("NSET", {"NSET": name}, [node])
             case "END STEP":
                 self.first_step_ended = True
             case "SURFACE" if options["TYPE"].upper() == "NODE":

@@ -16,6 +16,7 @@ from fecontact.core.errors import InputError, MeshError, ModelWarning, choices
 from fecontact.core.extras import optional
 from fecontact.core.types import Array, Integers
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
+from fecontact.fem.mesh_files.ansys_loads import archive_loads
 from fecontact.fem.mesh_files.raw import RawMesh
 
 # Numbers of element types.
@@ -44,10 +45,12 @@ _EDGES = {
 }
 _CORNERS = {"hexahedron": 8, "wedge": 6, "pyramid": 5, "tetra": 4, "triangle": 3, "quad": 4}
 _BY_CORNERS = {8: "hexahedron", 6: "wedge", 5: "pyramid", 4: "tetra"}
+# Corners of the faces 1, 2, ... of a brick, whose nodes may repeat, and of a tetrahedron.
+_FACES = {8: ((1, 0, 3, 2), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (4, 5, 6, 7)),
+          4: ((1, 0, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3))}
 # Commands of an archive that stiffen the model and are not read.
 _REFUSED = {"CE": "constraint equations (CE)", "CP": "coupled degrees of freedom (CP)",
             "CPBLOCK": "coupled degrees of freedom (CPBLOCK)"}
-_LOADS = {"D": "supports (D)", "F": "forces (F)", "SFE": "pressures (SFE)", "BF": "body loads (BF)"}
 _COMMAND = re.compile(r"^\s*([A-Za-z/*]+)\s*,", re.MULTILINE)
 _DATA = re.compile(r"^\s*MPDATA\s*,\s*R5\.0\s*,\s*(\d+)\s*,\s*(\w+)\s*,\s*(\d+)\s*,\s*\d+\s*,"
                    r"\s*([^,\s]+)", re.MULTILINE | re.IGNORECASE)
@@ -71,7 +74,7 @@ def read_cdb(path: Path) -> RawMesh:
     Warns
     -----
     ModelWarning
-        For loads and supports, which the study gives, and for materials that are not read.
+        For body loads, and for materials that are not read.
     """
     mapdl_archive = optional("mapdl_archive", "Reading Ansys archives")
     text = path.read_text(encoding="utf-8", errors="replace")
@@ -86,16 +89,22 @@ def read_cdb(path: Path) -> RawMesh:
     found = mapdl_archive.Archive(str(path), parse_vtk=False)
     _require_whole(text, found)
     elements = _Elements(found)
-    loads = [f"{commands[name]} {what}" for name, what in _LOADS.items() if commands[name]]
-    if loads:
-        warnings.warn(f"{path}: the file holds {', '.join(loads)}, which the study gives.",
-                      ModelWarning, stacklevel=4)
+    acting = archive_loads(text)
+    if acting.counts["BF"]:
+        warnings.warn(f"{path}: the file holds {acting.counts['BF']} body loads (BF), which are "
+                      f"not read; give temperatures in the study.", ModelWarning, stacklevel=4)
     raw = RawMesh(elements.points, elements.blocks(np.arange(elements.count)),
                   sets_are_boundaries=True)
     for name, numbers in found.node_components.items():
         raw.nodes[name.strip()] = elements.rows_of(np.asarray(numbers))
     for name, numbers in found.element_components.items():
         raw.parts[name.strip()] = elements.blocks(elements.of_numbers(np.asarray(numbers)))
+    for name, sides in acting.sides.items():
+        raw.faces[name] = elements.faces(sides)
+    for node in {node for node, *_ in acting.forces}:
+        raw.nodes[f"node {node}"] = elements.rows_of(np.array([node]))
+    for name, held in acting.supports.items():
+        raw.nodes[name] = elements.rows_of(np.array(held))
     materials, unread = _materials(text)
     for number in np.unique(elements.materials).tolist():
         name = f"material {number}"
@@ -146,6 +155,10 @@ class _Elements:
                             f"(shells, beams, springs, masses or others), which stiffen the mesh "
                             f"and are not read; SOLID185, 186, 187, 285 and PLANE182, 183 are.")
         kept = np.flatnonzero(~np.isin(kinds, _WITHOUT_STIFFNESS))
+        self._corners = {int(found.elem[place][8]): found.elem[place][10:][: 8 if kind in _BRICKS
+                                                                           else 4]
+                         for place, kind in zip(kept, kinds[kept], strict=True)
+                         if kind in (*_BRICKS, *_TETRAHEDRA)}
         rows = [np.asarray(found.elem[place], np.int64) for place in kept]
         heads = np.array([row[:10] for row in rows]).reshape(-1, 10)
         self.numbers, self.materials, self.count = heads[:, 8], heads[:, 0], len(kept)
@@ -174,6 +187,26 @@ class _Elements:
         """The elements of some rows, by their kinds."""
         chosen = [(kind, cells[np.isin(which, rows)]) for kind, which, cells in self._groups]
         return [(kind, cells) for kind, cells in chosen if len(cells)]
+
+    def faces(self, sides: list[tuple[int, int]]) -> list[Integers]:
+        """Corners (k, 3) and (k, 4) of faces by the numbers of their elements and their own.
+
+        Raises
+        ------
+        MeshError
+            For faces that the elements do not have.
+        """
+        found: dict[int, list[Integers]] = {}
+        for element, face in sides:
+            corners = self._corners.get(element, ())
+            places = _FACES.get(len(corners), ())
+            held = [corners[k] for k in places[face - 1]] if 1 <= face <= len(places) else []
+            nodes = self._row[list(dict.fromkeys(held))]
+            if len(nodes) < 3:
+                raise MeshError(f"SFE gives a pressure on face {face} of element {element}, which "
+                                f"no solid element of the file has.")
+            found.setdefault(len(nodes), []).append(nodes)
+        return [np.array(rows) for rows in found.values()]
 
     def _add(self, kind: int, which: Integers, nodes: Integers) -> None:
         """Cells of elements (M,) of one type with nodes (M, n)."""

@@ -1,4 +1,4 @@
-"""Contents of an Abaqus or CalculiX deck: keywords that are read, skipped, and element types."""
+"""Contents of a deck beside its mesh: loads and supports, keywords, and element types."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -9,15 +9,17 @@ from fecontact.core.checks import whole_number
 from fecontact.fem.mesh_files.abaqus_attachments import TYPES
 from fecontact.fem.mesh_files.abaqus_constraints import READ
 from fecontact.fem.mesh_files.abaqus_keywords import Deck
-from fecontact.fem.mesh_files.abaqus_loads import LOADS, DistributedLoads
+from fecontact.fem.mesh_files.abaqus_loads import LOADS, add_loads, groups_of_nodes
+from fecontact.fem.mesh_files.distributed_loads import DistributedLoads
 
 # Keywords of the mesh and its materials, besides those of constraints.
 _MESH = ("", "NODE", "ELEMENT", "SYSTEM", "NSET", "ELSET", "SURFACE", "PART", "END PART",
          "INSTANCE", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY", "SOLID SECTION", "MATERIAL",
          "ELASTIC", "DENSITY", "DAMPING", "EXPANSION", "ORIENTATION", "INCLUDE", "HEADING",
          "PREPRINT")
-# Loads and supports, which a study gives.
-_LOADS = ("BOUNDARY", "CLOAD", *LOADS, "TEMPERATURE", "INITIAL CONDITIONS")
+# Loads and supports, which a study gives, of Abaqus, Nastran and Ansys.
+_LOADS = ("BOUNDARY", "CLOAD", *LOADS, "TEMPERATURE", "INITIAL CONDITIONS",
+          "FORCE", "MOMENT", "PLOAD4", "GRAV", "SPC", "SPC1", "F", "D", "SFE", "ACEL", "OMEGA")
 _CONTACT = ("CONTACT PAIR", "CONTACT", "CONTACT INCLUSIONS", "CONTACT PROPERTY ASSIGNMENT",
             "SURFACE INTERACTION", "SURFACE BEHAVIOR", "FRICTION", "CLEARANCE", "GAP")
 
@@ -38,11 +40,13 @@ class DeckContents:
         Sets that ``*BOUNDARY`` holds up to the end of the first step, and the components of their
         motion that it does, with spaces between them: x y z phi_x phi_y phi_z.
     forces : tuple of (str, str, float)
-        Sets on which ``*CLOAD`` acts in the first step, the component and the value.
+        Sets or nodes on which ``*CLOAD`` acts in the first step, the component and the value.
     single : mapping of str to str
         Sets of one node, by its number.
     distributed : DistributedLoads
         Pressure, gravity and centrifugal force of ``*DLOAD`` and ``*DSLOAD`` in the first step.
+
+    Files of Nastran and Ansys give supports, forces and distributed loads alike.
     """
 
     keywords: Counter[str] = field(default_factory=Counter)
@@ -103,11 +107,14 @@ def deck_contents(path: Path) -> DeckContents:
         elif keyword == "CONTACT PAIR":
             pairs += [(row[0], row[1]) for row in rows if len(row) > 1]
         elif keyword == "BOUNDARY" and not deck.keywords["END STEP"]:
-            for name, *held in rows:
+            groups = [[name, *rows[k][1:]] for k, (name, _) in zip(
+                [k for k, row in enumerate(rows) if whole_number(row[0]) is not None],
+                groups_of_nodes(keyword, lines), strict=True)]
+            for name, *held in (*rows, *groups):
                 known = next((one for one in supports if one.upper() == name.upper()), name)
                 supports.setdefault(known, set()).update(_held(held))
         elif keyword in LOADS and not deck.keywords["END STEP"]:
-            distributed.add(keyword, options, lines)
+            add_loads(distributed, keyword, options, lines)
         elif keyword == "CLOAD" and not deck.keywords["END STEP"]:
             forces += [(name, COMPONENTS[dof - 1], float(value)) for name, word, value, *_ in (
                 (*row, "", "")[: max(len(row), 3)] for row in rows)

@@ -3,7 +3,10 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from fecontact.core.errors import InputError
+import numpy as np
+
+from fecontact.core.errors import InputError, MeshError
+from fecontact.core.types import Integers
 
 
 def cards(path: Path, name: str) -> Iterator[tuple[int, list[str]]]:
@@ -56,3 +59,28 @@ def real(line: int, word: str) -> float:
         return float(plain)
     except ValueError:
         raise InputError(f"Card of line {line}: {word[:40]!r} is not a number.") from None
+
+
+def grid_rows(path: Path) -> dict[int, int]:
+    """Rows of the grid points by their numbers, in the order of the cards GRID."""
+    return {whole(line, fields[0]): row for row, (line, fields) in enumerate(cards(path, "GRID"))}
+
+
+def point_rows(line: int, words: list[str], row: dict[int, int], card: str) -> Integers:
+    """Rows of points, which may be ranges (THRU); words that are reals end them."""
+    found: list[int] = []
+    wanted = [word for word in words if word]
+    while wanted:
+        word = wanted.pop(0)
+        if "." in word:
+            break
+        if word.upper() == "THRU":
+            last = whole(line, wanted.pop(0)) if wanted else found[-1]
+            found += [point for point in range(found[-1] + 1, last + 1) if point in row]
+            continue
+        found.append(whole(line, word))
+    missing = [point for point in found if point not in row]
+    if missing or not found:
+        what = f"the point {missing[0]}, which the file does not hold" if missing else "no points"
+        raise MeshError(f"The card {card} of line {line} names {what}; correct its numbers.")
+    return np.array([row[point] for point in found], np.int64)

@@ -1,7 +1,7 @@
-"""Constraints of Nastran's bulk data: RBE2, RBE3 and MPC, and the nodes of its supports.
+"""Constraints of Nastran's bulk data: RBE2, RBE3 and MPC.
 
 RBE2 lets nodes follow a grid point as a rigid body, RBE3 gives a grid point the mean motion of
-nodes, MPC are linear equations. Nodes of SPC and SPC1 become groups, such as ``SPC 7`` of set 7.
+nodes, MPC are linear equations.
 """
 
 import re
@@ -11,18 +11,17 @@ from pathlib import Path
 import numpy as np
 
 from fecontact.core.errors import MeshError, choices
-from fecontact.core.types import Integers
 from fecontact.fem.constraints import Constraint, Coupling, LinearEquation, Term
-from fecontact.fem.mesh_files.nastran_cards import cards, real, whole
+from fecontact.fem.mesh_files.nastran_cards import cards, point_rows, real, whole
 from fecontact.fem.mesh_files.raw import RawMesh
 
-_CARDS = re.compile(r"^(?:RBE[23]|MPC|SPC1?)\b", re.MULTILINE | re.IGNORECASE)
+_CARDS = re.compile(r"^(?:RBE[23]|MPC)\b", re.MULTILINE | re.IGNORECASE)
 
 
-def add_constraints(path: Path, text: str, raw: RawMesh) -> None:
-    """Add constraints of a file to its contents, and groups of nodes that these and supports name.
+def add_constraints(path: Path, text: str, row: dict[int, int], raw: RawMesh) -> None:
+    """Add constraints of a file to its contents, and groups of nodes that these name.
 
-    The points of ``raw`` are in the order of the cards GRID; ``text`` is that of the file.
+    The points of ``raw`` have the rows ``row`` by their numbers; ``text`` is that of the file.
 
     Raises
     ------
@@ -31,39 +30,14 @@ def add_constraints(path: Path, text: str, raw: RawMesh) -> None:
     """
     if not _CARDS.search(text):
         return
-    row = {whole(line, fields[0]): number for number, (line, fields) in enumerate(
-        cards(path, "GRID"))}
-    raw.numbers = np.array(list(row), np.int64)
     found = [*_rigid(path, row, raw), *_means(path, row, raw), *_equations(path, row, raw)]
     raw.constraints += found
     raw.apart = raw.apart or bool(found)
-    for name, nodes in _supported(path, row).items():
-        raw.nodes.setdefault(name, np.array(sorted(nodes), np.int64))
-
-
-def _rows(line: int, words: list[str], row: dict[int, int], card: str) -> Integers:
-    """Rows of points, which may be ranges (THRU); words that are reals end them."""
-    found: list[int] = []
-    wanted = [word for word in words if word]
-    while wanted:
-        word = wanted.pop(0)
-        if "." in word:
-            break
-        if word.upper() == "THRU":
-            last = whole(line, wanted.pop(0)) if wanted else found[-1]
-            found += [point for point in range(found[-1] + 1, last + 1) if point in row]
-            continue
-        found.append(whole(line, word))
-    missing = [point for point in found if point not in row]
-    if missing or not found:
-        what = f"the point {missing[0]}, which the file does not hold" if missing else "no points"
-        raise MeshError(f"The card {card} of line {line} names {what}; correct its numbers.")
-    return np.array([row[point] for point in found], np.int64)
 
 
 def _reference(line: int, word: str, row: dict[int, int], raw: RawMesh, card: str) -> str:
     """Name of the group of a point that others follow."""
-    node = _rows(line, [word], row, card)
+    node = point_rows(line, [word], row, card)
     raw.nodes.setdefault(f"point {word}", node)
     return f"point {word}"
 
@@ -81,7 +55,7 @@ def _rigid(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constraint
         if not set(components) & set("123"):
             raise MeshError(f"The card {name} of line {line} holds the components {components!r}, "
                             f"no displacements, which are 1, 2 and 3.")
-        raw.nodes[name] = _rows(line, fields[3:], row, name)
+        raw.nodes[name] = point_rows(line, fields[3:], row, name)
         yield Coupling(name, reference, tuple(raw.points[raw.nodes[reference][0]]),
                        axes=_axes(components), name=name)
 
@@ -104,7 +78,7 @@ def _means(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constraint
         if not parts or "UM" in map(str.upper, words):
             raise MeshError(f"The card {name} of line {line} has no weight or a list UM, which is "
                             f"not read; give a weight such as 1.0, and leave UM out.")
-        rows = [_rows(line, points, row, name) for _, points in parts]
+        rows = [point_rows(line, points, row, name) for _, points in parts]
         weights = np.repeat([weight for weight, _ in parts], [len(one) for one in rows])
         raw.nodes[name] = np.concatenate(rows)
         yield Coupling(name, reference, tuple(raw.points[raw.nodes[reference][0]]), "distributing",
@@ -121,7 +95,7 @@ def _equations(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constr
         for point, component, factor in zip(*(words[k::3] for k in range(3)), strict=False):
             if not point:
                 continue
-            node, way = int(_rows(line, [point], row, name)[0]), whole(line, component) - 1
+            node, way = int(point_rows(line, [point], row, name)[0]), whole(line, component) - 1
             if not 0 <= way < 6:
                 raise MeshError(f"The card {name} has the component {component}, which must be 1 "
                                 f"to 6.")
@@ -133,16 +107,3 @@ def _equations(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constr
     if len(sets) > 1:
         raise MeshError(f"The file has the sets {choices(sets)} of MPC; leave those out that do "
                         f"not act.")
-
-
-def _supported(path: Path, row: dict[int, int]) -> dict[str, set[int]]:
-    """Nodes by the name of their support."""
-    found: dict[str, set[int]] = {}
-    for line, fields in cards(path, "SPC1"):
-        found.setdefault(f"SPC {fields[0]}", set()).update(
-            _rows(line, fields[2:], row, "SPC1").tolist())
-    for line, fields in cards(path, "SPC"):
-        points = [fields[k] for k in (1, 4) if k < len(fields) and fields[k]]
-        found.setdefault(f"SPC {fields[0]}", set()).update(
-            _rows(line, points, row, "SPC").tolist())
-    return found

@@ -1,0 +1,124 @@
+"""Loads and supports of Ansys archives: SFE, ACEL, OMEGA, F and D.
+
+SFE gives a pressure on a face of a solid element, positive into it, ACEL the acceleration of the
+frame, so that gravity acts the opposite way, OMEGA an angular velocity about the axes of the model,
+F a force or moment at a node, D displacements that are held at zero.
+"""
+
+import re
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fecontact.core.errors import MeshError
+from fecontact.fem.mesh_files.deck_contents import COMPONENTS, DeckContents
+from fecontact.fem.mesh_files.distributed_loads import DistributedLoads
+
+# Node, label and value; element, face, label, and its values on this line or after R5.0.
+_AT_NODE = re.compile(r"^\s*([DF])\s*,\s*(\d+)\s*,\s*(\w+)\s*,([^\n]*)",
+                      re.MULTILINE | re.IGNORECASE)
+_ON_FACE = re.compile(r"^\s*SFE\s*,\s*(\d+)\s*,\s*(\d+)\s*,\s*(\w+)\s*,\s*(\d*)\s*,([^\n]*)"
+                      r"(?:(?=\n([^\n]*)))?", re.MULTILINE | re.IGNORECASE)
+_OF_ALL = re.compile(r"^\s*(ACEL|OMEGA)\s*,([^\n]*)", re.MULTILINE | re.IGNORECASE)
+_LABELS = {"F": ("FX", "FY", "FZ", "MX", "MY", "MZ"),
+           "D": ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")}
+
+
+@dataclass
+class ArchiveLoads:
+    """Loads and supports in units of the file.
+
+    Attributes
+    ----------
+    forces : list of (int, str, float)
+        Numbers of nodes, components and values.
+    sides : mapping of str to list of (int, int)
+        Numbers of elements and of their faces, by the surface under pressure.
+    supports : mapping of str to list of int
+        Numbers of the nodes that are held in the same components, by their labels.
+    counts : Counter
+        Number of commands of each kind that act.
+    """
+
+    forces: list[tuple[int, str, float]] = field(default_factory=list)
+    sides: dict[str, list[tuple[int, int]]] = field(default_factory=dict)
+    supports: dict[str, list[int]] = field(default_factory=dict)
+    counts: Counter[str] = field(default_factory=Counter)
+    distributed: DistributedLoads = field(default_factory=lambda: DistributedLoads(
+        kinds="F, D of zero, equal PRES of SFE on faces of solid elements, ACEL and OMEGA"))
+
+
+def archive_loads(text: str) -> ArchiveLoads:
+    """Loads and supports in the text of an archive.
+
+    Raises
+    ------
+    MeshError
+        For values that are no numbers.
+    """
+    found = ArchiveLoads()
+    held: dict[int, set[str]] = {}
+    unread = found.distributed.unread
+    for command, node, label, rest in _AT_NODE.findall(text):
+        found.counts[command.upper()] += 1
+        value = (_numbers(command, rest) or [0.0])[0]
+        known = _LABELS[command.upper()]
+        if label.upper() not in (*known, *(["ALL"] if command.upper() == "D" else [])):
+            unread.append(f"{command.upper()} {label.upper()}")
+        elif command.upper() == "F" and value:
+            found.forces.append((int(node), COMPONENTS[known.index(label.upper())], value))
+        elif command.upper() == "D" and value:
+            unread.append(f"D {label.upper()} other than zero")
+        elif command.upper() == "D":
+            held.setdefault(int(node), set()).update(
+                known if label.upper() == "ALL" else [label.upper()])
+    for point, labels in held.items():
+        name = " ".join(["D", *(one for one in _LABELS["D"] if one in labels)])
+        found.supports.setdefault(name, []).append(point)
+    for element, face, label, key, rest, following in _ON_FACE.findall(text):
+        found.counts["SFE"] += 1
+        blocked = rest.strip().upper().startswith("R")
+        values = _numbers("SFE", following.replace(" ", ",") if blocked else rest)
+        if label.upper() != "PRES" or key not in ("", "0", "1") or len({*values}) != 1:
+            unread.append("SFE of another label, or with a pressure that varies")
+        elif values[0]:
+            found.sides.setdefault(found.distributed.surface_of(values[0], "SFE"), []).append(
+                (int(element), int(face)))
+    for command, rest in _OF_ALL.findall(text):
+        x, y, z = (*_numbers(command, rest), 0.0, 0.0, 0.0)[:3]
+        square = x * x + y * y + z * z
+        found.counts[command.upper()] += bool(square)
+        if command.upper() == "ACEL" and square:
+            found.distributed.gravity.append(("", (-x, -y, -z)))
+        elif square:
+            found.distributed.rotations.append(("", square, (0.0, 0.0, 0.0), (x, y, z)))
+    found.counts["BF"] = len(re.findall(r"^\s*BF\s*,", text, re.MULTILINE | re.IGNORECASE))
+    unread += ["BF"] * bool(found.counts["BF"])
+    return found
+
+
+def archive_contents(path: Path) -> DeckContents:
+    """Loads and supports of an archive as those of a deck.
+
+    Raises
+    ------
+    MeshError
+        As in :func:`archive_loads`.
+    """
+    found = archive_loads(path.read_text(encoding="utf-8", errors="replace"))
+    return DeckContents(
+        found.counts, supports=tuple(
+            (name, " ".join(COMPONENTS[_LABELS["D"].index(label)] for label in name.split()[1:]))
+            for name in found.supports),
+        forces=tuple((f"node {node}", component, value)
+                     for node, component, value in found.forces),
+        distributed=found.distributed)
+
+
+def _numbers(command: str, text: str) -> list[float]:
+    """Numbers between commas, without empty places."""
+    try:
+        return [float(word) for word in text.split(",") if word.strip()]
+    except ValueError:
+        raise MeshError(f"A command {command.upper()} holds the values '{text.strip()[:60]}', "
+                        f"which are no numbers.") from None
