@@ -422,7 +422,9 @@ def check_half_spaces(names, printed, folder):
     loop = 9.0 * 1.7 * full**2 / (10.0 * 1e-3 * shear) * (
         1.0 - (1.0 - part) ** (5.0 / 3.0)
         - 5.0 * part / 6.0 * (1.0 + (1.0 - part) ** (2.0 / 3.0)))
-    assert float(printed.split()[-6]) == pytest.approx(loop, rel=0.01)
+    printed = printed.splitlines()
+    assert float(printed[-2].split()[0]) == pytest.approx(loop, rel=0.01)
+    assert printed[-1] == "8 56"
 
 
 CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,

@@ -72,6 +72,8 @@ class Pairing(Summarised):
     report : PairingReport
     swapped : bool
         Whether the nodes lie on the face that was given as the other one, because it is finer.
+    patches : Patches, optional
+        Facets that belong to each contact node of solids.
     """
 
     body: str
@@ -86,6 +88,7 @@ class Pairing(Summarised):
     feet_places: Array
     report: PairingReport
     swapped: bool = False
+    patches: Any = None
 
     def summary(self) -> list[tuple[str, str]]:
         """Names and values of the report."""

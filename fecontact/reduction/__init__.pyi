@@ -16,6 +16,7 @@ from .cyclic.cyclic_basis_from_bases import cyclic_basis_from_bases
 from .cyclic.whole_wheel import WholeWheel
 from .eigenmodes import eigenfrequencies_hz
 from .from_modes import Normalisation, normalisation
+from .half_space_compliance import with_half_space
 from .large_deflections.forces import LargeDeflectionForces
 from .large_deflections.options import LargeDeflections
 from .matrix_files.nastran import grid_places
@@ -77,4 +78,5 @@ __all__ = [
     "rows_from_dofs",
     "sector_modes",
     "tightened",
+    "with_half_space",
 ]

@@ -178,7 +178,7 @@ def paired_solids(
     return {"body": face.label.partition(".")[0], "other": other.label.partition(".")[0],
             "places": patches.centres, "normals": normals, "tangents": tangents, "gaps": gaps,
             "tributary": patches.areas, "nodes": patches.rows(), "feet": feet,
-            "feet_places": feet_places, "report": report}
+            "feet_places": feet_places, "report": report, "patches": patches}
 
 
 def grounded_solid(
@@ -207,7 +207,8 @@ def grounded_solid(
     return {"body": face.label.partition(".")[0], "other": None, "places": patches.centres,
             "normals": normals, "tangents": tangents_of(normals), "gaps": gaps,
             "tributary": patches.areas, "nodes": patches.rows(), "feet": None,
-            "feet_places": patches.centres * [1.0, 1.0, 0.0], "report": report}
+            "feet_places": patches.centres * [1.0, 1.0, 0.0], "report": report,
+            "patches": patches}
 
 
 def check_solids_apart(first: SolidFace, second: SolidFace) -> None:
