@@ -3,7 +3,9 @@
 Each deck is solved twice by ``ccx`` (Debian: calculix-ccx) in a temporary folder, a static step and
 frequencies; ``read_mesh`` reads it too. Ten-node tetrahedra and eight-node bricks, also those with
 incompatible modes, have equal stiffness in both. CalculiX integrates the mass of tetrahedra at
-fewer points, and gives bricks with incompatible modes another mass.
+fewer points, and gives bricks with incompatible modes another mass. Other elements are read as
+others: bricks C3D8R with incompatible modes, C3D20 and C3D20R with 27 nodes, wedges cut into
+tetrahedra; their frequencies alone are compared.
 
 Public decks, which are no part of this package, follow if their files are given: the blade of
 NASA's rotor 37 (one part of fifteen-node wedges, free, beside CalculiX), and the Brake-Reuss beam,
@@ -27,9 +29,18 @@ import fecontact as fc
 from fecontact.fem import SolidBlock
 from fecontact.reduction import eigenfrequencies_hz
 
-# Nodes of the sides S1, S2, ... of tetrahedra and of hexahedra.
+# Nodes of the sides S1, S2, ... of tetrahedra, wedges and hexahedra, and their edges with middles.
 SIDES = {4: ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+         6: ((0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
          8: ((0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 4, 5), (1, 2, 5, 6), (2, 3, 6, 7), (0, 3, 4, 7))}
+EDGES = {4: ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+         6: ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+         8: ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6),
+             (3, 7))}
+# Corners of elements, and whether their edges have middles.
+ELEMENTS_OF = {"C3D10": (4, True), "C3D8": (8, False), "C3D8I": (8, False), "C3D8R": (8, False),
+               "C3D20": (8, True), "C3D20R": (8, True), "C3D6": (6, False), "C3D15": (6, True)}
+SAME = ("C3D10", "C3D8", "C3D8I")
 # Set of all elements of the blade, and frequencies that the author of the beam's deck gives [Hz].
 ELEMENTS, BEAM = "Eall", (70.323, 151.26, 609.25)
 MATERIAL = "*MATERIAL, NAME=STEEL\n*ELASTIC\n2.1e11, 0.3\n*DENSITY\n7850.\n"
@@ -41,6 +52,7 @@ RIGID = f"{HUB}*RIGID BODY, NSET=A_right_N, REF NODE=90001, ROT NODE=90002\n"
 class Case:
     """A deck, its forces and moments at the node set whose displacement is compared.
 
+    ``same`` tells that its elements are the same here; frequencies alone are compared otherwise.
     ``force`` are pairs of the node's component and the value; those of rotations act on TURN.
     """
 
@@ -49,31 +61,39 @@ class Case:
     point: str
     force: tuple[tuple[str, float], ...]
     degree: int = 2
+    same: bool = True
 
 
 def part(name: str, at: float, size: float, element: str, first: int) -> str:
     """A block of 0.1 x 0.04 x 0.03 m from x = ``at`` on, with its sides as surfaces and sets."""
-    kind = "hexahedron" if element.startswith("C3D8") else "tetrahedron"
-    mesh = fc.generate(SolidBlock(0.1, 0.04, 0.03, element_size=size, element=kind)).placed(
-        (at, 0.0, 0.0))
-    body = fc.ElasticBody(mesh, degree=1 if kind == "hexahedron" else 2)
-    cells = body.basis.element_dofs.T if kind == "tetrahedron" else mesh.cells
+    corners, second_order = ELEMENTS_OF[element]
+    mesh = fc.generate(SolidBlock(0.1, 0.04, 0.03, element_size=size, element=(
+        "tetrahedron" if corners == 4 else "hexahedron"))).placed((at, 0.0, 0.0))
+    cells, places = mesh.cells, mesh.nodes
+    if corners == 6:
+        cells = np.concatenate([cells[:, [0, 1, 2, 4, 5, 6]], cells[:, [0, 2, 3, 4, 6, 7]]])
+    sides = cells
+    if second_order:
+        ends = np.sort(cells[:, np.array(EDGES[corners])], axis=2)
+        pairs, number = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
+        cells = np.concatenate([cells, len(places) + number.reshape(len(cells), -1)], axis=1)
+        places = np.concatenate([places, places[pairs].mean(axis=1)])
     text = f"*NODE, NSET={name}\n" + "".join(
-        f"{first + k}, {', '.join(map(repr, place))}\n" for k, place in enumerate(
-            body.nodes.tolist()))
+        f"{first + k}, {', '.join(map(repr, place))}\n" for k, place in enumerate(places.tolist()))
+    # Data of an element have at most 16 numbers a line.
     text += f"*ELEMENT, TYPE={element}, ELSET=E{name}\n" + "".join(
-        f"{first + k}, {', '.join(map(str, row))}\n" for k, row in enumerate(
-            (cells + first).tolist()))
-    for boundary in ("left", "right"):
-        facets = mesh.boundaries[boundary]
-        wanted = {frozenset(facet) for facet in facets.tolist()}
+        f"{first + k}, {', '.join(map(str, row[:15]))}" + (
+            f",\n{', '.join(map(str, row[15:]))}\n" if row[15:] else "\n")
+        for k, row in enumerate((cells + first).tolist()))
+    for boundary, end in (("left", at), ("right", at + 0.1)):
+        wanted = {frozenset(facet) for facet in mesh.boundaries[boundary].tolist()}
         text += f"*SURFACE, NAME={name}_{boundary}\n" + "".join(
-            f"{first + k}, S{side}\n" for k, row in enumerate(cells)
-            for side, corners in enumerate(SIDES[mesh.cells.shape[1]], start=1)
-            if frozenset(row[list(corners)].tolist()) in wanted)
-        nodes = first + np.unique(body.facet_nodes(facets))
+            f"{first + k}, S{side}\n" for k, row in enumerate(sides)
+            for side, of in enumerate(SIDES[corners], start=1)
+            if frozenset(row[list(of)].tolist()) in wanted)
+        nodes = first + np.flatnonzero(np.abs(places[:, 0] - end) < 1e-9)
         text += f"*NSET, NSET={name}_{boundary}_N\n" + "".join(f"{node},\n" for node in nodes)
-    tip = first + int(np.linalg.norm(body.nodes - [at + 0.1, 0.04, 0.03], axis=1).argmin())
+    tip = first + int(np.linalg.norm(places - [at + 0.1, 0.04, 0.03], axis=1).argmin())
     return (f"{text}*NSET, NSET={name}_tip\n{tip},\n*SOLID SECTION, ELSET=E{name}, "
             "MATERIAL=STEEL\n")
 
@@ -81,9 +101,9 @@ def part(name: str, at: float, size: float, element: str, first: int) -> str:
 def cases(size: float) -> Iterator[Case]:
     """Decks of blocks with cells of a size [m]."""
     force = (("x", 300.0), ("y", 100.0), ("z", -200.0))
-    for element in ("C3D10", "C3D8", "C3D8I"):
+    for element in ELEMENTS_OF:
         yield Case(f"block of {element}", part("A", 0.0, size, element, 1), "A_tip", force,
-                   2 if element == "C3D10" else 1)
+                   1 if element.startswith("C3D8") else 2, element in SAME)
     one = part("A", 0.0, size, "C3D10", 1)
     pair = one + part("B", 0.1, 0.8 * size, "C3D10", 30001)
     yield Case("tied blocks", f"{pair}*TIE, NAME=T, POSITION TOLERANCE=1e-4\nB_left, A_right\n",
@@ -157,7 +177,8 @@ def main(quick: bool, public: list[Path]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for case in cases(0.02 if quick else 0.01):
             displacement, frequencies = compared(case, Path(folder))
-            print(f"{case.name:24} {displacement:12.1e} {frequencies:12.1e}")
+            moved = f"{displacement:12.1e}" if case.same else f"{'':12}"
+            print(f"{case.name:24} {moved} {frequencies:12.1e}")
         for deck in public:
             blade = "*SYSTEM" not in deck.read_text().upper()
             off = of_blade(deck, Path(folder)) if blade else of_beam(deck)

@@ -82,6 +82,10 @@ def test_decks_are_solved_as_by_calculix(tmp_path, monkeypatch, capsys):
     for name, displacement, frequencies in rows:
         assert float(displacement) < 1e-6, name
         assert float(frequencies) < (1e-2 if "C3D8I" in name else 5e-4), name
+    others = re.findall(r"^block of (\S+) +(\S+)$", printed, re.MULTILINE)
+    assert [name for name, _ in others] == ["C3D8R", "C3D20", "C3D20R", "C3D6", "C3D15"]
+    for name, frequencies in others:
+        assert float(frequencies) < {"C3D8R": 0.2, "C3D6": 0.4, "C3D15": 0.02}.get(name, 5e-3)
 
 
 def test_every_benchmark_is_here():

@@ -8,6 +8,7 @@ from solid_blocks import block_mesh
 from fecontact import ElasticBody, MeshError, modal_basis, read_mesh
 from fecontact.fem.mesh_files.cut_cells import PYRAMID, SHAPES, WEDGE, cut_into_tetrahedra
 from fecontact.reduction import eigenfrequencies_hz
+from fecontact.study.imported import imported
 
 SIZE = (0.2, 0.03, 0.02)
 
@@ -148,6 +149,27 @@ def test_mixed_meshes_are_cut_into_tetrahedra(tmp_path, form, seed):
     assert mesh.volume == pytest.approx(1.0 + 1.0 / 3.0 + 0.5 + 1.0 / 6.0, rel=1e-12)
     assert len(mesh.outline) == 2 * 4 + 4 + (2 * 2 + 1) + 3
     assert len(mesh.curved_edges) == 0
+
+
+@pytest.mark.parametrize(("corners", "order", "kind", "note"), [
+    (6, 1, "C3D6", "64 cells C3D6 are cut into tetrahedra, quadratic ones that are softer, by"),
+    (6, 2, "C3D15", "64 cells C3D15 are cut into quadratic tetrahedra, which raises frequencies"),
+    (8, 1, "C3D8R", "32 bricks C3D8R with one point become second-order hexahedra, or bricks with"),
+    (8, 1, "C3D8I", "32 bricks C3D8I become second-order hexahedra, of nearly the same"),
+    (8, 1, "C3D8", None),
+])
+def test_an_import_tells_elements_that_are_read_as_others(tmp_path, corners, order, kind, note):
+    block = block_mesh((8, 2, 2), SIZE)
+    nodes, cells = wedges((8, 2, 2)) if corners == 6 else (block.nodes, block.cells)
+    if order == 2:
+        nodes, cells = second_order(nodes, cells, WEDGE)
+    path = deck(tmp_path / "a.inp", nodes, cells)
+    path.write_text(path.read_text().replace("TYPE=C3D8", f"TYPE={kind}"))
+    found = imported(path)
+    assert dict(found.contents.elements) == {kind: len(cells)}
+    assert [one.startswith(note) for one in found.notes] == ([True] if note else [])
+    if note:
+        assert f"# {note}" in found.toml(tmp_path)
 
 
 def test_folded_wedges_and_pyramids_are_refused(tmp_path):
