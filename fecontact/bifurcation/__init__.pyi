@@ -47,6 +47,9 @@ from .orbits.from_run import periodic_motion
 from .orbits.motions import PeriodicMotion
 from .orbits.samples import amplitude, observe, quantity_range
 from .response_options import ResponseSettings
+from .tori.branches import torus_branch
+from .tori.method import SecondExcitation, TorusBalance
+from .tori.motion import TorusMotion, torus_motion
 from .tree import BranchTree, branch_tree
 
 __all__ = [
@@ -82,8 +85,11 @@ __all__ = [
     "Resonance",
     "ResonanceCurve",
     "ResponseSettings",
+    "SecondExcitation",
     "Shooting",
     "StabilityMap",
+    "TorusBalance",
+    "TorusMotion",
     "UnresolvedPoint",
     "VectorField",
     "WaveField",
@@ -111,6 +117,8 @@ __all__ = [
     "quantity_range",
     "resonance_curve",
     "stability_map",
+    "torus_branch",
+    "torus_motion",
     "vector_field",
     "wheel_motion",
     "wheel_stability",

@@ -29,7 +29,7 @@ def common_period(system: ContactSystem) -> float | None:
         longest.
     """
     require_kind("common_period", ContactSystem, system=system)
-    return _common([period for _, period in _periods(system)])
+    return common_multiple([period for _, period in source_periods(system)])
 
 
 def drive_sets_period(system: ContactSystem) -> bool:
@@ -40,14 +40,20 @@ def drive_sets_period(system: ContactSystem) -> bool:
     AnalysisError
         As :func:`common_period`.
     """
-    names = [name for name, _ in _periods(system)]
+    names = [name for name, _ in source_periods(system)]
     own = [f"drive.motion_{axis}" for axis in "xyz"
            if getattr(system.drive, f"motion_{axis}") is None]
     return type(system.drive) is Drive and bool(names) and set(names) <= set(own)
 
 
-def _periods(system: ContactSystem) -> list[tuple[str, float]]:
-    """Names of the excitations that repeat in time, each with its period [s]."""
+def source_periods(system: ContactSystem) -> list[tuple[str, float]]:
+    """Names of the excitations that repeat in time, each with its period [s].
+
+    Raises
+    ------
+    AnalysisError
+        If one of them is not periodic.
+    """
     drive, ground = system.drive, system.ground
     given: list[tuple[str, Any]] = [
         (f"drive.motion_{axis}", motion)
@@ -115,7 +121,14 @@ def _repeat_length(name: str, shape: Profile) -> float:
                         f"a Sine, a FourierSeries or a periodic MeasuredProfile.")
 
 
-def _common(periods: list[float]) -> float | None:
+def common_multiple(periods: list[float]) -> float | None:
+    """Common period of some periods [s]; None for none.
+
+    Raises
+    ------
+    AnalysisError
+        If they have no common multiple up to 1000 times the longest.
+    """
     if not periods:
         return None
     if len(periods) == 1:

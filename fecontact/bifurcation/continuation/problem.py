@@ -29,6 +29,10 @@ class BranchStatus(Enum):
                      "names it. Beyond it no orbit of this kind goes on.")
     SADDLE_NODE = ("The saddle of the homoclinic orbits meets another equilibrium in a fold: there "
                    "the curve ends.")
+    SINGLE_FREQUENCY = ("The tori shrink to a periodic orbit: the branch ends at a Neimark-Sacker "
+                        "point.")
+    UNRESOLVED_TORUS = ("The harmonics no longer resolve the torus: take more of them, or look "
+                        "whether it breaks up here, as where its frequencies lock.")
     STOPPED = "The branch reached a point at which it was to stop."
     CLOSED = ("The branch came back to its start, or to where it would run through the same orbits "
               "again.")

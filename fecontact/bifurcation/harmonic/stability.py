@@ -50,7 +50,14 @@ def _collocation(radau: bool) -> tuple[Array, Array, Array]:
     if not radau:
         chosen = rule(_DEGREE)
         return chosen.points, chosen.values, chosen.slopes
-    degree = 2
+    return radau_rule(2)
+
+
+@cache
+def radau_rule(degree: int) -> tuple[Array, Array, Array]:
+    """Radau's points (s,) in (0, 1], the last of which is 1, and values and slopes (s, s + 1) there
+    of polynomials through s + 1 equidistant nodes.
+    """
     legendre = np.polynomial.legendre.Legendre
     roots = (legendre.basis(degree) - legendre.basis(degree - 1)).roots()
     points = np.sort((1.0 + np.real(roots)) / 2.0)

@@ -1,0 +1,314 @@
+"""Branches of tori, from Neimark-Sacker points, runs, orbits and other tori."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.points import NeimarkSackerPoint
+from fecontact.bifurcation.continuation.problem import (
+    ContinuationOptions,
+    options_of,
+    sizes_of,
+    width_of,
+)
+from fecontact.bifurcation.continuation.pseudo_arclength import inside
+from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.harmonic.layout import Layout
+from fecontact.bifurcation.orbits.branches import as_motion
+from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.tori.excitation import Excitation, excitation_of
+from fecontact.bifurcation.tori.from_run import fitted
+from fecontact.bifurcation.tori.method import SecondExcitation, TorusBalance
+from fecontact.bifurcation.tori.motion import torus_motion
+from fecontact.bifurcation.tori.problem import TorusProblem
+from fecontact.bifurcation.tori.series import with_orders
+from fecontact.core.checks import require_flags, require_kind
+from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
+from fecontact.core.resources.blas_threads import one_blas_thread
+from fecontact.core.types import Array, ArrayLike
+from fecontact.integrate.field_runs.field_run import FieldRun
+from fecontact.integrate.trajectory import Trajectory
+from fecontact.system.elastic_sliders import slider_counts
+from fecontact.system.fields.vector_field import VectorField, require_field
+
+# Factors of the first step, tried in this order to leave a Neimark-Sacker point.
+_FIRST_STEPS = (1.0, 0.3, 0.1, 3.0)
+_SAMPLES = 2001
+# Newton's method at fixed parameter: steps, and smallest factor of a step.
+_CORRECTIONS, _SMALLEST = 30, 1e-3
+# Part of the torus in the harmonics of the second frequency below which it is an orbit.
+_ORBIT = 1e-6
+
+
+@one_blas_thread
+def torus_branch(
+    field: VectorField,
+    start: BranchPoint | PeriodicMotion | Trajectory | FieldRun | tuple[ArrayLike, ArrayLike],
+    parameter: str | None = None, *, second: str | SecondExcitation | None = None,
+    method: TorusBalance | None = None, options: ContinuationOptions | None = None,
+    bounds: tuple[float, float] | None = None, scales: ArrayLike | None = None,
+    width: float | None = None, direction: float = 1.0, both: bool = False,
+) -> Branch:
+    """Follow quasi-periodic motions with two frequencies over a parameter.
+
+    Points store 'frequency_1' and 'frequency_2' [Hz], 'minimum' and 'maximum' (d,),
+    'truncation_error' and 'sampling_error' (relative to the torus), 'multipliers' (d,) (mean growth
+    per period 1 / f1), 'stable' and 'trivial_error'. :func:`torus_motion` gives the motion.
+
+    Parameters
+    ----------
+    field : VectorField
+        The system, excited with one period or not at all, or with two by ``second``.
+    start : BranchPoint, PeriodicMotion, Trajectory, FieldRun or (times, states)
+        A Neimark-Sacker point of orbits by any method; a point of a branch of tori; a steady
+        quasi-periodic run; with ``second`` also an orbit, as one without the second excitation.
+    parameter : str, optional
+        The parameter to vary; by default that of the point, or the only one of the field.
+    second : str or SecondExcitation, optional
+        A second excitation of any frequency: of contact systems 'drive', 'load' or one of their
+        signals, such as 'load.forces.0'; all others, and the ground, are the first one.
+    method : TorusBalance, optional
+        Harmonics and samples; by default those of the point's branch, or 7 and 30.
+    options, bounds : ContinuationOptions and (float, float), optional
+        Step lengths, tolerances, stopping conditions; range of the parameter in place of theirs.
+    scales, width, direction, both
+        See :func:`orbit_branch`.
+
+    Raises
+    ------
+    InputError, AnalysisError
+        If the start or the excitations do not suit, for friction by elastic Coulomb elements, or
+        if no torus is found near the start.
+    """
+    require_field(field)
+    require_kind("torus_branch", (BranchPoint, PeriodicMotion, Trajectory, FieldRun, tuple),
+                 start=start)
+    require_kind("torus_branch", (TorusBalance, type(None)), method=method)
+    require_kind("torus_branch", (str, SecondExcitation, type(None)), second=second)
+    require_finite("torus_branch", direction=direction)
+    require_flags("torus_branch", both=both)
+    if isinstance(field, ContactField) and slider_counts(field.system()).any():
+        raise InputError("torus_branch: elastic Coulomb elements (JenkinsFriction, IwanFriction, "
+                         "FourParameterIwanFriction) switch along a motion, which series of two "
+                         "angles do not resolve; take a smooth friction law, or "
+                         "fecontact.simulate.")
+    chosen = options_of(options, bounds)
+    name = (start.branch.parameter_name if parameter is None and isinstance(start, BranchPoint)
+            else field.parameter_or_only(parameter))
+    excitation, free = excitation_of(field, second), field.index(name)
+    given: Any = scales, width, chosen
+    if isinstance(start, BranchPoint) and "torus_harmonics" in start.branch.attributes:
+        problem, u, tangent = _from_torus(excitation, start, free, method, given)
+        if name == start.branch.parameter_name:
+            return _followed(problem, u, float(np.copysign(1.0, direction)) * tangent, chosen, name,
+                             1.0, both)
+        return _followed(*_corrected(problem, u), None, chosen, name, direction, both)
+    own = method or TorusBalance()
+    if isinstance(start, NeimarkSackerPoint) and second is None:
+        if both or name != start.branch.parameter_name:
+            raise InputError(f"{start.place} is where tori begin: they are followed over its own "
+                             f"parameter, {start.branch.parameter_name!r}, to one side.")
+        return _from_neimark_sacker(excitation, start, free, own, given)
+    if isinstance(start, BranchPoint) and not start.is_orbit:
+        raise InputError(f"{start.place} has no tori to follow: take a point of the kind "
+                         f"'Neimark-Sacker', one of a branch of tori, or a run.")
+    if isinstance(start, BranchPoint):
+        start = start.orbit(field, _SAMPLES)
+    motion = as_motion(start)
+    if motion.period is not None and second is None:
+        raise InputError("torus_branch: a periodic motion starts tori only with a second "
+                         "excitation, second=; else give a Neimark-Sacker point or a "
+                         "quasi-periodic run.")
+    problem, u = _from_motion(excitation, motion, free, own, given)
+    problem, u = _corrected(problem, u)
+    return _followed(problem, u, None, chosen, name, direction, both)
+
+
+def _layout(field: VectorField) -> Layout:
+    modes = field.system().basis.modes if isinstance(field, ContactField) else 0
+    return Layout(field.dimension, modes)
+
+
+def _problem(
+    excitation: Excitation, values: Array, free: int, method: TorusBalance, X: Array,
+    frequencies: tuple[float, float], amplitudes: Array, given: Any,
+) -> TorusProblem:
+    scales, width, options = given
+    sizes, limits = sizes_of(scales, amplitudes + 1e-300)
+    return TorusProblem(
+        excitation, values, free, method.orders, method.counts, X,
+        np.concatenate([sizes, frequencies, [width_of(width, options, values[free])]]),
+        _layout(excitation.field), method.stability, method.tolerance, limits)
+
+
+def _unknowns(problem: TorusProblem, X: Array, frequencies: tuple[float, float]) -> Array:
+    return np.concatenate([X.reshape(-1), [frequencies[i] for i in problem.unknown],
+                           [problem.values[problem.free]]])
+
+
+def _of_orbit(
+    layout: Layout, motion: PeriodicMotion, orders: tuple[int, int]
+) -> tuple[Array, Array]:
+    """Coefficients (L, b) of a periodic motion as a torus, and amplitudes (d,) of its states."""
+    c = motion.harmonics(min(orders[0], max((len(motion.times) - 3) // 2, 0)))[:, layout.columns]
+    X = np.zeros((2 * len(c) - 1, c.shape[1]))
+    X[0], X[1::2], X[2::2] = c[0].real, c[1:].real, -c[1:].imag
+    return with_orders(X, (len(c) - 1, 0), orders), motion.amplitudes
+
+
+def _values(field: VectorField, motion: PeriodicMotion, free: int, options: Any) -> Array:
+    given = field.values if motion.parameter_values is None else motion.parameter_values.copy()
+    if given.shape != field.values.shape:
+        raise InputError(f"parameter_values of the motion must be {len(field.values)} numbers, one "
+                         f"for each parameter of the field, not of shape {given.shape}.")
+    given[free] = inside(float(given[free]), options)
+    return given
+
+
+def _from_neimark_sacker(
+    excitation: Excitation, point: NeimarkSackerPoint, free: int, method: TorusBalance, given: Any
+) -> Branch:
+    """Tori along the eigenfunction of the critical multipliers."""
+    field, options = excitation.field, given[2]
+    motion = point.orbit(field, _SAMPLES)
+    assert motion.period is not None
+    excitation = replace(excitation, periods=motion.periods)
+    X, amplitudes = _of_orbit(_layout(field), motion, method.orders)
+    frequencies = (1.0 / motion.period, point.angle / (2.0 * np.pi * motion.period))
+    values = point.parameter_values(field)
+    problem = _problem(excitation, values, free, method, X, frequencies, amplitudes, given)
+    u = _unknowns(problem, X, frequencies)
+    leaving = np.zeros_like(X)
+    rows = np.arange(2 * method.orders[0] + 1, 6 * method.orders[0] + 3)
+    matrix = problem.linearise(u).matrix[rows][:, :, rows]
+    n = matrix.shape[0] * matrix.shape[1]
+    sizes = np.tile(problem.scales[problem.layout.columns], len(rows))
+    square = matrix.reshape(n, n) * sizes
+    square /= np.abs(square).max(axis=1)[:, None]
+    leaving[rows] = (sizes * np.linalg.svd(square)[2][-1]).reshape(len(rows), -1)
+    tangent = np.zeros_like(u)
+    tangent[: problem.size] = leaving.reshape(-1)
+    tangent /= np.sqrt(problem.weights() @ tangent**2)
+    failed: FecontactError = InputError("There is nothing to start from.")
+    for part in _FIRST_STEPS:
+        step = min(max(part * options.step, options.smallest_step), options.largest_step)
+        beside = u + step * tangent
+        try:
+            return _followed(replace(problem, reference=problem.coefficients(beside).copy()),
+                             beside, tangent, replace(options, step=step),
+                             point.branch.parameter_name, 1.0, False)
+        except FecontactError as error:
+            failed = error
+    raise failed
+
+
+def _from_motion(
+    excitation: Excitation, motion: PeriodicMotion, free: int, method: TorusBalance, given: Any
+) -> tuple[TorusProblem, Array]:
+    """Problem and first guess from an orbit, or from a run."""
+    field, layout = excitation.field, _layout(excitation.field)
+    values = _values(field, motion, free, given[2])
+    if motion.period is not None:
+        excitation = replace(excitation, periods=motion.periods)
+    known = excitation.frequencies(values)
+    if motion.states.shape[1] != field.dimension:
+        raise InputError(f"torus_branch: the motion has {motion.states.shape[1]} states, but the "
+                         f"field {field.dimension}.")
+    if motion.period is not None:
+        X, amplitudes = _of_orbit(layout, motion, method.orders)
+        assert known[0] is not None
+        assert known[1] is not None
+        frequencies = known[0], known[1]
+    else:
+        fit, frequencies, orders = fitted(motion.times, motion.states[:, layout.columns], known,
+                                          method.orders)
+        X, amplitudes = with_orders(fit, orders, method.orders), motion.amplitudes
+    problem = _problem(excitation, values, free, method, X, frequencies, amplitudes, given)
+    return problem, _unknowns(problem, X, frequencies)
+
+
+def _from_torus(
+    excitation: Excitation, point: BranchPoint, free: int, method: TorusBalance | None, given: Any
+) -> tuple[TorusProblem, Array, Array]:
+    """Problem, unknowns and tangent of a point of a branch of tori, on other harmonics perhaps."""
+    known, motion = point.branch.attributes, torus_motion(point)
+    excitation = replace(excitation, periods=int(known["periods"]))
+    H1, H2 = map(int, known["torus_harmonics"])
+    N1, N2 = map(int, known["torus_samples"])
+    own = method or TorusBalance((H1, H2), (N1, N2), bool(known["torus_multipliers"]),
+                                 float(known["tolerance"]))
+    values, layout = point.parameter_values(excitation.field), _layout(excitation.field)
+    X = with_orders(motion.coefficients[:, layout.columns], motion.harmonics, own.orders)
+    scales = np.asarray(known["scales"], dtype=float)
+    frequencies = float(motion.frequencies[0]), float(motion.frequencies[1])
+    problem = _problem(excitation, values, free, own, X, frequencies, scales[: layout.states],
+                       (given[0], given[1] or float(scales[-1]), given[2]))
+    u = _unknowns(problem, X, frequencies)
+    tangent = np.zeros_like(u)
+    L = len(motion.coefficients)
+    along = point.tangent[: L * layout.harmonic].reshape(L, -1)
+    tangent[: problem.size] = with_orders(along, motion.harmonics, own.orders).reshape(-1)
+    tangent[problem.size :] = point.tangent[L * layout.harmonic :]
+    return problem, u, tangent / np.sqrt(problem.weights() @ tangent**2)
+
+
+def _corrected(problem: TorusProblem, u: Array) -> tuple[TorusProblem, Array]:
+    """The torus near u at fixed parameter, by Newton's method with shortened steps.
+
+    Raises
+    ------
+    AnalysisError
+        If it does not converge, or to an orbit.
+    """
+    row = np.zeros_like(u)
+    row[-1] = 1.0
+    weights = problem.weights()
+    where = f"at {list(problem.field.parameters)[problem.free]} = {u[-1]:.6g}"
+    linearised = problem.linearise(u)
+    norm = float(np.linalg.norm(linearised.residual))
+    for _ in range(_CORRECTIONS):
+        step = linearised.solve(row, -np.append(linearised.residual, 0.0))
+        size = float(np.sqrt(weights @ step**2))
+        if not np.isfinite(size):
+            break
+        factor, small = 1.0, size < 1e-9 * (1.0 + float(np.sqrt(weights @ u**2)))
+        while True:
+            try:
+                trial = problem.linearise(u + factor * step)
+                left = float(np.linalg.norm(trial.residual))
+            except FecontactError:
+                left = np.inf
+            if left < (1.0 - 0.1 * factor) * norm or (small and np.isfinite(left)):
+                break
+            factor *= 0.5
+            if factor < _SMALLEST:
+                raise AnalysisError(f"No torus was found {where}: Newton's method does not "
+                                    f"converge; start nearer to it, or take other harmonics.")
+        u, linearised, norm = u + factor * step, trial, left
+        if small:
+            X = problem.coefficients(u) / problem.scales[problem.layout.columns]
+            if 1 in problem.unknown and np.abs(X[2 * problem.orders[0] + 1 :]).max() < (
+                    _ORBIT * np.abs(X).max()):
+                break
+            return replace(problem, reference=problem.coefficients(u).copy()), u
+    raise AnalysisError(f"No torus was found {where}: Newton's method ends at a periodic orbit or "
+                        f"nowhere; start from a steady quasi-periodic run.")
+
+
+def _followed(
+    problem: TorusProblem, u: Array, tangent: Array | None, options: ContinuationOptions,
+    name: str, direction: float, both: bool,
+) -> Branch:
+    field = problem.field
+    attributes: dict[str, Any] = {
+        "state_names": list(field.state_names), "parameter_names": list(field.parameters),
+        "parameter_values": problem.values, "scales": problem.scales,
+        "torus_harmonics": np.array(problem.orders), "torus_samples": np.array(problem.samples),
+        "torus_multipliers": int(problem.multipliers), "tolerance": problem.tolerance,
+        "displacements": problem.layout.displacements, "periods": problem.excitation.periods}
+    return continue_branch(problem, u, options, name=name, tangent=tangent, direction=direction,
+                           both=both, attributes=attributes)

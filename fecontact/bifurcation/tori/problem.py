@@ -1,0 +1,442 @@
+"""Continuation problem of tori by harmonic balance with two base frequencies."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
+from fecontact.bifurcation.harmonic.few_contacts import Factors
+from fecontact.bifurcation.harmonic.layout import Layout
+from fecontact.bifurcation.orbits.same_orbit import shrunk
+from fecontact.bifurcation.tori.excitation import Excitation
+from fecontact.bifurcation.tori.series import (
+    complex_coefficients,
+    means,
+    on_lines,
+    orders,
+    products,
+    projected,
+    turned,
+)
+from fecontact.bifurcation.tori.stability import TorusStability, stability_of
+from fecontact.core.errors import AnalysisError
+from fecontact.core.types import Array
+
+# Relative step of differences in a parameter that changes a prescribed frequency.
+_DIFFERENCE = 1e-5
+# Points per harmonic among which extremes are sought.
+_FINE = 8
+# Test function whose zero ends a branch of tori that shrink to an orbit.
+_SHRINKS = "torus shrinks"
+
+
+@dataclass(frozen=True, eq=False)
+class TorusProblem(Problem):
+    """Equations of a torus X(theta1, theta2), along which theta_i' = 2 pi f_i.
+
+    With D = 2 pi (f1 d/dtheta1 + f2 d/dtheta2), displacements q and other states y are Fourier
+    series, velocities are D q. The residuals D D q - f_v and D y - f_y have no part in the
+    harmonics of the series. Each unknown frequency f_i has the phase condition <X, dX_0/dtheta_i> =
+    0 with the torus X_0 before.
+
+    The unknowns are ``u = [coefficients L b, unknown frequencies [Hz], parameter]``.
+
+    Attributes
+    ----------
+    excitation : Excitation
+        Field and prescribed frequencies.
+    values : (k,) array
+        Parameters; the free one is taken from u.
+    free : int
+        Index of the free parameter.
+    orders, samples : (int, int)
+        H1, H2 and N1, N2.
+    reference : (L, b) array
+        Coefficients of the torus that fixes the phases.
+    scales : (d + 3,) array
+        Scales in the step length: of each state, of both frequencies and of the parameter.
+    layout : Layout
+        How states become unknowns; internal variables are series.
+    multipliers : bool
+        Whether points have multipliers.
+    tolerance : float
+        Truncation error at which the branch ends.
+    limits : (d,) array, optional
+        Upper limits up to which the scales of the states grow; None keeps them.
+    """
+
+    excitation: Excitation
+    values: Array
+    free: int
+    orders: tuple[int, int]
+    samples: tuple[int, int]
+    reference: Array
+    scales: Array
+    layout: Layout
+    multipliers: bool = True
+    tolerance: float = 0.05
+    limits: Array | None = None
+
+    keeps_matrix: ClassVar[bool] = True
+    ends: ClassVar[Mapping[str, BranchStatus]] = {_SHRINKS: BranchStatus.SINGLE_FREQUENCY}
+
+    @property
+    def field(self) -> Any:
+        """The field of the branch."""
+        return self.excitation.field
+
+    @property
+    def size(self) -> int:
+        """Number L b of coefficients."""
+        return self.reference.size
+
+    @cached_property
+    def unknown(self) -> tuple[int, ...]:
+        """Which of the frequencies 0 and 1 are unknowns, in their order in u."""
+        return tuple(i for i, f in enumerate(self.excitation.frequencies(self.values))
+                     if f is None)
+
+    @property
+    def common(self) -> int:
+        """Number of unknowns beside the series."""
+        return 1 + len(self.unknown)
+
+    @cached_property
+    def pairs(self) -> Any:
+        """Pairs (K, 2) of the harmonics."""
+        return orders(*self.orders)
+
+    def coefficients(self, u: Array) -> Array:
+        """Coefficients (L, b) of q and y."""
+        return u[: self.size].reshape(self.reference.shape)
+
+    def parameters(self, u: Array) -> Array:
+        """Parameter values (k,)."""
+        values = self.values.copy()
+        values[self.free] = u[-1]
+        return values
+
+    def frequencies(self, u: Array) -> tuple[float, float]:
+        """f1 and f2 [Hz]."""
+        found = list(self.excitation.frequencies(self.parameters(u)))
+        for place, i in enumerate(self.unknown):
+            found[i] = float(u[self.size + place])
+        first, second = found
+        assert first is not None
+        assert second is not None
+        return first, second
+
+    def ratio(self, frequencies: tuple[float, float]) -> float:
+        """Ratio r of the lines on which the equations are evaluated; see `.series`."""
+        # Without a second excitation the rates do not change across a torus but by its states.
+        return 0.0 if self.excitation.shifted is None else frequencies[1] / frequencies[0]
+
+    def whole(self, X: Array, frequencies: tuple[float, float]) -> Array:
+        """Coefficients (L, d) of all states."""
+        m = self.layout.displacements
+        if not m:
+            return X
+        turns = 2.0 * np.pi * self.pairs @ np.array(frequencies)
+        return np.concatenate([X[:, :m], turned(X[:, :m], turns), X[:, m:]], axis=1)
+
+    def states(
+        self, u: Array, taus: Array, count: int, ratio: float
+    ) -> Array:
+        """States (count, P, d) on lines at tau (P,)."""
+        c = complex_coefficients(self.whole(self.coefficients(u), self.frequencies(u)),
+                                 *self.orders)
+        return on_lines(c, taus, count, ratio)
+
+    @cached_property
+    def _weights(self) -> Array:
+        sizes = self.scales[self.layout.columns] ** -2.0
+        over = np.full((len(self.reference), 1), 0.5)
+        over[0] = 1.0
+        tail = [self.scales[self.layout.states + i] for i in self.unknown] + [self.scales[-1]]
+        return np.concatenate([(over * sizes).reshape(-1), np.array(tail) ** -2.0])
+
+    def weights(self) -> Array:
+        """Weights of the inner product: mean over the torus of scaled states; f; parameter."""
+        return self._weights
+
+    @cached_property
+    def phase_rows(self) -> Array:
+        """Rows (a, L b) of the phase conditions."""
+        rows = [turned(self.reference, self.pairs[:, i].astype(float))
+                * self.scales[self.layout.columns] ** -2.0 for i in self.unknown]
+        return np.array([row.reshape(-1) / (np.abs(row).max() or 1.0) for row in rows]
+                        ).reshape(len(rows), self.size)
+
+    def linearise(self, u: Array) -> "TorusLinearisation":
+        """Residual and linearisation at u, each computed on demand."""
+        if not min(self.frequencies(u)) > 0.0:
+            raise AnalysisError("A frequency of the torus became negative.")
+        return TorusLinearisation(self, u)
+
+    def adapted(self, u: Array, tangent: Array) -> "tuple[TorusProblem, Array, Array]":
+        """The problem for the next step, with the phase conditions at u."""
+        scales, X = self.scales, self.coefficients(u)[1:]
+        if self.limits is not None:
+            sizes = scales[:-3].copy()
+            sizes[self.layout.columns] = np.sqrt(np.einsum("ki,ki->i", X, X))
+            scales = enlarged(scales, sizes, self.limits)
+        return replace(self, reference=self.coefficients(u).copy(), values=self.parameters(u),
+                       scales=scales), u, tangent
+
+    @cached_property
+    def _second(self) -> int:
+        """First row of the coefficients with k2 > 0."""
+        return 2 * self.orders[0] + 1
+
+    def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
+        """Frequencies, extremes of the states, errors and stability."""
+        frequencies = self.frequencies(u)
+        fine = [_FINE * H for H in self.orders]
+        x = self.states(u, np.arange(fine[0]) / fine[0], fine[1], 0.0)
+        found = {"frequency_1": frequencies[0], "frequency_2": frequencies[1],
+                 "minimum": x.min(axis=(0, 1)), "maximum": x.max(axis=(0, 1)),
+                 "truncation_error": linearisation.truncation_error,
+                 "sampling_error": linearisation.sampling_error}
+        if self.multipliers:
+            stability: TorusStability = linearisation.stability
+            found |= {"multipliers": stability.multipliers, "stable": stability.stable,
+                      "trivial_error": stability.trivial_error}
+        return found
+
+    def tests(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, float]:
+        """Test function of tori that shrink to an orbit."""
+        if 1 not in self.unknown:
+            return {}
+        scale = self.scales[self.layout.columns]
+        before = self.reference[self._second :] / scale
+        if not before.any():
+            return {}
+        return {_SHRINKS: shrunk(np.ones(1), self.coefficients(u)[self._second :] / scale, before)}
+
+    def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
+        """At tori that their harmonics do not resolve."""
+        return (BranchStatus.UNRESOLVED_TORUS
+                if linearisation.truncation_error > self.tolerance else None)
+
+    def note(self, points: Sequence[Any]) -> str:
+        """Note on the errors of the tori of a branch; empty if they are small."""
+        notes = []
+        for name, most, remedy in (("truncation_error", 0.01, "harmonics"),
+                                   ("sampling_error", 0.005, "samples")):
+            worst = max((float(point.values[name]) for point in points), default=0.0)
+            if worst > most:
+                notes.append(f"The {name.replace('_', ' ')} of the tori reaches {worst:.2g} of "
+                             f"their size; take more {remedy}.")
+        if self.multipliers and any(float(point.values["trivial_error"]) > 0.05
+                                    for point in points):
+            notes.append("Multipliers that should be one are off by more than 0.05 at some points: "
+                         "their stability is uncertain.")
+        return " ".join(notes)
+
+
+class TorusLinearisation:
+    """Residual of the equations at u, and solutions of systems with their derivative."""
+
+    def __init__(self, problem: TorusProblem, u: Array) -> None:
+        self.problem, self.u = problem, u
+        self.frequencies = problem.frequencies(u)
+        self.ratio = problem.ratio(self.frequencies)
+        self._factors: tuple[Factors, Array] | None = None
+
+    @cached_property
+    def _taus(self) -> Array:
+        return np.arange(self.problem.samples[0]) / self.problem.samples[0]
+
+    @cached_property
+    def _states(self) -> Array:
+        return self.problem.states(self.u, self._taus, self.problem.samples[1], self.ratio)
+
+    def _evaluated(self, active: tuple[int, ...], derivatives: bool) -> tuple[Array, Array, Array]:
+        return self.problem.excitation.on_lines(
+            self._taus, self._states, self.problem.parameters(self.u), self.frequencies[0], active,
+            derivatives=derivatives)
+
+    @cached_property
+    def derivatives(self) -> tuple[Array, Array, Array]:
+        """Rates and derivatives at the samples; see :meth:`Excitation.on_lines`."""
+        return self._evaluated((self.problem.free,), True)
+
+    @cached_property
+    def rates(self) -> Array:
+        """Rates (N2, N1, b) of the equations at the samples."""
+        f = (self.derivatives[0] if "derivatives" in self.__dict__
+             else self._evaluated((), False)[0])
+        return f[:, :, self.problem.layout.rows]
+
+    @cached_property
+    def _turns(self) -> Array:
+        return np.asarray(2.0 * np.pi * self.problem.pairs @ np.array(self.frequencies))
+
+    @cached_property
+    def balance(self) -> Array:
+        """Balance (L b,) of the harmonics."""
+        problem, m = self.problem, self.problem.layout.displacements
+        X = problem.coefficients(self.u)
+        moved = turned(X, self._turns)
+        moved[:, :m] = turned(moved[:, :m], self._turns)
+        return np.asarray((moved - projected(self.rates, *problem.orders, self.ratio)).reshape(-1))
+
+    @cached_property
+    def residual(self) -> Array:
+        """Residual (L b + a,): balance and phase conditions."""
+        return np.append(self.balance, self.problem.phase_rows @ self.u[: self.problem.size])
+
+    @cached_property
+    def _blocks(self) -> tuple[Array, Array, Array]:
+        """Derivatives (N2, N1, b, b) of the rates to q and y, (N2, N1, b, m) to velocities, and
+        (N2, N1, b) to the parameter.
+        """
+        layout, m = self.problem.layout, self.problem.layout.displacements
+        _, J, by_parameter = self.derivatives
+        of = J[:, :, layout.rows]
+        return (of[..., layout.columns], of[..., m : 2 * m],
+                by_parameter[:, :, layout.rows, 0])
+
+    @cached_property
+    def matrix(self) -> Array:
+        """Derivatives (L, b, L, b) of the balance to the coefficients."""
+        problem, m, k = self.problem, self.problem.layout.displacements, self.problem.pairs
+        by_state, by_velocity, _ = self._blocks
+        twice = 2 * problem.orders[0], 2 * problem.orders[1]
+        cc, cs, sc, ss = products(means(by_state, *twice, self.ratio), k)
+        if m:
+            turn = self._turns[None, :, None, None]
+            vcc, vcs, vsc, vss = products(means(by_velocity, *twice, self.ratio), k)
+            cc[..., :m] -= turn * vcs
+            cs[..., :m] += turn * vcc
+            sc[..., :m] -= turn * vss
+            ss[..., :m] += turn * vsc
+        L, b = problem.reference.shape
+        out = np.empty((L, b, L, b))
+        cosines, sines = np.append(0, np.arange(1, L, 2)), np.arange(2, L, 2)
+        for rows, columns, part in ((cosines, cosines, cc), (cosines, sines, cs[:, 1:]),
+                                    (sines, cosines, sc[1:]), (sines, sines, ss[1:, 1:])):
+            out[rows[:, None], :, columns[None, :], :] = -part
+        turns = self._turns[1:, None]
+        q, y = np.arange(m), np.arange(m, b)
+        for rows in (cosines[1:, None], sines[:, None]):
+            out[rows, q, rows, q] -= turns**2
+        out[cosines[1:, None], y, sines[:, None], y] += turns
+        out[sines[:, None], y, cosines[1:, None], y] -= turns
+        return out
+
+    @cached_property
+    def _by_common(self) -> Array:
+        """Derivatives (L b, a + 1) of the balance to unknown frequencies and the parameter."""
+        problem, m = self.problem, self.problem.layout.displacements
+        _, by_velocity, by_parameter = self._blocks
+        X, columns = problem.coefficients(self.u), []
+        for i in problem.unknown:
+            moved = turned(X, 2.0 * np.pi * problem.pairs[:, i])
+            speeds = on_lines(complex_coefficients(moved[:, :m], *problem.orders), self._taus,
+                              problem.samples[1], self.ratio) if m else None
+            moved[:, :m] = 2.0 * turned(moved[:, :m], self._turns)
+            if speeds is not None:
+                moved -= projected(np.einsum("qpij,qpj->qpi", by_velocity, speeds),
+                                   *problem.orders, self.ratio)
+            columns.append(moved.reshape(-1))
+        h = _DIFFERENCE * max(abs(float(self.u[-1])), 1e-3)
+        sides = []
+        for sign in (1.0, -1.0):
+            beside = self.u.copy()
+            beside[-1] += sign * h
+            sides.append(beside)
+        if problem.frequencies(sides[0]) == problem.frequencies(sides[1]):
+            columns.append(-projected(by_parameter, *problem.orders, self.ratio).reshape(-1))
+        else:
+            up, down = (TorusLinearisation(problem, side).balance for side in sides)
+            columns.append((up - down) / (2.0 * h))
+        return np.array(columns).T
+
+    @cached_property
+    def condensed(self) -> Array:
+        """Derivatives (n, n + 1) of the residual."""
+        problem, n = self.problem, self.problem.size
+        found = np.zeros((n + len(problem.unknown), n + problem.common))
+        found[:n, :n], found[:n, n:] = self.matrix.reshape(n, n), self._by_common
+        found[n:, :n] = problem.phase_rows
+        return found
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
+        if self._factors is None:
+            made = Factors.of(np.vstack([self.condensed, row]))
+            if made is None:
+                return np.full(len(row), np.nan)
+            self._factors = made, np.array(row)
+        factors, first = self._factors
+        found = factors.solve(rhs)
+        if np.array_equal(first, row):
+            return found
+        # Another last row: add what solves the homogeneous equations.
+        along = factors.solve(np.append(np.zeros(len(row) - 1), 1.0))
+        return np.asarray(found + (rhs[-1] - row @ found) / (row @ along) * along)
+
+    @cached_property
+    def _size(self) -> float:
+        """Root mean square of the torus without its mean, in the scales of its states."""
+        scaled = self.problem.coefficients(self.u)[1:] / self._scales
+        return float(np.sqrt((scaled**2).sum())) or 1.0
+
+    @property
+    def _scales(self) -> Array:
+        return self.problem.scales[self.problem.layout.columns]
+
+    @cached_property
+    def truncation_error(self) -> float:
+        """Estimate of the neglected harmonics, root mean square over that of the torus.
+
+        They are x_k = (i k.w - J_0)^-1 f_k, with the harmonics f_k of the rates that the series
+        leaves out, up to the samples, and the mean derivative J_0.
+        """
+        problem, m = self.problem, self.problem.layout.displacements
+        (H1, H2), (N1, N2) = problem.orders, problem.samples
+        K1, K2 = (N1 - 1) // 2, (N2 - 1) // 2
+        f = means(self.rates, K1, K2, self.ratio)
+        f[K1 - H1 : K1 + H1 + 1, K2 - H2 : K2 + H2 + 1] = 0.0
+        k1, k2 = np.meshgrid(np.arange(-K1, K1 + 1), np.arange(-K2, K2 + 1), indexing="ij")
+        turns = 2.0j * np.pi * (k1 * self.frequencies[0] + k2 * self.frequencies[1])
+        by_state, by_velocity, _ = (part.mean(axis=(0, 1)) for part in self._blocks)
+        turns = turns[:, :, None, None]
+        b = by_state.shape[0]
+        power = np.ones(b) + (np.arange(b) < m)
+        matrix = turns ** power * np.eye(b) - by_state
+        matrix[..., :m] -= turns * by_velocity
+        try:
+            added = np.linalg.solve(matrix, f[..., None])[..., 0] / self._scales
+        except np.linalg.LinAlgError:
+            return np.nan
+        return float(np.sqrt(2.0 * (np.abs(added) ** 2).sum())) / self._size
+
+    @cached_property
+    def sampling_error(self) -> float:
+        """Change of the torus at fixed parameter with twice the samples, relative to its size."""
+        problem = self.problem
+        finer = replace(problem, samples=(2 * problem.samples[0], 2 * problem.samples[1]))
+        residual = TorusLinearisation(finer, self.u).residual
+        row = np.zeros(len(self.u))
+        row[-1] = 1.0
+        change = self.solve(row, np.append(-residual, 0.0))
+        scaled = problem.coefficients(change) / self._scales
+        return float(np.sqrt((scaled**2).sum())) / self._size
+
+    @cached_property
+    def stability(self) -> TorusStability:
+        """Multipliers of the torus, from motions along it."""
+        problem, values = self.problem, self.problem.parameters(self.u)
+        first, second = self.frequencies
+
+        def jacobians(taus: Array, count: int) -> Array:
+            x = problem.states(self.u, taus, count, second / first)
+            return problem.excitation.on_lines(taus, x, values, first)[1]
+
+        return stability_of(jacobians, self.frequencies, problem.orders, problem.samples[1] | 1,
+                            len(problem.unknown))

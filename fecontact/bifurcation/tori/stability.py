@@ -1,0 +1,132 @@
+"""Multipliers of tori.
+
+Deviations on the section theta1 = 0 grow in one period 1 / f1 by the transition matrices M(phi) of
+the linearised equations along lines, and move on by the ratio r of the frequencies: xi(phi + r) =
+M(phi) xi(phi). Their mean growth per period, exp of the Lyapunov exponents, are the moduli of the
+multipliers.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from fecontact.bifurcation.harmonic.stability import radau_rule
+from fecontact.bifurcation.linalg import condensation
+from fecontact.bifurcation.linalg.transition_matrices import transitions
+from fecontact.core.read_only import read_only_arrays
+from fecontact.core.types import Array, Integers
+
+Jacobians: TypeAlias = Callable[[Array, int], Array]
+
+# Collocation of the linearised equations by Radau's points, which damps what is stiff: degree,
+# intervals per harmonic and at least, and changes of the fastest mode on an interval up to a most.
+_DEGREE, _INTERVALS, _LEAST, _CHANGES, _MOST = 4, 4, 24, 1.5, 400
+# Periods over which the growth is averaged, and before.
+_PERIODS, _BEFORE = 2000, 200
+# Distance from one within which a multiplier counts as one, at least.
+_ROUNDING = 1e-3
+
+
+@read_only_arrays
+@dataclass(frozen=True, eq=False)
+class TorusStability:
+    """Stability of a torus.
+
+    Attributes
+    ----------
+    multipliers : (d,) array
+        Mean growth of deviations in one period 1 / f1, falling; one of them is one for each
+        frequency that the motion finds itself.
+    trivial : (a,) array of int
+        Places of these.
+    """
+
+    multipliers: Array
+    trivial: Integers
+
+    @property
+    def trivial_error(self) -> float:
+        """Largest deviation of the multipliers that are one."""
+        return float(np.abs(self.multipliers[self.trivial] - 1.0).max(initial=0.0))
+
+    @property
+    def stable(self) -> bool:
+        """Whether all other deviations decay."""
+        others = np.delete(self.multipliers, self.trivial)
+        return bool((others < 1.0 + max(_ROUNDING, self.trivial_error)).all())
+
+
+def stability_of(
+    jacobians: Jacobians, frequencies: tuple[float, float], orders: tuple[int, int], lines: int,
+    unknown: int,
+) -> TorusStability:
+    """Multipliers of a torus with a number of ``unknown`` frequencies."""
+    M = transition_matrices(jacobians, frequencies[0], orders, lines)
+    growth = np.exp(exponents(M, frequencies[1] / frequencies[0]))
+    near = np.argsort(np.abs(np.log(np.maximum(growth, 1e-300))))
+    return TorusStability(growth, near[:unknown])
+
+
+def transition_matrices(
+    jacobians: Jacobians, frequency: float, orders: tuple[int, int], lines: int
+) -> Array:
+    """Transition matrices M (Q, d, d) over one period 1 / f1 along Q lines.
+
+    Parameters
+    ----------
+    jacobians : function
+        Derivatives (Q, P, d, d) of the rates at tau (P,) of Q motions, from equidistant phi.
+    frequency : float
+        f1 [Hz].
+    orders : (int, int)
+        H1 and H2.
+    lines : int
+        Q.
+    """
+    few = jacobians(np.arange(2 * orders[0]) / (2.0 * orders[0]), 2 * orders[1] + 1)
+    fastest = float(np.abs(np.linalg.eigvals(few)).max()) / frequency
+    N = max(_LEAST, _INTERVALS * orders[0], min(int(fastest / _CHANGES), _MOST))
+    points, basis, slopes = radau_rule(_DEGREE)
+    J = jacobians(((np.arange(N)[:, None] + points) / N).reshape(-1), lines)
+    d = J.shape[-1]
+    factors = condensation.factors_for(N, _DEGREE, d, 1)
+    nothing = np.zeros((N * _DEGREE, d))
+    M, steps = np.empty((lines, d, d)), np.empty((N, d, d))
+    for along, whole in zip(J, M, strict=True):
+        condensation.condense(np.ascontiguousarray(along), nothing, nothing[:, :, None],
+                              np.full(N, 1.0 / N), 1.0 / frequency, basis, slopes, 0, factors)
+        transitions(factors, steps)
+        whole[:] = np.eye(d)
+        for step in steps:
+            whole[:] = step @ whole
+    return M
+
+
+def exponents(M: Array, ratio: float) -> Array:
+    """Lyapunov exponents (d,) per period, falling, of xi(phi + r) = M(phi) xi(phi).
+
+    M (Q, d, d) at equidistant phi are interpolated by their Fourier series. The logarithms of the
+    growth are averaged with weights that vanish smoothly at both ends of the run, so that the error
+    falls faster than any power of its length where they are quasi-periodic.
+
+    References
+    ----------
+    S. Das, Y. Saiki, E. Sander, J. A. Yorke, Nonlinearity 30, 4111-4140 (2017).
+    """
+    Q, d, _ = M.shape
+    c = np.fft.fft(M, axis=0) / Q
+    k = np.fft.fftfreq(Q, 1.0 / Q)
+    phis = np.mod(ratio * np.arange(_BEFORE + _PERIODS), 1.0)
+    along = np.exp(2.0j * np.pi * np.outer(phis, k))
+    matrices = np.real(along @ c.reshape(Q, -1)).reshape(-1, d, d)
+    s = (np.arange(_PERIODS) + 0.5) / _PERIODS
+    weights = np.exp(-1.0 / (s * (1.0 - s)))
+    basis, total = np.eye(d), np.zeros(d)
+    for n, step in enumerate(matrices):
+        basis, upper = np.linalg.qr(step @ basis)
+        if n >= _BEFORE:
+            with np.errstate(divide="ignore"):
+                total += weights[n - _BEFORE] * np.log(np.abs(np.diag(upper)))
+    return np.sort(total / weights.sum())[::-1]

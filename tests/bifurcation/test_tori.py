@@ -1,0 +1,217 @@
+"""Tori of the forced van der Pol and of a two-tone Duffing oscillator."""
+
+import numpy as np
+import pytest
+from bifurcation.torus_fields import SECOND, forced_van_der_pol, two_tone_duffing
+
+import fecontact as fc
+from fecontact.bifurcation import (
+    BranchStatus,
+    Collocation,
+    ContinuationOptions,
+    HarmonicBalance,
+    PeriodicMotion,
+    TorusBalance,
+    orbit_branch,
+    periodic_motion,
+    torus_branch,
+    torus_motion,
+)
+from fecontact.core.errors import AnalysisError, InputError
+
+EPS = 0.1
+CIRCLE = 2.0 * np.pi
+
+
+def settled(field, initial, begin, end, outputs=8001):
+    run = fc.simulate(field, end, initial=initial, rtol=1e-10,
+                      outputs=np.append(0.0, np.linspace(begin, end, outputs)))
+    return run.between(begin)
+
+
+def without_second(field):
+    """The orbit that the first excitation alone gives, as a guess for both."""
+    found = periodic_motion(field.with_(second=0.0), initial=[0.0, 0.0])
+    return PeriodicMotion(found.times, found.states, found.period)
+
+
+def one(field, start, name, **options):
+    """The first torus of a branch."""
+    method = options.pop("method", None)
+    return torus_branch(field, start, name, method=method,
+                        options=ContinuationOptions(points=1), **options).points[0]
+
+
+def test_a_weakly_forced_oscillator_beats_as_adler_says():
+    # Phase of the averaged equations: psi' = D - K sin psi, with D = w - w0, K = F / (2 a w0).
+    force, free = 0.012, 1.0 - EPS**2 / 16.0
+    locking = force / 4.0
+    for detuning in (1.6 * locking, 4.0 * locking):
+        field = forced_van_der_pol(EPS, force, free + detuning)
+        point = one(field, settled(field, [2.0, 0.0], 600.0, 8000.0, 6000), "w",
+                    method=TorusBalance((6, 6)))
+        beat = CIRCLE * (point.values["frequency_1"] - point.values["frequency_2"])
+        assert beat == pytest.approx(np.sqrt(detuning**2 - locking**2), rel=0.02)
+        assert point.values["stable"]
+        # The relaxation of the amplitude, exp(-eps T).
+        assert point.values["multipliers"] == pytest.approx(
+            [1.0, np.exp(-EPS * CIRCLE / field.values[2])], rel=2e-2)
+        assert abs(torus_motion(point).harmonic(0, 1)[0]) == pytest.approx(
+            2.0 * averaged_part(detuning, locking), rel=0.02)
+
+
+def averaged_part(detuning, locking):
+    """Amplitude of the harmonic of frequency w - beat in exp(i (w t - psi))."""
+    beat = np.sqrt(detuning**2 - locking**2)
+    t = np.arange(4096) / 4096 * CIRCLE / beat
+    # tan(psi / 2) = (K + beat tan(beat t / 2)) / D.
+    psi = 2.0 * np.arctan2(locking * np.cos(beat * t / 2) + beat * np.sin(beat * t / 2),
+                           detuning * np.cos(beat * t / 2))
+    return abs(np.mean(np.exp(-1j * psi) * np.exp(1j * beat * t)))
+
+
+@pytest.fixture(scope="module")
+def orbits():
+    field = forced_van_der_pol(EPS, 1.3, 1.3)
+    begin = periodic_motion(field, initial=[1.0, 0.0])
+    return field, {name: orbit_branch(field, begin, "force", method=method, bounds=(0.5, 1.4),
+                                      direction=-1.0)
+                   for name, method in (("collocation", Collocation()),
+                                        ("harmonics", HarmonicBalance(7)))}
+
+
+@pytest.mark.parametrize("by", ["collocation", "harmonics"])
+def test_tori_leave_a_neimark_sacker_point(orbits, by):
+    field, branches = orbits
+    born = branches[by].of_kind("Neimark-Sacker")[0]
+    # The averaged equations lose stability at an amplitude of sqrt 2.
+    w = 1.3
+    assert born.parameter == pytest.approx(
+        np.sqrt(2.0 * ((1.0 - w**2) ** 2 + (EPS * w / 2.0) ** 2)), rel=0.01)
+    branch = torus_branch(field, born, bounds=(0.3, 1.0), method=TorusBalance((4, 4)))
+    first, last = branch.points[0], branch.points[-1]
+    assert last.parameter == pytest.approx(0.3)
+    assert all(point.values["stable"] for point in branch.points)
+    # The second frequency begins as that of the pair, one of +- angle + 2 pi.
+    assert first.values["frequency_2"] / first.values["frequency_1"] == pytest.approx(
+        born.angle / CIRCLE, abs=1e-3)
+    # Far away from the point the torus is that of a run.
+    motion = torus_motion(last)
+    there = forced_van_der_pol(EPS, 0.3, w)
+    run = settled(there, motion.section(1)[0], 60.0 * CIRCLE / w, 61.0 * CIRCLE / w, 11)
+    distance = np.abs(run.states[0] - motion.section(2000)).sum(axis=1).min()
+    assert distance < 5e-3
+    # Energy of all harmonics, that is the mean square, of a long run.
+    long = settled(there, motion.section(1)[0], 300.0, 4000.0, 20001)
+    assert np.mean(long.states**2, axis=0) == pytest.approx(
+        (motion.grid() ** 2).mean(axis=(0, 1)), rel=1e-3)
+
+
+def test_back_at_the_orbit_the_branch_ends(orbits):
+    field, branches = orbits
+    born = branches["collocation"].of_kind("Neimark-Sacker")[0]
+    out = torus_branch(field, born, bounds=(0.85, 1.0), method=TorusBalance((4, 3)))
+    back = torus_branch(field, out.points[-1], bounds=(0.8, 1.2), direction=-1.0)
+    assert back.status is BranchStatus.SINGLE_FREQUENCY
+    assert back.points[-1].parameter == pytest.approx(born.parameter, rel=1e-4)
+
+
+def test_errors_fall_with_the_harmonics_and_are_estimated():
+    field = forced_van_der_pol(0.4, 0.5, 1.6)
+    run = settled(field, [1.0, 0.0], 200.0, 3000.0)
+    exact = one(field, run, "w", method=TorusBalance((13, 9)))
+    errors, estimates = [], []
+    for H in (2, 4, 6, 8):
+        point = one(field, run, "w", method=TorusBalance((H, H)))
+        fine, coarse = torus_motion(exact), torus_motion(point)
+        part = [fine.harmonic(*k)[0] - coarse.harmonic(*k)[0] for k in ((0, 1), (1, 0), (2, -1))]
+        errors.append(np.abs(part).max() + abs(
+            exact.values["frequency_2"] - point.values["frequency_2"]))
+        estimates.append(point.values["truncation_error"])
+    assert errors[3] < 1e-2 * errors[0]
+    assert np.all(np.diff(estimates) < 0.0)
+    assert point.values["sampling_error"] < 1e-3
+
+
+@pytest.mark.parametrize("second", [None, SECOND])
+def test_derivatives_are_those_of_differences(second):
+    if second is None:
+        field = forced_van_der_pol(EPS, 0.05, 1.2)
+        start, name = settled(field, [2.0, 0.0], 300.0, 2000.0), "w"
+    else:
+        field, name = two_tone_duffing(), "w"
+        start = without_second(field)
+    from fecontact.bifurcation.tori import branches as tori
+
+    kept = {}
+    followed = tori._followed
+
+    def keep(problem, u, *rest):
+        kept["at"] = problem, u
+        return followed(problem, u, *rest)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(tori, "_followed", keep)
+        one(field, start, name, second=second, method=TorusBalance((2, 3)))
+    problem, u = kept["at"]
+    given = problem.linearise(u).condensed
+    columns = []
+    for k in range(len(u)):
+        h = 1e-6 * max(abs(u[k]), 1e-2)
+        sides = [problem.linearise(u + sign * h * np.eye(len(u))[k]).residual for sign in (1, -1)]
+        columns.append((sides[0] - sides[1]) / (2.0 * h))
+    assert np.abs(given - np.array(columns).T).max() < 1e-5 * np.abs(given).max()
+
+
+def test_two_tones_of_a_duffing_oscillator_meet_a_long_run():
+    field = two_tone_duffing()
+    point = one(field, without_second(field), "second", second=SECOND,
+                method=TorusBalance((7, 7)))
+    motion = torus_motion(point)
+    assert motion.frequencies == pytest.approx([1.7 / CIRCLE, field.values[5]])
+    # Phases of both excitations are those of the run.
+    times = np.linspace(900.0, 1000.0, 501)
+    run = fc.simulate(field, 1000.0, initial=[0.0, 0.0], rtol=1e-10,
+                      outputs=np.append(0.0, times)).between(900.0)
+    assert np.abs(motion.states(run.time) - run.states).max() < 2e-3
+    assert point.values["stable"]
+    # The mean divergence of the field is that of the multipliers.
+    assert np.log(point.values["multipliers"]).sum() == pytest.approx(
+        -0.1 * CIRCLE / 1.7, rel=1e-6)
+
+def test_the_second_excitation_grows_from_nothing():
+    field = two_tone_duffing(second=0.0)
+    branch = torus_branch(field, without_second(field), "second", second=SECOND,
+                          bounds=(0.0, 0.3), method=TorusBalance((5, 5)))
+    assert branch.points[0].values["minimum"] == pytest.approx(
+        without_second(field).states.min(axis=0), rel=1e-2)
+    direct = one(two_tone_duffing(), without_second(field), "second", second=SECOND,
+                 method=TorusBalance((5, 5)))
+    assert branch.points[-1].values["maximum"] == pytest.approx(direct.values["maximum"], rel=1e-6)
+
+
+def test_a_run_finds_both_tones_too():
+    field = two_tone_duffing()
+    run = settled(field, [0.0, 0.0], 300.0, 1500.0)
+    by_run = one(field, run, "w", second=SECOND, method=TorusBalance((5, 5)))
+    by_orbit = one(field, without_second(field), "w", second=SECOND,
+                   method=TorusBalance((5, 5)))
+    assert by_run.u == pytest.approx(by_orbit.u, abs=1e-6)
+
+
+def test_what_is_no_torus_is_refused():
+    field = forced_van_der_pol(EPS, 1.3, 1.3)
+    orbit = periodic_motion(field, initial=[1.0, 0.0])
+    with pytest.raises(InputError, match="second="):
+        torus_branch(field, orbit, "force")
+    with pytest.raises(AnalysisError, match=r"no second frequency|periodic orbit"):
+        torus_branch(field, settled(field, orbit.states[0], 200.0, 1000.0), "force")
+    with pytest.raises(InputError, match="harmonics = 0"):
+        TorusBalance(0)
+    with pytest.raises(InputError, match="contact system"):
+        torus_branch(field, orbit, "force", second="drive")
+    point = orbit_branch(field, orbit, "force", bounds=(1.2, 1.4)).points[0]
+    with pytest.raises(InputError, match="no torus"):
+        torus_motion(point)
+
+
