@@ -200,6 +200,14 @@ def made_values(field: ContactField, values: Array, index: int) -> list[float]:
     return [value for value in field._family.made_for(values, index) if value != values[index]]
 
 
+def with_parameter(
+    field: ContactField, name: str, value: float,
+    setter: Callable[[ContactSystem, float], ContactSystem],
+) -> ContactField:
+    """The field with a further parameter, the last one, that a function sets."""
+    return ContactField(field._family.with_parameter(name, value, setter))
+
+
 def family_on(
     field: ContactField, make: Callable[[ContactSystem], ContactSystem]
 ) -> ParametrisedSystem:

@@ -97,6 +97,12 @@ class ParametrisedSystem:
         """Return the family of another system over these parameters."""
         return ParametrisedSystem(system, *self._asked)
 
+    def with_parameter(self, name: str, value: float, setter: Setter) -> "ParametrisedSystem":
+        """Return the family over these parameters and, behind them, one that a function sets."""
+        given, _ = self._asked
+        known = given if isinstance(given, Mapping) else dict.fromkeys(given)
+        return ParametrisedSystem(self.base, {**known, name: (value, setter)})
+
     def _between(self, ranges: Mapping[str, tuple[float, float]]) -> Corners | None:
         """A box of ranges that are given; None where some are not, or none is affine over it."""
         if set(ranges) != set(self.parameters):

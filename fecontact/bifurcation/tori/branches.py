@@ -76,7 +76,7 @@ def torus_branch(
     options, bounds : ContinuationOptions and (float, float), optional
         Step lengths, tolerances, stopping conditions; range of the parameter in place of theirs.
     scales, width, direction, both
-        See :func:`orbit_branch`.
+        See :func:`fecontact.bifurcation.orbit_branch`.
 
     Raises
     ------

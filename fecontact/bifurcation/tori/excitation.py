@@ -1,14 +1,13 @@
 """Fields on lines along a torus, with up to two excitations of any frequencies."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
+from fecontact.bifurcation.fields.contact_field import ContactField, with_parameter
 from fecontact.bifurcation.tori.method import SecondExcitation
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
@@ -116,11 +115,7 @@ def excitation_of(field: VectorField, second: SecondExcitation | str | None) -> 
                          f"system; for a field of your own give SecondExcitation(phase, "
                          f"frequency_hz).")
     _names(field.system(), second)
-    given_parameters, _ = field._family._asked
-    if not isinstance(given_parameters, Mapping):
-        given_parameters = dict.fromkeys(given_parameters)
-    shifted = ContactField(ParametrisedSystem(
-        field._family.base, {**given_parameters, _PHASE: (0.0, partial(_delayed, second))}))
+    shifted = with_parameter(field, _PHASE, 0.0, partial(_delayed, second))
     return Excitation(field, partial(_frequency_of, field, second, False),
                       partial(_frequency_of, field, second, True), shifted)
 

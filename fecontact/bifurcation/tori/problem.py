@@ -95,7 +95,7 @@ class TorusProblem(Problem):
 
     @cached_property
     def unknown(self) -> tuple[int, ...]:
-        """Which of the frequencies 0 and 1 are unknowns, in their order in u."""
+        """Indices of the unknown frequencies, 0 and 1, in their order in u."""
         return tuple(i for i, f in enumerate(self.excitation.frequencies(self.values))
                      if f is None)
 
