@@ -314,6 +314,9 @@ def imported(path: str | Path, scale: float = 1.0) -> Imported:
         for name, body in bodies.items():
             notes += [f"{sentence[:1].upper()}{sentence[1:]}"
                       for sentence in implausible_body(who[name], body)]
+    if contents.elements:
+        notes += [f"The deck gives {who[name]} no material; the study has steel, correct it there."
+                  for name, mesh in meshes.items() if not mesh.materials]
     notes += [f"{number} {sentence.format(kind)}" for kind, number in contents.elements.items()
               for types, sentence in _OTHERWISE.items() if re.fullmatch(types, kind)]
     interfaces: list[tuple[str, str]] = []

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fecontact import ElasticBody, InputError, MeshError, ModelWarning, read_mesh
+from fecontact.study.imported import imported
 
 PLACES = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
 NODES = "*NODE\n" + "".join(f"{k}, {x}, {y}, {z}\n" for k, (x, y, z) in enumerate(PLACES, 1))
@@ -96,6 +97,37 @@ def test_materials_without_a_section_are_said(tmp_path):
     with pytest.warns(ModelWarning, match=r"no elements, for want of a \*SOLID SECTION"):
         mesh = read_mesh(written(tmp_path, "a.inp", NODES + BRICK + steel))
     assert mesh.materials == {}
+
+
+def test_sections_of_unknown_sets_and_elements_without_one_are_said(tmp_path):
+    text = NODES + BRICK + STEEL
+    with pytest.raises(MeshError, match=r"SOLID SECTION names the element set 'AL', which the file "
+                                        r"does not hold.* 'ALL'.*; its element sets are: 'ALL'"):
+        read_mesh(written(tmp_path, "a.inp", text.replace("ELSET=ALL, MAT", "ELSET=AL, MAT")))
+    more = "".join(f"{k}, {x}, {y}, {z + 1}\n" for k, (x, y, z) in enumerate(PLACES[4:], 9))
+    two = (NODES + more + BRICK.replace("ELSET=ALL", "ELSET=FIRST")
+           + "*ELEMENT, TYPE=C3D8, ELSET=SECOND\n2, 5, 6, 7, 8, 9, 10, 11, 12\n"
+           + STEEL.replace("ELSET=ALL", "ELSET=FIRST"))
+    mesh = read_mesh(written(tmp_path, "b.inp", two))
+    with pytest.raises(InputError, match=r"material leaves 1 of 2 cells without a material, the "
+                                         r"first at \(0\.5, 0\.5, 1\.5\); give"):
+        ElasticBody(mesh)
+    bare = imported(written(tmp_path, "c.inp", NODES + BRICK))
+    assert "The deck gives the body no material; the study has steel, correct it there." in (
+        bare.notes)
+    assert imported(written(tmp_path, "d.inp", text)).notes == ()
+
+
+def test_couplings_of_no_nodes_and_ties_of_faces_apart_are_said(tmp_path):
+    points = NODES.rstrip() + "\n98, 0.5, 0.5, 2\n"
+    coupling = ("*SURFACE, TYPE=NODE, NAME=A\nLONE\n"
+                "*COUPLING, CONSTRAINT NAME=C, REF NODE=98, SURFACE=A\n*KINEMATIC\n")
+    with pytest.raises(MeshError, match=r"Coupling 'C' needs nodes of 'A', of which the body has"):
+        read_mesh(written(tmp_path, "a.inp", points + BRICK + "*NSET, NSET=LONE\n98,\n" + coupling))
+    tie = "*SURFACE, NAME=L\n1, S1\n*SURFACE, NAME=U\n1, S2\n*TIE, NAME=T\nL, U\n"
+    with pytest.raises(MeshError, match=r"Tie 'T': no node of 'L' lies within tolerance = .*, the "
+                                        r"closest is 1 m away"):
+        _ = ElasticBody(read_mesh(written(tmp_path, "b.inp", NODES + BRICK + tie))).expansion
 
 
 def test_couplings_that_determine_a_node_twice_name_it(tmp_path):

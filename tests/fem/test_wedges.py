@@ -163,7 +163,9 @@ def test_an_import_tells_elements_that_are_read_as_others(tmp_path, corners, ord
     nodes, cells = wedges((8, 2, 2)) if corners == 6 else (block.nodes, block.cells)
     if order == 2:
         nodes, cells = second_order(nodes, cells, WEDGE)
-    path = deck(tmp_path / "a.inp", nodes, cells)
+    path = deck(tmp_path / "a.inp", nodes, cells, extra=(
+        "*MATERIAL, NAME=STEEL\n*ELASTIC\n2.1e11, 0.3\n*DENSITY\n7850.\n"
+        "*SOLID SECTION, ELSET=E, MATERIAL=STEEL\n"))
     path.write_text(path.read_text().replace("TYPE=C3D8", f"TYPE={kind}"))
     found = imported(path)
     assert dict(found.contents.elements) == {kind: len(cells)}

@@ -520,11 +520,18 @@ class _Assembly:
         found: dict[str, AnyMaterial] = {}
         if self.materials and not self.sections:
             return {}, ["its materials belong to no elements, for want of a *SOLID SECTION"]
+        held = [*(part.sets for part in self.parts.values()),
+                *(one.sets for one in (*self.instances, self.own))]
+        sets = {name.upper(): name for one in held for name in one.elements}
         for part, options in self.sections:
             name, wanted = options.get("ELSET", ""), options.get("MATERIAL", "")
             if not name or not wanted:
                 raise MeshError(f"A line *SOLID SECTION has no "
                                 f"{'ELSET' if not name else 'MATERIAL'}=; add it.")
+            if name.upper() not in sets:
+                raise MeshError(f"A line *SOLID SECTION names the element set '{name}', which the "
+                                f"file does not hold{nearest(name, sets.values())}; its element "
+                                f"sets are: {choices(sets.values())}.")
             if wanted.upper() not in self.materials:
                 raise MeshError(f"The section of '{name}' names the material '{wanted}', which the "
                                 f"file does not hold{nearest(wanted.upper(), self.materials)}; its "
