@@ -13,6 +13,7 @@ from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.friction_contact import separated
 from fecontact.laws.ground.ground import Ground
+from fecontact.laws.ground.height_map import HeightMap
 from fecontact.laws.registry import PART_CLASSES
 from fecontact.reduction.assembly.links import NonlinearSpring
 from fecontact.reduction.modal_basis import ModalBasis
@@ -59,7 +60,7 @@ class Described(Protocol):
         """Loads."""
 
     @property
-    def gap(self) -> float | tuple[float, ...] | Crown:
+    def gap(self) -> float | tuple[float, ...] | Crown | HeightMap:
         """Initial gap."""
 
 
@@ -113,7 +114,8 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
     if several:
         gap = _gaps(study, reduced, title)
     else:
-        with located(f"{title}: [gap]:" if isinstance(study.gap, Crown) else f"{title}:", "Crown"):
+        of_table = isinstance(study.gap, Crown | HeightMap)
+        with located(f"{title}: [gap]:" if of_table else f"{title}:", "Crown", "gap"):
             gap = gap_values(study.gap, basis.contact_places)
     parts: dict[str, Any] = {part: getattr(study, part) for part in PART_CLASSES}
     parts |= {part: usual.get(part) for part in LAWS}

@@ -25,9 +25,11 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.pairing import Pairing, TwoPassPairing, pair_both_faces, pair_faces
 from fecontact.laws.base import FrictionLaw, NormalLaw
+from fecontact.laws.ground.height_map import HeightMap
 from fecontact.laws.ground.sliding import SlidingRotation, SlidingTranslation
 from fecontact.reduction.assembly.assembled_basis import assembled_basis
 from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs
+from fecontact.reduction.half_space_compliance import with_half_space
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import reduce_bodies
 from fecontact.study.geometry_section import (
@@ -41,7 +43,7 @@ from fecontact.study.links_section import LinkSettings, made_links
 from fecontact.study.sections import BasisSettings, BodySettings
 from fecontact.system.gap import Crown
 
-Gap = float | tuple[float, ...] | Crown
+Gap = float | tuple[float, ...] | Crown | HeightMap
 
 # Keys of an interface on which the modal bases of its bodies depend.
 PAIRING_KEYS = ("face", "other", "passes", "nodes", "nodes_on", "reach", "overlap")
@@ -182,7 +184,7 @@ class InterfaceSettings:
     overlap : float
         Depth up to which faces inside each other are set to zero gap, in mean edges of the finer
         face.
-    gap : float, list or Crown
+    gap : float, list, Crown or HeightMap
         Added to the gaps of the geometry [m].
     sliding : SlidingTranslation or SlidingRotation, optional
         Steady motion of the other side: ``{speed, direction}``, or ``{speed, centre}`` and, of
@@ -341,6 +343,9 @@ def _check_sector(study: Bodies, title: str) -> None:
             raise InputError(f"{title}: [bodies.{name}.basis]: rigid = true is for one sector of a "
                              f"wheel, [symmetry]; take reduction = \"vibration\" with the rigid "
                              f"modes alone.")
+        if one.basis.half_space and study.symmetry is not None:
+            raise InputError(f"{title}: [bodies.{name}.basis]: half_space = true is not for one "
+                             f"sector of a wheel; refine the mesh at the contact instead.")
 
 
 def _check_names(study: Bodies, title: str) -> None:
@@ -451,7 +456,11 @@ def body_bases(
                   for name, one in study.bodies.items()})
     for name, one in study.bodies.items():
         with located(f"{title}: [bodies.{name}.basis]:"):
-            found[name] = one.basis.finished(bases[name])
+            basis = bases[name]
+            if one.basis.half_space:
+                touching = [face for face in faces.values() if name in (face.body, face.other)]
+                basis = with_half_space(basis, bodies[name], pairings=touching, name=name)
+            found[name] = one.basis.finished(basis)
     return found
 
 

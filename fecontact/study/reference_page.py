@@ -9,6 +9,7 @@ from typing import Any, get_args, get_type_hints
 from fecontact.core.docstrings import documented, summary
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import described
+from fecontact.laws.ground.height_map import HeightMap
 from fecontact.laws.registry import is_kind, law_names
 from fecontact.laws.synonyms import laws_called
 from fecontact.study.geometry_section import SHAPES, MeshFile
@@ -87,7 +88,8 @@ def _parts() -> Iterator[tuple[str, str]]:
     hints = get_type_hints(Study)
     yield "gap", ("## `gap`\n\nAbove all sections: initial distance of the contact nodes from flat "
                   "ground [m]; a number, a list with one per node, or a table for a face that is "
-                  "an arc:\n\n" + _table(Crown) + "\n")
+                  "an arc:\n\n" + _table(Crown) + "\n\nor for measured heights of a "
+                  "solid's face:\n\n" + _table(HeightMap) + "\n")
     shapes = [_table(cls, f'`shape = "{name}"`: {_summary(cls)}') for name, cls in SHAPES.items()]
     yield "geometry", _section("geometry", "A shape and its dimensions, or the file of a mesh.",
                                *shapes, _table(MeshFile, f"`file`: {_summary(MeshFile)}"))

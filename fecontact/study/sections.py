@@ -27,6 +27,7 @@ from fecontact.laws.base import PerNode
 from fecontact.laws.excitation import Load
 from fecontact.laws.wear import ArchardWear, EnergyWear, WearLaw
 from fecontact.reduction.damping import LossFactor, Rayleigh
+from fecontact.reduction.half_space_compliance import with_half_space
 from fecontact.reduction.large_deflections.options import LargeDeflections
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.reduce_body import modal_basis
@@ -197,6 +198,9 @@ class BasisSettings:
         for 'residual' and 'craig-bampton'. 'mesh': that which the deck of the mesh holds.
     large_deflections : LargeDeflections, optional
         ``[basis.large_deflections]``: forces of large deflections of some modes.
+    half_space : bool
+        Whether the contact nodes of a solid have the local compliance of a half-space where its
+        elements and modes are too stiff; see :func:`fecontact.reduction.with_half_space`.
     """
 
     modes: int = 20
@@ -217,6 +221,7 @@ class BasisSettings:
     prestress: bool = False
     temperature: Annotated[float | Literal["mesh"] | None, Unit("K")] = None
     large_deflections: LargeDeflections | None = None
+    half_space: bool = False
 
     def __post_init__(self) -> None:
         convert_fields(self)
@@ -252,9 +257,10 @@ class BasisSettings:
         if self.prestress and load is not None:
             with located("prestress = true:"):
                 state = static_solution(body, load, points=self.load_points)
-        return self.finished(modal_basis(
+        found = modal_basis(
             body, self.modes, contact=self.contact, contact_nodes=self.contact_nodes,
-            rotation=rotation, prestress=state, **self.options))
+            rotation=rotation, prestress=state, **self.options)
+        return self.finished(with_half_space(found, body) if self.half_space else found)
 
     @property
     def load_points(self) -> dict[str, Place]:

@@ -40,6 +40,7 @@ from fecontact.integrate.wear import WearHistory, wear_history
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
+from fecontact.laws.ground.height_map import HeightMap
 from fecontact.laws.registry import PART_CLASSES, foreign_keys, trusting, with_folder
 from fecontact.study.assembly import LAWS, contact_system
 from fecontact.study.bodies_section import (
@@ -116,7 +117,7 @@ class Study(Summarised, StudyModels):
     interfaces : mapping of interface to InterfaceSettings
         ``[interfaces.NAME.normal]``, ``[interfaces.NAME.friction]``: laws of single interfaces;
         all others use ``[normal]`` and ``[friction]``. Of several bodies also their faces.
-    gap : float, (n,) tuple or Crown
+    gap : float, (n,) tuple, Crown or HeightMap
         Initial distance of the contact nodes from flat ground [m], or ``{radius, centre}`` for a
         face in the shape of an arc; written above all sections.
     preload : PreloadSettings or None
@@ -488,7 +489,9 @@ def _title(path: Path | None) -> str:
 
 def _gap(value: Any, title: str) -> Gap:
     gap: Gap = convert(value, Gap, title, "gap")
-    numbers = () if isinstance(gap, Crown) else gap if isinstance(gap, tuple) else (gap,)
+    if isinstance(gap, Crown | HeightMap):
+        return gap
+    numbers = gap if isinstance(gap, tuple) else (gap,)
     if not all(0.0 <= number < float("inf") for number in numbers):
         raise InputError(f"{title}: gap = {shown(value)} must be finite and zero or above.")
     return gap

@@ -99,7 +99,7 @@ class ContactSystem(Summarised):
         Base excitation of B.
     load : Load
         Loads at C and other points.
-    gap : float, (n,) sequence, Crown or function of x
+    gap : float, (n,) sequence, Crown, HeightMap or function of x
         Initial distance g_j of the contact nodes from flat ground, zero or above [m]; stored as
         numbers.
     sliding : mapping of interface to SlidingTranslation or SlidingRotation

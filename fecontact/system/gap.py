@@ -17,6 +17,7 @@ from fecontact.core.errors import (
 )
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
+from fecontact.laws.ground.height_map import HeightMap
 
 
 @dataclass(frozen=True)
@@ -70,20 +71,47 @@ class Crown:
         return np.asarray(away**2 / (self.radius + np.sqrt(self.radius**2 - away**2)))
 
 
-Gap = float | Sequence[float] | Crown | Callable[..., Array]
+Gap = float | Sequence[float] | Crown | HeightMap | Callable[..., Array]
+
+
+def _below(heights: HeightMap, places: Array) -> Array:
+    """Distance (n,) of measured heights at places (n, 3) from the highest of them [m].
+
+    They lie on the bicubic spline through the points, which does not repeat itself here.
+    """
+    from scipy.interpolate import RectBivariateSpline
+
+    if places.ndim != 2 or places.shape[1] != 3:
+        raise InputError("gap: a HeightMap is over x and y of solids; give a plane body one gap "
+                         "for each contact node.")
+    grid = np.array(heights.heights)
+    lines = [origin + step * np.arange(count) for origin, step, count in zip(
+        (heights.origin_x, heights.origin_y), (heights.spacing_x, heights.spacing_y), grid.shape,
+        strict=True)]
+    for axis, line, at in zip("xy", lines, places.T, strict=False):
+        beyond = 0.5 * (line[1] - line[0])
+        if at.min() < line[0] - beyond or at.max() > line[-1] + beyond:
+            raise InputError(f"gap: the HeightMap reaches from {line[0]:g} to {line[-1]:g} m in "
+                             f"{axis}, but contact nodes lie from {at.min():g} to {at.max():g} m; "
+                             f"measure all of the face, or shift the map by origin_{axis}.")
+    z = RectBivariateSpline(*lines, grid)(places[:, 0], places[:, 1], grid=False)
+    return np.asarray(z.max() - z)
 
 
 def gap_values(gap: Gap, places: Array) -> float | tuple[float, ...]:
     """One gap for all contact nodes, or one for each.
 
     ``places`` (n, d) are those of the nodes, or (n,) their abscissae. Functions take x (n,), of
-    solids x and y.
+    solids x and y. A HeightMap holds heights of the surface of a solid out of it, which move with
+    the body; the highest contact node has the gap zero.
 
     Raises
     ------
     InputError
         For a wrong number of values, or a value that is negative or not finite.
     """
+    if isinstance(gap, HeightMap):
+        gap = _below(gap, places).tolist()
     at = (places,) if places.ndim == 1 else tuple(places.T[:-1])
     names = "x and y" if len(at) == 2 else "x"
     try:

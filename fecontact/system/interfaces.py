@@ -56,7 +56,7 @@ class Interface:
         Required if its contact nodes can move along each other.
     sliding : SlidingTranslation or SlidingRotation, optional
         Prescribed motion of the other side; on the ground it replaces the ground's motion.
-    gap : float, (n,) sequence, Crown or function of x
+    gap : float, (n,) sequence, Crown, HeightMap or function of x
         Added to the gaps of the pairing, zero or above [m].
 
     Raises

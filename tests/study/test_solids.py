@@ -18,7 +18,7 @@ from fecontact.laws import (
     SlidingRotation,
     SlidingTranslation,
 )
-from fecontact.reduction import Spring, reduce_bodies
+from fecontact.reduction import Spring, reduce_bodies, with_half_space
 
 PAD = """
 [geometry]
@@ -482,3 +482,60 @@ def test_sweeps_of_solids_have_the_numbers_of_single_runs(tmp_path):
     belt = table.values["belt_power"]
     assert belt[1] / belt[0] == pytest.approx(5.0**0.5, rel=2e-3)
     assert table.values["amplitude_y@0"][1] > 100.0 * table.values["amplitude_y@0"][0]
+
+
+def measured(folder, factor=1e-6):
+    """A file of heights over the face of the pad, and the heights at places x, y."""
+    x, y = np.meshgrid(np.linspace(0.0, 0.06, 31), np.linspace(0.0, 0.04, 21), indexing="ij")
+    z = factor * np.cos(60.0 * x) * np.sin(80.0 * y)
+    np.savetxt(folder / "heights.csv", np.column_stack([x.ravel(), y.ravel(), z.ravel()]),
+               delimiter=",", header="x,y,height")
+    return lambda x, y: factor * np.cos(60.0 * x) * np.sin(80.0 * y)
+
+
+def test_measured_heights_are_gaps(tmp_path):
+    heights = measured(tmp_path)
+    text = PAD.replace("[geometry]", 'gap = { file = "heights.csv" }\n[geometry]', 1)
+    (tmp_path / "study.toml").write_text(text)
+    system = fc.Study.read(tmp_path / "study.toml").system()
+    places = system.basis.contact_places
+    z = heights(places[:, 0], places[:, 1])
+    assert np.array(system.gap) == pytest.approx(z.max() - z, abs=1e-9)
+    python = fc.ContactSystem(system.basis, system.normal, system.friction,
+                              gap=HeightMap(file=str(tmp_path / "heights.csv")))
+    assert python.gap == system.gap
+
+
+def test_measured_heights_must_cover_the_face(tmp_path):
+    measured(tmp_path)
+    text = PAD.replace("[geometry]", 'gap = { file = "heights.csv" }\n[geometry]', 1)
+    (tmp_path / "study.toml").write_text(text.replace("length = 0.06", "length = 0.12"))
+    with pytest.raises(fc.InputError, match=r"reaches from .* in x, but contact nodes lie"):
+        fc.Study.read(tmp_path / "study.toml").system()
+
+
+def test_half_space_of_a_study():
+    """The key of one body, and of both bodies of an interface, as in Python."""
+    study, plain = (fc.Study.from_toml(text) for text in (
+        PAD.replace("modes = 8", "modes = 8\nhalf_space = true"), PAD))
+    expected = with_half_space(plain.modal_basis(), plain.elastic_body())
+    assert expected.modes == 8 + 3 * 8
+    assert np.array(study.modal_basis().T) == pytest.approx(np.array(expected.T))
+    assert fc.Study.from_toml(study.to_toml()) == study
+    text = PAIR.replace("modes = 4", "modes = 4\nhalf_space = true")
+    both, alone = (fc.Study.from_toml(one) for one in (text, PAIR))
+    disc = with_half_space(alone.modal_bases()["disc"], alone.elastic_bodies()["disc"],
+                           pairings=[alone.pairings()["seam"]], name="disc")
+    assert both.modal_bases()["disc"].modes == disc.modes > alone.modal_bases()["disc"].modes
+    assert both.modal_bases()["pad"].modes == alone.modal_bases()["pad"].modes
+
+
+def test_half_space_of_a_plane_body_is_refused():
+    study = fc.Study.from_toml(
+        PAD.replace("solid-block", "block").replace("length = 0.06\n", "").replace(
+            "[4, 2]", "4").replace("modes = 8", "modes = 8\nhalf_space = true") + """
+[body]
+thickness = 0.1
+""")
+    with pytest.raises(fc.InputError, match="the body is plane"):
+        study.system()

@@ -192,7 +192,7 @@ def deflection_path(
         Boundaries of one body that may touch the ground, none by default.
     normal, friction : laws, or mappings of boundary to law, optional
         Of the ground; the normal law is required with contact.
-    gap : float, (n,) sequence, Crown or function of x
+    gap : float, (n,) sequence, Crown, HeightMap or function of x
         Initial distance from the ground [m].
     interfaces : sequence of Interface
         Faces paired by :func:`~fecontact.fem.pair_faces`, and their laws.
