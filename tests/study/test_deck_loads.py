@@ -6,6 +6,7 @@ bricks have the same stiffness as trilinear ones here.
 
 import numpy as np
 import pytest
+from ansys_archives import archive, material
 from solid_blocks import block_mesh
 
 from fecontact import InputError, MeshError, Study, read_mesh, static_solution
@@ -59,10 +60,13 @@ SIDES = ("*DLOAD\nUP, P2, 2e6\n1, P1, -3e6\n3, P1, -3e6\n24, P5, 1.5e6\n24, P4, 
          "24, P5, 1e6\n")
 
 
-def displacement(tmp_path, load, scale=1.0, file="a.inp", make=deck):
+def displacement(tmp_path, load, scale=1.0, file="a.inp"):
     """Displacements (2, 3) at the places of the deck's study, and the study."""
-    (tmp_path / file).write_text(make(load, scale))
-    found = imported(tmp_path / file, scale)
+    return displacement_of(imported(written(tmp_path / file, load, scale), scale), tmp_path)
+
+
+def displacement_of(found, tmp_path):
+    """Displacements (2, 3) of an imported file, all of whose loads are taken, and its study."""
     assert found.notes == ()
     text = found.toml(tmp_path)
     assert "left out" not in text
@@ -109,23 +113,16 @@ def bulk(load, scale=1.0):
     return f"{text}{held}{cards}ENDDATA\n"
 
 
-def archive(load, scale=1.0):
-    """The block as an archive of SOLID185."""
-    lines = ["/PREP7", "ET,        1,185", f"NBLOCK,6,SOLID,{len(MESH.nodes):10d},"
-             f"{len(MESH.nodes):10d}", "(3i9,6e21.13e3)"]
-    lines += [f"{k:9d}{0:9d}{0:9d}" + "".join(
-        f"{x:20.13E}".replace("E+", "E+0").replace("E-", "E-0") for x in node)
-        for k, node in enumerate(MESH.nodes / scale, 1)]
-    lines += ["N,R5.3,LOC,       -1,", f"EBLOCK,19,SOLID,{len(MESH.cells):10d},"
-              f"{len(MESH.cells):10d}", "(19i9)"]
-    lines += ["".join(f"{n:9d}" for n in (1, 1, 1, 1, 0, 0, 0, 0, 8, 0, k, *row))
-              for k, row in enumerate((MESH.cells + 1).tolist(), 1)]
-    constants = (2.1e11, 7850.0) if scale == 1.0 else (2.1e5, 7.85e-9)
-    lines += ["       -1", *(f"MPDATA,R5.0, 1,{name},       1, 1, {value:.9E}    ," for name, value
-                             in (("EX", constants[0]), ("NUXY", 0.3), ("DENS", constants[1])))]
-    lines += [f"D,{node:8d},{label}  ,  0.00000000    ,  0.00000000    " for node in HELD
-              for label in ("UX", "UY", "UZ")]
-    return "\n".join([*lines, load.rstrip(), "FINISH", ""])
+def written(path, load, scale):
+    """A file of a format with the block and a load."""
+    if path.suffix != ".cdb":
+        path.write_text((bulk if path.suffix == ".bdf" else deck)(load, scale))
+        return path
+    E, rho = (2.1e11, 7850.0) if scale == 1.0 else (2.1e5, 7.85e-9)
+    held = "".join(f"D,{node:8d},{label}  ,  0.00000000    ,  0.00000000    \n" for node in HELD
+                   for label in ("UX", "UY", "UZ"))
+    return archive(path, 185, MESH.nodes / scale, MESH.cells + 1,
+                   f"{material(EX=E, NUXY=0.3, DENS=rho)}\n{held}{load.rstrip()}")
 
 
 def pload4(pressure, *elements, side=5, number=7):
@@ -166,7 +163,7 @@ GRAVITY = 9.81 / 7.0  # along 3, -2, -6
     ("a.cdb", sfe(2.0, *UP) + "ACEL,  0.00000000    ,  0.00000000    ,  9810.00000\n", 1e-3, "MM"),
 ])
 def test_loads_of_nastran_and_ansys_are_those_of_calculix(file, load, scale, expected, tmp_path):
-    found, study = displacement(tmp_path, load, scale, file, bulk if file == "a.bdf" else archive)
+    found, study = displacement(tmp_path, load, scale, file)
     # Files of Nastran have no material: that of the study is steel.
     assert len(study.body.fixed) == 1
     assert found == pytest.approx(np.array(CALCULIX[expected]),
@@ -183,12 +180,12 @@ def test_forces_of_nastran_and_ansys_are_those_of_a_deck(file, load, tmp_path):
     """The deck names nodes by their numbers, and holds them so in place of their set."""
     expected, _ = displacement(
         tmp_path, f"*CLOAD\n{TIP}, 1, 60.\n{TIP}, 3, -200.\n{HIGH}, 2, 50.\n")
-    found, _ = displacement(tmp_path, load, 1.0, file, bulk if file == "a.bdf" else archive)
+    found, _ = displacement(tmp_path, load, 1.0, file)
     assert np.abs(expected).max() > 1e-8
-    numbered, study = displacement(
-        tmp_path, f"*NSET, NSET=T\n{TIP},\n*CLOAD\nT, 1, 60.\nT, 3, -200.\n{HIGH}, 2, 50.\n", 1.0,
-        "b.inp", lambda *of: deck(*of).replace("HELD, 1, 3\n", "".join(
-            f"{node}, 1, 3\n" for node in HELD)))
+    text = deck(f"*NSET, NSET=T\n{TIP},\n*CLOAD\nT, 1, 60.\nT, 3, -200.\n{HIGH}, 2, 50.\n")
+    (tmp_path / "b.inp").write_text(text.replace("HELD, 1, 3\n", "".join(
+        f"{node}, 1, 3\n" for node in HELD)))
+    numbered, study = displacement_of(imported(tmp_path / "b.inp"), tmp_path)
     assert study.body.fixed == {"BOUNDARY 1-3": "xyz"}
     assert numbered == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
     assert found == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
@@ -196,8 +193,7 @@ def test_forces_of_nastran_and_ansys_are_those_of_a_deck(file, load, tmp_path):
 
 def test_rotation_of_an_archive_is_that_of_a_deck(tmp_path):
     expected, _ = displacement(tmp_path, "*DLOAD\nEALL, CENTRIF, 2500., 0., 0., 0., 0., 3., 4.\n")
-    found, study = displacement(tmp_path, "OMEGA,  0.0    ,  30.0    ,  40.0\n", 1.0, "a.cdb",
-                                archive)
+    found, study = displacement(tmp_path, "OMEGA,  0.0    ,  30.0    ,  40.0\n", 1.0, "a.cdb")
     assert study.body.rotation.speed == pytest.approx(50.0)
     assert found == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
 
@@ -227,8 +223,7 @@ def test_moments_of_nastran_act_on_points_that_others_follow(tmp_path):
       "F HEAT is left out", "BF is left out")),
 ])
 def test_loads_of_nastran_and_ansys_that_are_not_taken_are_named(file, load, sentences, tmp_path):
-    (tmp_path / file).write_text(bulk(load) if file == "a.bdf" else archive(load))
-    text = imported(tmp_path / file).toml(tmp_path)
+    text = imported(written(tmp_path / file, load, 1.0)).toml(tmp_path)
     for sentence in sentences:
         assert sentence in text, text
     study = Study.from_toml(text, tmp_path / "a.toml")
@@ -270,9 +265,9 @@ def test_sides_of_cells_by_two_of_their_points(corners, tmp_path):
     ("a.cdb", "ACEL,0,x,0\n", r"ACEL holds the values '0,x,0', which are no numbers"),
 ])
 def test_bad_loads_of_nastran_and_ansys(file, load, message, tmp_path):
-    (tmp_path / file).write_text(bulk(load) if file == "a.bdf" else archive(load))
+    path = written(tmp_path / file, load, 1.0)
     with pytest.raises((MeshError, InputError), match=message):
-        read_mesh(tmp_path / file)
+        read_mesh(path)
 
 
 # Studies --------------------------------------------------------------------------------------
