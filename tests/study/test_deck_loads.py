@@ -12,6 +12,7 @@ from solid_blocks import block_mesh
 from fecontact import InputError, MeshError, Study, read_mesh, static_solution
 from fecontact.fem.elements.cell_kinds import HEXAHEDRON
 from fecontact.fem.mesh_files.cut_cells import SHAPES
+from fecontact.fem.mesh_files.deck_contents import COMPONENTS
 from fecontact.fem.mesh_files.nastran_loads import nastran_contents
 from fecontact.study.imported import imported
 
@@ -168,6 +169,61 @@ def test_loads_of_nastran_and_ansys_are_those_of_calculix(file, load, scale, exp
     assert len(study.body.fixed) == 1
     assert found == pytest.approx(np.array(CALCULIX[expected]),
                                   abs=2e-6 * np.abs(CALCULIX[expected]).max())
+
+
+# A cube, a wedge at its right side and a tetrahedron at the wedge's end, all under pressure.
+MIXED = """\
+LOAD = 12
+SPC = 3
+BEGIN BULK
+GRID,1,,0.,0.,0.
+GRID,2,,1.,0.,0.
+GRID,3,,1.,1.,0.
+GRID,4,,0.,1.,0.
+GRID,5,,0.,0.,1.
+GRID,6,,1.,0.,1.
+GRID,7,,1.,1.,1.
+GRID,8,,0.,1.,1.
+GRID,10,,2.,0.,0.
+GRID,11,,2.,1.,0.
+GRID,12,,1.5,-1.,0.
+CHEXA,1,1,1,2,3,4,5,6
++,7,8
+CPENTA,2,1,2,6,10,3,7,11
+CTETRA,3,1,2,10,6,12
+LOAD,12,2.,1.5,7,-.5,8
+PLOAD4,7,1,10.,,,,1,8
+PLOAD4,7,1,30.,,,,8,6
+PLOAD4,7,2,20.,,,,3
+PLOAD4,7,2,5.,,,,10,7
+PLOAD4,8,2,-7.,,,,2,11
+PLOAD4,7,3,3.,,,,12,6
+PLOAD4,7,3,4.,,,,12,2
+FORCE,8,1,,3.,1.,2.,-2.
+FORCE,7,12,,3.,1.,2.,-2.
+MOMENT,7,12,,4.,1.,0.,0.
+SPC1,3,123,1,4,5,8
+ENDDATA
+"""
+
+
+def test_sums_of_forces_of_nastran_are_those_of_another_reader(tmp_path):
+    """Force and moment about the origin by sum_forces_moments of pyNastran 1.4.1."""
+    (tmp_path / "a.bdf").write_text(MIXED)
+    mesh, contents = read_mesh(tmp_path / "a.bdf"), nastran_contents(tmp_path / "a.bdf")
+    assert contents.distributed.unread == []
+    force, moment = np.zeros(3), np.zeros(3)
+    for name, pressure in contents.distributed.pressures:
+        corners = mesh.nodes[mesh.boundaries[name]]
+        areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        force -= pressure * areas.sum(axis=0)
+        moment -= pressure * np.cross(corners.mean(axis=1), areas).sum(axis=0)
+    for name, component, value in contents.forces:
+        way = value * np.eye(6)[COMPONENTS.index(component)]
+        force += way[:3]
+        moment += way[3:] + np.cross(mesh.nodes[mesh.points[name][0]], way[:3])
+    assert force == pytest.approx([15.0, -15.0, -111.5])
+    assert moment == pytest.approx([-9.5, 91.75, -9.0])
 
 
 @pytest.mark.parametrize(("file", "load"), [
