@@ -16,6 +16,7 @@ from .output.plots.diagram_insets import Inset, phase_inset
 from .output.plots.diameters import plot_diameters
 from .output.plots.fields import plot_stress
 from .output.plots.figure import StyledFigure, new_figure, styled
+from .output.plots.half_space import plot_half_space
 from .output.plots.many_runs import plot_basins, plot_poincare_scan, plot_runs
 from .output.plots.modes import plot_buckling, plot_convergence, plot_modes, plot_wheel
 from .output.plots.phase_space import plot_phase_space
@@ -51,6 +52,7 @@ __all__ = [
     "plot_energies",
     "plot_fit",
     "plot_friction_work",
+    "plot_half_space",
     "plot_history",
     "plot_loop",
     "plot_modal_assurance",

@@ -57,6 +57,9 @@ EXAMPLES = {
     "pressed_sphere": ([(r"^radius of contact (\S+) mm", 1.0, 5e-3),
                         (r"takes (\S+) mJ", 6.3035, 0.5)],
                        {"pressed_sphere_loop.png", "pressed_sphere_shear.png"}),
+    # What no longer touches at 0.6 and 0.2 of the load (Jaeger, Ciavarella).
+    "half_space": ([(r"^at .* force (\S+) and", 36.66, 1.5),
+                    (r" and (\S+) % of it slide", 75.11, 1.5)], {"half_space.png"}),
     # Slip theory: 4.01786 J.
     "clamped_layers": ([(r"^mu p b h / P = 0.375: (\S+) J", 4.01786, 0.01)],
                        {"clamped_layers.png"}),

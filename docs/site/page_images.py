@@ -125,6 +125,12 @@ def squeal(folder: Path) -> dict[str, Path]:
     return {"flutter_modes": folder / "squeal_modes.png"}
 
 
+def half_space(folder: Path) -> dict[str, Path]:
+    """A rough surface pressed and sheared."""
+    example(folder, "half_space")
+    return {"half_space": folder / "half_space.png"}
+
+
 def block(folder: Path) -> dict[str, Path]:
     """Stick-slip of a block over the speed of its belt."""
     results = studied(folder, "friction_branch", "branch")
@@ -193,6 +199,7 @@ def panel(folder: Path) -> dict[str, Path]:
 MAKERS: dict[Callable[[Path], dict[str, Path]], tuple[str, ...]] = {
     beam: ("beam_on_wavy_ground", "contact_map", "report"),
     solid: ("solid_on_belt", "report-solid"), squeal: ("flutter_modes",),
+    half_space: ("half_space",),
     block: ("block_over_speed",), sweep: ("sweep_map",), stick_slip: ("beam_stick_slip",),
     orbits: ("impact_orbits", "impact_doublings"), two_masses: ("two_masses_over_B",),
     responses: ("friction_damper_response", "hardening_response"),

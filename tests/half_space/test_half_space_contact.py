@@ -214,6 +214,18 @@ def rough(pixels=64):
     return np.ascontiguousarray(1e-6 * z / z.std())
 
 
+def test_superposition_of_shear():
+    """Tractions ``mu (p(P) - p(P - Q / mu))`` of nu = 0 (Jaeger, 1998; Ciavarella, 1998)."""
+    gap, side, part = -rough(32), 1e-3 / 32, 0.6
+    whole, rest = (half_space_contact(gap, side, SOFT, force=force, periodic=True, rtol=1e-10)
+                   for force in (60.0, (1.0 - part) * 60.0))
+    found = half_space_friction(whole, MU, forces=[(part * MU * 60.0, 0.0)], rtol=1e-8)
+    exact = MU * (whole.pressure - rest.pressure)
+    assert found.traction[0, ..., 0] == pytest.approx(exact, abs=1e-5 * exact.max())
+    assert found.traction[0, ..., 1] == pytest.approx(0.0, abs=1e-6 * exact.max())
+    assert found.sticking[0].sum() == pytest.approx(rest.touching.sum(), abs=1.0)
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("tamaas") is None, reason="tamaas is not installed")
 def test_rough_surface_beside_tamaas():
