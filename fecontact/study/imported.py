@@ -182,6 +182,7 @@ class Imported:
         """Forces and moments at points, pressure and gravity of the first step."""
         found = _Loads({body: set() for body in bodies})
         several = len(bodies) > 1 or bool(self.interfaces)
+        found.notes += self._lost_supports(bodies)
         for given, component, value in self.contents.forces:
             word = self.contents.single.get(given, given)
             for body in bodies:
@@ -230,6 +231,20 @@ class Imported:
         for what in dict.fromkeys(distributed.unread):
             found.notes.append(f"{what} is left out: only {distributed.kinds} are read.")
         return found
+
+    def _lost_supports(self, bodies: Sequence[str]) -> Iterator[str]:
+        """Sentences on supports that hold displacements, but are fixed on none of the bodies."""
+        bodies_fixed = [self._body(body).get("fixed", {}) for body in bodies]
+        taken = {name.upper() for fixed in bodies_fixed if isinstance(fixed, dict)
+                 for name in fixed}
+        axes = "xyz"[: self.meshes[bodies[0]].dimension]
+        for given, components in self.contents.supports:
+            words = {self.contents.single.get(given, given).upper(), f"NODE {given}"}
+            # Nodes by their numbers are in groups of their own.
+            numbered = given.isdigit() and any(name.startswith("BOUNDARY ") for name in taken)
+            if not words & taken and not numbered and {*components.split()} & {*axes}:
+                yield (f"The support of {given} is left out: it is no group of the bodies, or "
+                       f"touches a face of an interface.")
 
     def _rotation(self, body: str) -> dict[str, object] | None:
         """Table of the rotation of a body by centrifugal force on all its cells."""

@@ -79,7 +79,11 @@ def test_supports_of_the_deck(place):
     text = deck(*STACK, more="*BOUNDARY\nleft, 1, 2\nRIGHT, ENCASTRE\nfront, 3, 3, 0.1\ntop, 1, 3\n"
                              "*STEP\n*STATIC\n*END STEP\n*STEP\n*BOUNDARY\nback, 1\n")
     (place / "stack.inp").write_text(text)
-    study = Study.from_toml(imported("stack.inp").toml(place), place / "study.toml")
+    written = imported("stack.inp").toml(place)
+    assert [line for line in written.splitlines() if "support of" in line] == [
+        "# The support of top is left out: it is no group of the bodies, or touches a face of an "
+        "interface."]
+    study = Study.from_toml(written, place / "study.toml")
     assert study.bodies["A"].body.fixed == {"left": "xy", "right": "xyz"}
 
 
