@@ -80,11 +80,11 @@ def test_supports_of_the_deck(place):
                              "*STEP\n*STATIC\n*END STEP\n*STEP\n*BOUNDARY\nback, 1\n")
     (place / "stack.inp").write_text(text)
     written = imported("stack.inp").toml(place)
-    assert [line for line in written.splitlines() if "support of" in line] == [
-        "# The support of top is left out: it is no group of the bodies, or touches a face of an "
-        "interface."]
     study = Study.from_toml(written, place / "study.toml")
     assert study.bodies["A"].body.fixed == {"left": "xy", "right": "xyz"}
+    # The upper block is held at its own top.
+    assert study.bodies["B"].body.fixed == {"left": "xy", "right": "xyz", "top": "xyz"}
+    assert "The support of" not in written
 
 
 def test_supports_and_loads_at_reference_nodes(cli, place):
