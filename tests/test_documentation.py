@@ -427,6 +427,15 @@ def check_half_spaces(names, printed, folder):
     assert printed[-1] == "8 56"
 
 
+def check_quasi_periodic(names, printed, folder):
+    # Averaging about the forced vibration b = force / (w^2 - 1): a^2 = 4 - 2 b^2.
+    b, motion = 0.3 / 0.69, names["motion"]
+    sizes = {abs(motion.harmonic(*k)[0]) for k in ((0, 1), (1, 1), (-1, 1))}
+    assert abs(motion.harmonic(1, 0)[0]) == pytest.approx(b, rel=0.05)
+    assert max(sizes) == pytest.approx(np.sqrt(4.0 - 2.0 * b**2), abs=0.03)
+    assert names["over_frequency"].points[-1].parameter == pytest.approx(3.8)
+
+
 CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,
           "laws.md": check_laws, "frequency-responses.md": check_frequency_responses,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
@@ -439,7 +448,8 @@ CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": che
           "solids.md": check_solids,
           "report.md": check_report, "contact-faces-in-space.md": check_faces_in_space,
           "results.md": check_results, "measurements.md": check_measurements,
-          "fitting.md": check_fitting, "half-spaces.md": check_half_spaces}
+          "fitting.md": check_fitting, "half-spaces.md": check_half_spaces,
+          "quasi-periodic.md": check_quasi_periodic}
 
 
 def test_every_page_with_code_is_known():

@@ -30,6 +30,10 @@ EXAMPLES = {
                            (r"fold at B = (\S+)", 0.890687, 1e-4),
                            (r"doubling at B = (8\S+)", 8.092192, 1e-4)],
                           {"two_masses_over_B.png"}),
+    # The Neimark-Sacker point by collocation.
+    "beating_friction": ([(r"^tori from waves of (\S+) um", 32.7298, 2e-3),
+                          (r"^waves of 2 um: \S+ Hz and (\S+) Hz", 4.957, 2e-3)],
+                         {"tori.png", "tori_section.png"}),
     "sliding_beam": ([(r"off by (\S+)$", 0.0, 1e-8)],
                      {"contact.png", "energies.png", "friction_work.png", "history.png",
                       "sliding_beam.mp4"}),

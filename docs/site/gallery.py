@@ -18,7 +18,7 @@ bodies of other programs.
 """
 ORDER = (
     "squeal", "disc_brake", "beam_stick_slip", "friction_oscillator", "two_mass_friction",
-    "sliding_beam", "sliding_borders",
+    "beating_friction", "sliding_beam", "sliding_borders",
     "impact_oscillator", "impact_map", "impact_orbits", "million_starts", "colliding_bars",
     "line_contact", "two_bodies", "pressed_sphere", "half_space",
     "lap_joint", "clamped_layers", "bolted_panel", "brake_reuss_beam",

@@ -131,6 +131,12 @@ def half_space(folder: Path) -> dict[str, Path]:
     return {"half_space": folder / "half_space.png"}
 
 
+def tori(folder: Path) -> dict[str, Path]:
+    """Tori and orbits of a block on a wavy belt."""
+    example(folder, "beating_friction")
+    return {"tori": folder / "tori.png"}
+
+
 def block(folder: Path) -> dict[str, Path]:
     """Stick-slip of a block over the speed of its belt."""
     results = studied(folder, "friction_branch", "branch")
@@ -198,7 +204,7 @@ def panel(folder: Path) -> dict[str, Path]:
 
 MAKERS: dict[Callable[[Path], dict[str, Path]], tuple[str, ...]] = {
     beam: ("beam_on_wavy_ground", "contact_map", "report"),
-    solid: ("solid_on_belt", "report-solid"), squeal: ("flutter_modes",),
+    solid: ("solid_on_belt", "report-solid"), squeal: ("flutter_modes",), tori: ("tori",),
     half_space: ("half_space",),
     block: ("block_over_speed",), sweep: ("sweep_map",), stick_slip: ("beam_stick_slip",),
     orbits: ("impact_orbits", "impact_doublings"), two_masses: ("two_masses_over_B",),

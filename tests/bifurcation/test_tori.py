@@ -16,6 +16,7 @@ from fecontact.bifurcation import (
     periodic_motion,
     torus_branch,
     torus_motion,
+    vector_field,
 )
 from fecontact.core.errors import AnalysisError, InputError
 
@@ -197,6 +198,58 @@ def test_a_run_finds_both_tones_too():
     by_orbit = one(field, without_second(field), "w", second=SECOND,
                    method=TorusBalance((5, 5)))
     assert by_run.u == pytest.approx(by_orbit.u, abs=1e-6)
+
+
+def coupled(t, x, p, out):
+    out[0] = x[1]
+    out[1] = p[0] * (1.0 - x[0] * x[0]) * x[1] - x[0] + p[2] * (x[2] - x[0])
+    out[2] = x[3]
+    out[3] = p[1] * (1.0 - x[2] * x[2]) * x[3] - 2.0 * x[2] + p[2] * (x[0] - x[2])
+
+
+@pytest.mark.parametrize("second", [0.2, -0.2])
+def test_two_oscillators_that_do_not_feel_each_other(second, tmp_path):
+    # Each has w = w0 - eps^2 / (16 w0) and decays to its cycle by exp(-eps t); backwards it grows.
+    field = vector_field(coupled, {"first": 0.2, "second": second, "coupling": 0.0},
+                         ["x", "vx", "y", "vy"])
+    w = np.array([1.0, np.sqrt(2.0)])
+    times = np.linspace(0.0, 400.0, 4001)
+    guess = np.concatenate([[2.0 * np.cos(each * times), -2.0 * each * np.sin(each * times)]
+                            for each in w]).T
+    branch = torus_branch(field, (times, guess), "coupling", method=TorusBalance(5),
+                          bounds=(0.0, 0.05))
+    point, motion = branch.points[0], torus_motion(branch.points[0])
+    assert np.sort(CIRCLE * motion.frequencies) == pytest.approx(w - 0.04 / 16.0 / w, rel=1e-4)
+    period = 1.0 / motion.frequencies[0]
+    assert point.values["multipliers"] == pytest.approx(
+        np.sort([1.0, 1.0, np.exp(-0.2 * period), np.exp(-second * period)])[::-1], rel=1e-2)
+    assert point.values["trivial_error"] < 1e-6
+    assert point.values["stable"] == (second > 0.0)
+    # What files hold goes on.
+    fc.io.write_branch(tmp_path / "tori.h5", branch)
+    last = fc.io.read_branch(tmp_path / "tori.h5").points[-1]
+    on = torus_branch(field, last, bounds=(0.0, 0.06), method=TorusBalance((6, 5)))
+    assert on.points[-1].parameter == pytest.approx(0.06)
+    assert on.points[0].values["frequency_2"] == pytest.approx(last.values["frequency_2"], rel=1e-4)
+
+
+def test_far_from_resonance_the_free_vibration_is_smaller():
+    # Averaging about the forced vibration b: a^2 = 4 - 2 b^2.
+    field = forced_van_der_pol(0.02, 0.3, 1.3)
+    point = one(field, settled(field, [2.0, 0.0], 1000.0, 2000.0), "w", method=TorusBalance((4, 4)))
+    b = 0.3 / (1.3**2 - 1.0)
+    motion = torus_motion(point)
+    assert abs(motion.harmonic(1, 0)[0]) == pytest.approx(b, rel=1e-2)
+    assert abs(motion.harmonic(0, 1)[0]) == pytest.approx(np.sqrt(4.0 - 2.0 * b**2), rel=1e-3)
+
+
+def test_a_torus_that_its_harmonics_do_not_resolve_ends_the_branch():
+    field = forced_van_der_pol(EPS, 0.1, 1.2)
+    branch = torus_branch(field, settled(field, [2.0, 0.0], 300.0, 2000.0), "w", direction=-1.0,
+                          bounds=(1.0, 1.2), method=TorusBalance((3, 3), tolerance=0.02))
+    # The frequencies lock at the detuning F / (2 a w).
+    assert branch.status is BranchStatus.UNRESOLVED_TORUS
+    assert branch.points[-1].parameter > 1.0 + 0.1 / 4.0
 
 
 def test_what_is_no_torus_is_refused():

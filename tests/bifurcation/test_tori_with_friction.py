@@ -6,14 +6,23 @@ from systems import basis
 
 import fecontact as fc
 from fecontact.bifurcation import (
+    BranchStatus,
     ContinuationOptions,
     TorusBalance,
     contact_field,
+    orbit_branch,
+    periodic_motion,
     torus_branch,
     torus_motion,
 )
 from fecontact.core.errors import InputError
-from fecontact.laws import ConstantFriction, JenkinsFriction, LuGreFriction, RoughSurface
+from fecontact.laws import (
+    ConstantFriction,
+    ExponentialFriction,
+    JenkinsFriction,
+    LuGreFriction,
+    RoughSurface,
+)
 
 DRIVE_HZ, WAVES_HZ = np.sqrt(13.0), 2.5
 
@@ -96,6 +105,25 @@ def test_a_bristle_is_a_series_too():
     # The bristle turns over within a hundredth of a period, where its series overshoots.
     far = np.abs(torus_motion(point).states(run.time) - run.states)[:, 4].mean()
     assert far < 0.08 * np.ptp(run.states[:, 4])
+
+
+def test_waves_that_entrain_a_friction_vibration_end_its_torus():
+    r = 1.0 / np.sqrt(5.632)
+    shape = [[r, 0.0], [0.0, r]]
+    system = fc.ContactSystem(
+        basis([0.0, 0.0], [0.0, 0.0], shape, shape), normal=RoughSurface(10e6, 10e-6, 40.0),
+        friction=ExponentialFriction(0.8, 0.55, 50.0, 1e3),
+        ground=fc.Ground(speed=20e-3, amplitude=31e-6, wavelength=4.4e-3),
+        drive=fc.Drive(stiffness_x=5610.0, damping_x=20.0), load=fc.Load(14.0))
+    field = contact_field(system, ["ground.amplitude"])
+    tori = torus_branch(field, steady(system, 60.0, 20.0), bounds=(30e-6, 38e-6),
+                        method=TorusBalance((6, 6)))
+    assert tori.status is BranchStatus.SINGLE_FREQUENCY
+    high = contact_field(system.with_({"ground.amplitude": 35e-6}), ["ground.amplitude"])
+    orbits = orbit_branch(high, periodic_motion(high, transient=60.0), bounds=(32e-6, 38e-6),
+                          direction=-1.0)
+    born, = orbits.of_kind("Neimark-Sacker")
+    assert tori.points[-1].parameter == pytest.approx(born.parameter, rel=1e-4)
 
 
 def test_the_ground_may_be_the_second_frequency_only_by_name():

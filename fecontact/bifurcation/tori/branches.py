@@ -272,6 +272,7 @@ def _corrected(problem: TorusProblem, u: Array) -> tuple[TorusProblem, Array]:
     norm = float(np.linalg.norm(linearised.residual))
     for _ in range(_CORRECTIONS):
         step = linearised.solve(row, -np.append(linearised.residual, 0.0))
+        step[-1] = 0.0
         size = float(np.sqrt(weights @ step**2))
         if not np.isfinite(size):
             break
@@ -309,6 +310,6 @@ def _followed(
         "parameter_values": problem.values, "scales": problem.scales,
         "torus_harmonics": np.array(problem.orders), "torus_samples": np.array(problem.samples),
         "torus_multipliers": int(problem.multipliers), "tolerance": problem.tolerance,
-        "displacements": problem.layout.displacements, "periods": problem.excitation.periods}
+        "torus_displacements": problem.layout.displacements, "periods": problem.excitation.periods}
     return continue_branch(problem, u, options, name=name, tangent=tangent, direction=direction,
                            both=both, attributes=attributes)

@@ -101,7 +101,7 @@ def torus_motion(point: BranchPoint) -> TorusMotion:
     if "torus_harmonics" not in known:
         raise InputError(f"{point.place} is no torus; take a point of torus_branch(...).")
     first, second = (int(H) for H in known["torus_harmonics"])
-    names, m = tuple(map(str, known["state_names"])), int(known["displacements"])
+    names, m = tuple(map(str, known["state_names"])), int(known["torus_displacements"])
     k = orders(first, second)
     X = point.u[: (2 * len(k) - 1) * (len(names) - m)].reshape(2 * len(k) - 1, -1)
     frequencies = np.array([point.values["frequency_1"], point.values["frequency_2"]], dtype=float)

@@ -28,7 +28,7 @@ from fecontact.core.types import Array
 # Relative step of differences in a parameter that changes a prescribed frequency.
 _DIFFERENCE = 1e-5
 # Points per harmonic among which extremes are sought.
-_FINE = 8
+_FINE = 16
 # Test function whose zero ends a branch of tori that shrink to an orbit.
 _SHRINKS = "torus shrinks"
 

@@ -237,18 +237,22 @@ def _stored(group: Any, path: str | Path) -> Branch:
                       for name, item in _members(group, "attributes").items()}
         _require_kinds(attributes)
         _require_orbits(attributes, u, stored)
+        _require_tori(attributes, u, stored)
         return Branch(text(group, "parameter"), points, BranchStatus[text(group, "status")],
                       text(group, "message"), attributes)
 
 
 # Attributes of branches by what they are.
 _COUNTS = ("degree", "displacements", "harmonics", "memory", "memory_nodes", "mode_number",
-           "periods", "samples")
+           "periods", "samples", "torus_displacements")
 _LAYOUT = ("displacements", "harmonics", "memory", "memory_nodes", "state_names")
 _NUMBERS = ("level",)
 _TEXTS = ("condition", "kind", "level_label", "level_name", "observed", "stability")
 _LISTS = ("labels", "parameter_names", "parameters", "state_names")
-_ARRAYS = ("limits", "orders", "parameter_values", "scales", "widths")
+_ARRAYS = ("limits", "orders", "parameter_values", "scales", "torus_harmonics",
+           "torus_samples", "widths")
+_TORI = ("torus_harmonics", "torus_samples", "torus_displacements", "torus_multipliers",
+         "tolerance", "periods", "scales", "state_names")
 
 
 def _require_kinds(attributes: dict[str, Any]) -> None:
@@ -307,6 +311,23 @@ def _require_orbits(attributes: dict[str, Any], u: list[Array], stored: dict[str
     if layout.memory and u and any(np.shape(each)[1:] != (layout.memory,)
                                    for each in stored.get("memory", [()])):
         raise DamagedError(f"'values/memory' has no {layout.memory} internal variables")
+
+
+def _require_tori(attributes: dict[str, Any], u: list[Array], stored: dict[str, Any]) -> None:
+    """Raise DamagedError where tori lack a part, or parts disagree; see _require_orbits."""
+    if "torus_harmonics" not in attributes:
+        return
+    missing = [*(name for name in _TORI if name not in attributes),
+               *(name for name in ("frequency_1", "frequency_2") if u and name not in stored)]
+    if missing:
+        raise DamagedError(f"it lacks '{missing[0]}'")
+    states, m = len(attributes["state_names"]), attributes["torus_displacements"]
+    harmonics = attributes["torus_harmonics"].tolist()
+    if len(harmonics) != 2 or min(harmonics) < 1 or not 2 * m <= states:
+        raise DamagedError(f"the attribute 'torus_harmonics' is {shown(harmonics)}")
+    count = (2 * harmonics[0] + 1) * (2 * harmonics[1] + 1) * (states - m)
+    if not all(count < len(each) for each in u):
+        raise DamagedError(f"{states} states do not fit the harmonics {shown(harmonics)}")
 
 
 def _write(group: Any, name: str, values: list[Any]) -> None:
