@@ -312,7 +312,7 @@ MISTAKES = [
     ({"drive.damping_y": -1}, r"\[drive\]: damping_y = -1\.0 must be a finite number, zero"),
     ({"load.normal": float("inf")}, r"\[load\]: normal = inf must be finite"),
     ({"gap": -1}, r"s.toml: gap = -1 must be finite and zero or above"),
-    ({"gap": "a"}, r's.toml: gap = "a" must be a number, a list of numbers or a table of'),
+    ({"gap": "a"}, r's.toml: gap = "a" must be a number, a list of numbers, a table of'),
     ({"gap": [0, 0]}, r"s.toml: gap has 2 values for 4 contact nodes"),
     ({"body.material": "steal"}, r"\[body\]: There is no material 'steal' \(did you mean 'steel'"),
     ({"body.material": 7}, r"\[body\]: material = 7 must be a text in quotes"),
