@@ -31,7 +31,8 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.solvers.factorisation import factorised
 from fecontact.reduction.static_modes.residual_vectors import flexibility_of, leading_patterns
 
-_LAYERS = 3.0  # of facets, to the depth at which elements are held
+# Depth at which elements are held, by their degree, in facets: errors of linear ones reach deeper.
+_LAYERS = {1: 6.0, 2: 3.0}
 _FLAT = 0.9  # least cosine of the normals of facets against the mean one
 _FREE = 0.7  # least cosine of the normal of a facet on the surface of the half-space
 _RANK = 1e-8  # of the rows of the contact nodes
@@ -214,7 +215,7 @@ def _region(
     """
     from scipy.spatial import cKDTree
 
-    depth = _LAYERS * float(np.sqrt(face.patches.surface.areas.max()))
+    depth = _LAYERS[body.degree] * float(np.sqrt(face.patches.surface.areas.max()))
     surface = Surface(body.nodes, body.facet_nodes(body.mesh.outline))
     normals = surface.area_vectors / surface.areas[:, None]
     level = np.abs(places[surface.facets].mean(axis=1)[:, 2]) <= 0.5 * depth

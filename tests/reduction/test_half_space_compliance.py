@@ -7,7 +7,7 @@ import pytest
 
 import fecontact as fc
 from fecontact.core.errors import InputError
-from fecontact.fem import Coupling, pair_faces
+from fecontact.fem import Coupling, SolidBlock, pair_faces
 from fecontact.half_space import half_space_contact, half_space_friction
 from fecontact.laws import ConstantFriction, LinearContact
 from fecontact.reduction import reduce_bodies, with_half_space
@@ -41,7 +41,7 @@ def uniform(basis):
 
 
 @pytest.mark.parametrize(("nx", "nz", "degree", "error", "before"), [
-    (6, 4, 1, [0.013, 0.013, 0.007], 0.12), (12, 8, 1, [0.006, 0.006, 0.004], 0.04),
+    (6, 4, 1, [0.013, 0.013, 0.007], 0.12), (12, 8, 1, [0.006, 0.006, 0.003], 0.04),
     (6, 4, 2, [0.003, 0.003, 0.002], 0.014), (9, 6, 2, [0.002, 0.002, 0.002], 0.005)])
 def test_even_load_on_a_patch(nx, nz, degree, error, before):
     """To 1.3 % with two linear elements along the patch, which alone are 13 and 17 % too stiff."""
@@ -51,6 +51,22 @@ def test_even_load_on_a_patch(nx, nz, degree, error, before):
     assert (np.abs(found / SQUARE - 1.0) < error).all()
     alone = uniform(fc.modal_basis(body, 8, reduction="residual", tolerance=0.0))
     assert (alone / SQUARE - 1.0 < -before).all()
+
+
+@pytest.mark.parametrize(("degree", "error", "before"), [
+    (1, [0.012, 0.012, 0.005], 0.09), (2, [0.002, 0.002, 0.002], 0.008)])
+def test_even_load_on_tetrahedra(degree, error, before):
+    """Patches of triangles; linear tetrahedra alone are 9 and 13 % too stiff."""
+    mesh = fc.generate(SolidBlock(0.012, 0.012, 0.008, element_size=1e-3, element="tetrahedron"))
+    bottom = mesh.boundaries["contact"]
+    inside = (np.abs(mesh.nodes[bottom].mean(axis=1)[:, :2] - 6e-3) < 2e-3).all(axis=1)
+    mesh = replace(mesh, boundaries={"contact": bottom[inside], "top": mesh.boundaries["top"]})
+    body = fc.ElasticBody(mesh, degree=degree, fixed={"top": "xyz"})
+    basis, alone = (fc.modal_basis(body, 8, contact_nodes=(2, 2), **how) for how in (
+        {}, {"reduction": "residual", "tolerance": 0.0}))
+    found = uniform(with_half_space(basis, body))
+    assert (np.abs(found / SQUARE - 1.0) < error).all()
+    assert (uniform(alone) / SQUARE - 1.0 < -before).all()
 
 
 def test_nothing_is_counted_twice():
@@ -119,7 +135,7 @@ def system_of(basis, load):
 
 
 def test_hertz_and_cattaneo_on_linear_elements():
-    """Pressures to 2 % and the loss of a cycle to 3 %, of elements that lock at nu = 0.49."""
+    """Pressures to 3 % and the loss of a cycle to 3 %, of elements that lock at nu = 0.49."""
     body, basis, exact = pressed(0.49)
     side = exact.sides[0]
     full = with_half_space(basis, body)
@@ -130,7 +146,7 @@ def test_hertz_and_cattaneo_on_linear_elements():
         forces = fc.equilibrium(system_of(one, exact.force)).normal_force
         errors.append(np.abs(forces - expected).sum() / expected.sum())
     assert errors[0] > 0.2
-    assert errors[1] < 0.02
+    assert errors[1] < 0.03
     parts = np.array([0.9, 0.45, 0.0, -0.45, -0.9, -0.45, 0.0, 0.45, 0.9]) * MU * exact.force
     shear = half_space_friction(exact, MU, forces=np.outer(parts, [1.0, 0.0]))
     path = fc.LoadPath(forces={"C.x": (0.0, parts[0], -parts[0], parts[0])}, steps=4)
