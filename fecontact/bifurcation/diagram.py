@@ -13,6 +13,7 @@ from fecontact.bifurcation.continuation.problem import ContinuationOptions, titl
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.orbits.samples import observe
+from fecontact.bifurcation.tori.motion import torus_motion
 from fecontact.bifurcation.tree import BranchTree, Task, grow, tasks_beyond
 from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 
@@ -29,6 +30,8 @@ _LONGEST_STEP = 0.02
 _SCALE = 10.0
 # Number of points of a branch at which the limits of the model are checked.
 _CHECKED_POINTS = 12
+# Periods of the lower frequency of a torus in which they are checked, and samples.
+_PERIODS, _SAMPLES = 10.0, 2000
 
 
 @dataclass(kw_only=True)
@@ -99,6 +102,10 @@ def _limits_exceeded(field: ContactField, branch: Branch) -> Iterator[str]:
         if "period" in point.values:
             motion = point.orbit(field)
             times, states = motion.times, motion.states
+        elif point.is_torus:
+            torus = torus_motion(point)
+            times = np.linspace(0.0, _PERIODS / torus.frequencies.min(), _SAMPLES)
+            states = torus.states(times)
         else:
             times, states = np.zeros(1), np.atleast_2d(point.values["state"])
         found = limits_exceeded(field.system(values), times, states)

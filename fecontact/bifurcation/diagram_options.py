@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 # Limits of the mesh intervals or segments and of the runs beneath a diagram, against typing errors.
 _MOST_PIECES, _MOST_RUNS = 10_000, 100_000
 # Kinds of special points at which other branches begin.
-SWITCHES = ("Hopf", "period doubling", "branch point")
+SWITCHES = ("Hopf", "period doubling", "branch point", "Neimark-Sacker")
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class BranchSettings:
     kind : 'equilibria', 'orbits' or 'both'
         Solutions followed first: steady sliding, the periodic orbit on which a run at ``start``
         settles, or both.
-    switch : list of 'Hopf', 'period doubling', 'branch point'
+    switch : list of 'Hopf', 'period doubling', 'branch point', 'Neimark-Sacker'
         Special points at which the branches that begin there are followed too: the orbits born at
-        Hopf points, those of twice the period, the other branch.
+        Hopf points, those of twice the period, the other branch, tori by harmonic balance.
     depth : int
         How often to go over from a branch to others that begin on it.
     step, largest_step : float

@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 # Distance within which two points are the same: in widths of the diagram, ranges of the states, and
 # parts of a period.
 _SAME = 1e-4
+# Kinds of special points at which a tree switches by default.
+_USUAL = tuple(kind for kind in SWITCHES if kind != "Neimark-Sacker")
 
 
 @dataclass(repr=False)
@@ -75,7 +77,7 @@ class Task(NamedTuple):
 
 def branch_tree(
     field: VectorField, first: Branch | Sequence[Branch] | Mapping[str, Branch], *,
-    depth: int = 1, switch: Iterable[str] = SWITCHES, method: "Method | None" = None,
+    depth: int = 1, switch: Iterable[str] = _USUAL, method: "Method | None" = None,
     both: bool = True, options: ContinuationOptions | None = None,
     bounds: tuple[float, float] | None = None,
 ) -> BranchTree:
@@ -94,7 +96,8 @@ def branch_tree(
     depth : int
         Number of generations of branches.
     switch : sequence of str
-        Kinds of special points at which to switch: 'Hopf', 'period doubling', 'branch point'.
+        Kinds of special points at which to switch: 'Hopf', 'period doubling', 'branch point' by
+        default, and 'Neimark-Sacker' to tori.
     method : Collocation, Shooting or HarmonicBalance, optional
         Of the orbits born at Hopf points, by default collocation; others keep theirs.
     both : bool
@@ -213,7 +216,8 @@ def tasks_beyond(
             count = f" {number + 1}" if len(points) > 1 else ""
             title = {"Hopf": f"{before}orbits{count}",
                      "period doubling": f"{task.title}, doubled{count}",
-                     "branch point": f"{task.title}, crossing{count}"}[kind]
+                     "branch point": f"{task.title}, crossing{count}",
+                     "Neimark-Sacker": f"{task.title}, tori{count}"}[kind]
             halves = partial(_beyond, field, point, method, 1.0, both)
             yield Task(title, task.generation + 1, halves, point)
             if kind == "branch point" and point.is_orbit and both:
@@ -227,9 +231,12 @@ def _beyond(
 ) -> Branch:
     """The branch that begins at a special point."""
     from fecontact.bifurcation.orbits.branches import orbit_branch
+    from fecontact.bifurcation.tori.branches import torus_branch
 
     if point.kind == "Hopf":
         return orbit_branch(field, point, method=method, options=options)
+    if point.kind == "Neimark-Sacker":
+        return torus_branch(field, point, options=options)
     if point.is_orbit:
         return orbit_branch(field, point, options=options, direction=direction)
     return equilibrium_branch(field, point, options=options, both=both)
@@ -256,6 +263,9 @@ def _known(start: BranchPoint, found: Iterable[Branch]) -> bool:
     if start.kind == "Hopf":
         return any(branch.status is BranchStatus.HOPF and there(branch.points[-1], None)
                    for branch in branches)
+    if start.kind == "Neimark-Sacker":
+        return any(branch.status is BranchStatus.SINGLE_FREQUENCY
+                   and there(branch.points[-1], None) for branch in branches)
     if start.kind == "period doubling":
         return any(point.kind == HALVING and there(point, 2.0)
                    for branch in branches for point in branch.special)
@@ -265,9 +275,12 @@ def _known(start: BranchPoint, found: Iterable[Branch]) -> bool:
 
 
 def _whereabouts(point: BranchPoint) -> tuple[Array, Array, float]:
-    """Middle and range (d,) of the states, and the period; of equilibria the state, 0, 0."""
-    if not point.is_orbit:
+    """Middle and range (d,) of the states, and the period; of equilibria the state, 0, 0.
+
+    The period of a torus is zero.
+    """
+    if "state" in point.values:
         state = np.asarray(point.values["state"])
         return state, np.zeros(len(state)), 0.0
     low, high = (np.asarray(point.values[name]) for name in ("minimum", "maximum"))
-    return 0.5 * (low + high), high - low, float(point.values["period"])
+    return 0.5 * (low + high), high - low, float(point.values.get("period", 0.0))

@@ -95,7 +95,8 @@ def branches_csv(branches: Mapping[str, Branch], usable_hz: float = math.inf) ->
             values, period = point.values, _period(point)
             rows.append([
                 name, point.kind or "", repr(point.parameter), int(values["stable"]),
-                int(values["unstable"]), "" if period is None else repr(period),
+                int(values["unstable"]) if "unstable" in values else "",
+                "" if period is None else repr(period),
                 "" if period is None else repr(1.0 / period),
                 *(repr(float(values[f"observed_{what}"]))
                   for what in ("minimum", "maximum", "amplitude")),
@@ -141,6 +142,9 @@ def _period(point: BranchPoint) -> float | None:
 def _remark(point: BranchPoint) -> str:
     if point.kind is not None:
         return _what_changes(point)
+    if point.is_torus:
+        first, second = (f"{float(point.values[f'frequency_{k}']):.5g} Hz" for k in (1, 2))
+        return f"{first} and {second}, {'stable' if point.values['stable'] else 'unstable'}"
     unstable = int(point.values["unstable"])
     if not unstable:
         return "stable"

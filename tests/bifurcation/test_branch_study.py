@@ -190,3 +190,38 @@ def test_no_branches_no_file(tmp_path):
     with pytest.raises(InputError, match="no branches to write"):
         write_branches(tmp_path / "none.h5", {})
     assert not list(tmp_path.iterdir())
+
+
+def test_a_study_follows_tori(tmp_path):
+    text = STUDY[: STUDY.index("[branch]")]
+    for old, new in (("decay = 1000.0", "decay = 50.0"), ("slope = 1e6", "slope = 1e3"),
+                     ("speed = 12e-3", "speed = 20e-3\namplitude = 37e-6\nwavelength = 4.4e-3"),
+                     ("damping_x = 0.768", "damping_x = 20.0")):
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "waves.toml"
+    path.write_text(text + """
+[simulation]
+t_end = 20.0
+
+[branch]
+parameter = "ground.amplitude"
+bounds = [31e-6, 37e-6]
+start = 37e-6
+kind = "orbits"
+switch = ["Neimark-Sacker"]
+transient = 60.0
+step = 0.01
+largest_step = 0.2
+""")
+    assert execute(["branch", str(path)]) == 0
+    found = read_branches(tmp_path / "results" / "waves-branch.h5")
+    orbits, tori = found["orbits of the run"], found["orbits of the run, tori"]
+    born, = orbits.of_kind("Neimark-Sacker")
+    assert tori.points[0].parameter == pytest.approx(born.parameter, rel=1e-3)
+    # Beside the point, tori and orbits have about the same range.
+    assert tori.points[0].values["observed_maximum"] == pytest.approx(
+        born.values["observed_maximum"], rel=0.02)
+    rows = rows_of(tmp_path / "results" / "waves-branch.csv")
+    assert sum(row["branch"] == "orbits of the run, tori" for row in rows) == len(tori)
+    assert (tmp_path / "results" / "waves-branch.html").exists()

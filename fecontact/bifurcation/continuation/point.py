@@ -135,6 +135,11 @@ class BranchPoint(Summarised):
         return "saddle" in self.values and "time" in self.values
 
     @property
+    def is_torus(self) -> bool:
+        """Whether the point is a torus: a quasi-periodic motion."""
+        return self.header is not None and "torus_harmonics" in self.header.attributes
+
+    @property
     def by_shooting(self) -> bool:
         """Whether the point is an orbit found by shooting."""
         return self.header is not None and "segments" in self.header.attributes

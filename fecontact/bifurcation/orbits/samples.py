@@ -13,6 +13,7 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.estimates import peaks
 from fecontact.bifurcation.orbits.mesh import extremes, interpolate
 from fecontact.bifurcation.orbits.motions import nodes_on_mesh
+from fecontact.bifurcation.tori.motion import torus_motion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError, shown
 from fecontact.core.types import Array, ArrayLike
@@ -73,6 +74,9 @@ def _extremes(point: BranchPoint, weights: Array) -> tuple[float, float]:
     """The range of the quantity with so many weights."""
     if point.is_orbit and point.by_harmonics:
         return _peaks(point.orbit(samples=_FINE).states @ weights)
+    if point.is_torus:
+        moved = torus_motion(point).grid(_ANGLES, _ANGLES) @ weights
+        return float(moved.min()), float(moved.max())
     if "mesh" not in point.values:
         if "state" not in point.values:
             raise InputError(f"{point.place} stores no orbit, only its extremes: take 'minimum' "
@@ -106,6 +110,8 @@ def _peaks(moved: Array) -> tuple[float, float]:
 
 # Samples per period; the error of an extreme is of the order of their spacing squared.
 _SAMPLES = 4000
+# Samples of each angle of a torus, more than twice its harmonics at most.
+_ANGLES = 401
 # The same where extremes are those of parabolas through the samples.
 _FINE = 501
 

@@ -101,7 +101,7 @@ def torus_branch(
             else field.parameter_or_only(parameter))
     excitation, free = excitation_of(field, second), field.index(name)
     given: Any = scales, width, chosen
-    if isinstance(start, BranchPoint) and "torus_harmonics" in start.branch.attributes:
+    if isinstance(start, BranchPoint) and start.is_torus:
         problem, u, tangent = _from_torus(excitation, start, free, method, given)
         if name == start.branch.parameter_name:
             return _followed(problem, u, float(np.copysign(1.0, direction)) * tangent, chosen, name,

@@ -97,9 +97,9 @@ def torus_motion(point: BranchPoint) -> TorusMotion:
         If the point is no torus.
     """
     require_kind("torus_motion", BranchPoint, point=point)
-    known = {} if point.header is None else point.header.attributes
-    if "torus_harmonics" not in known:
+    if not point.is_torus:
         raise InputError(f"{point.place} is no torus; take a point of torus_branch(...).")
+    known = point.branch.attributes
     first, second = (int(H) for H in known["torus_harmonics"])
     names, m = tuple(map(str, known["state_names"])), int(known["torus_displacements"])
     k = orders(first, second)

@@ -9,6 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.tori.motion import torus_motion
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.output.diagrams.branches import branch_diagram
@@ -93,7 +94,14 @@ def shown_of(
 
 
 def _orbit(point: BranchPoint, field: ContactField) -> Motion:
-    """The orbit of a point; an equilibrium has the period zero and two equal states."""
+    """The orbit of a point; an equilibrium has the period zero and equal states.
+
+    A torus shows the longer of its two periods, after which it does not repeat.
+    """
+    if point.is_torus:
+        torus = torus_motion(point)
+        times = np.linspace(0.0, 1.0 / torus.frequencies.min(), SAMPLES)
+        return sampled(times, torus.states(times))
     if not point.is_orbit:
         return 0.0, np.repeat(np.asarray(point.values["state"], dtype=float)[None], SAMPLES, 0)
     motion = point.orbit(field if point.by_shooting else None, SAMPLES)

@@ -196,7 +196,8 @@ def point_texts(point: BranchPoint, usable_hz: float = np.inf) -> list[str]:
     period = point.period if isinstance(point, HopfPoint) else point.values.get("period")
     hertz = None if period is None else 1.0 / float(period)
     unstable = point.values.get("unstable")
-    kind = point.kind or ("orbit" if point.is_orbit else "steady sliding")
+    kind = point.kind or ("orbit" if point.is_orbit else "torus" if point.is_torus
+                          else "steady sliding")
     return [kind + (f", {point.criticality}" if point.criticality else ""),
             point.parameter_text(), "" if hertz is None else f"{1.0 / hertz:.6g} s",
             "" if hertz is None else f"{hertz:.6g} Hz",
