@@ -17,6 +17,7 @@ import normal_contact
 import responses_section
 import sliding_solids_section
 import solids_section
+import tori_cases
 import turning_section
 import two_bodies_section
 import two_mass_section
@@ -49,6 +50,7 @@ def main() -> None:
                        ("bodies that turn or repeat", turning_section.section),
                        ("large deflections", large_deflections_section.section),
                        ("continuation", continuation_cases.section),
+                       ("quasi-periodic motions", tori_cases.section),
                        ("frequency responses", lambda: responses_section.section(images)),
                        ("section 4.2", lambda: impact_section.section(images)),
                        ("section 4.3", lambda: friction_section.section(images)),
