@@ -9,7 +9,7 @@ import fecontact as fc
 from fecontact.core.errors import InputError
 from fecontact.fem import Coupling, SolidBlock, pair_faces
 from fecontact.half_space import half_space_contact, half_space_friction
-from fecontact.laws import ConstantFriction, LinearContact
+from fecontact.laws import ConstantFriction, HeightMap, LinearContact
 from fecontact.reduction import reduce_bodies, with_half_space
 
 RADIUS, WIDTH, MU = 0.05, 1e-3, 0.3
@@ -152,6 +152,24 @@ def test_hertz_and_cattaneo_on_linear_elements():
     path = fc.LoadPath(forces={"C.x": (0.0, parts[0], -parts[0], parts[0])}, steps=4)
     history = fc.load_history(system_of(full, exact.force), path, rtol=1e-3)
     assert history.loop(1, 3).loss == pytest.approx(shear.loss[-1] - shear.loss[0], rel=0.03)
+
+
+def test_measured_heights():
+    """Forces on a rough crown to 2 %, and the same nodes in contact as between half-spaces."""
+    body, basis, exact = pressed(0.3)
+    side, load = exact.sides[0], exact.force
+    place = (np.arange(8) - 3.5) * side
+    z = 1e-6 * np.random.default_rng(4).standard_normal((8, 8)) - np.add.outer(
+        place**2, place**2) / (2.0 * RADIUS)
+    heights = HeightMap(z.tolist(), side, side, place[0], place[0])
+    between = half_space_contact(-z, side, body.material, force=load)
+    index = np.rint(basis.contact_places[:, :2] / side + 3.5).astype(int)
+    expected = between.pressure[index[:, 0], index[:, 1]] * side**2
+    system = replace(system_of(with_half_space(basis, body), load), gap=heights)
+    forces = fc.equilibrium(system).normal_force
+    assert np.abs(forces - expected).sum() < 0.02 * load
+    assert (forces > 0.0).tolist() == (expected > 0.0).tolist()
+    assert 0.2 < (expected > 0.0).mean() < 0.8
 
 
 def test_responses_and_runs_have_the_static_limit():
