@@ -18,6 +18,7 @@ from fecontact.bifurcation import (
     torus_motion,
     vector_field,
 )
+from fecontact.bifurcation.tori.stability import TorusStability, stability_of
 from fecontact.core.errors import AnalysisError, InputError
 
 EPS = 0.1
@@ -250,6 +251,25 @@ def test_a_torus_that_its_harmonics_do_not_resolve_ends_the_branch():
     # The frequencies lock at the detuning F / (2 a w).
     assert branch.status is BranchStatus.UNRESOLVED_TORUS
     assert branch.points[-1].parameter > 1.0 + 0.1 / 4.0
+
+
+def test_multipliers_of_given_jacobians():
+    # x' = (a + b cos theta2) x and y' = 0.2 cos(theta1) y, a triangle coupling them.
+    f1, f2 = 2.0, 2.0 * np.sqrt(0.3)
+
+    def jacobians(taus, count):
+        phis = np.arange(count)[:, None] / count + f2 / f1 * taus
+        J = np.zeros((count, len(taus), 2, 2))
+        J[..., 0, 0] = -0.7 + 0.9 * np.cos(CIRCLE * phis)
+        J[..., 1, 1], J[..., 0, 1] = 0.2 * np.cos(CIRCLE * taus), 0.5
+        return J
+
+    for unknown in (0, 1):
+        found = stability_of(jacobians, (f1, f2), (3, 3), 15, unknown)
+        assert found.multipliers == pytest.approx([1.0, np.exp(-0.7 / f1)], rel=1e-6)
+        assert found.trivial.tolist() == [0][:unknown]
+    assert TorusStability(np.array([1.01, 0.5]), np.array([0])).stable
+    assert not TorusStability(np.array([1.01, 0.5]), np.array([], dtype=int)).stable
 
 
 def test_what_is_no_torus_is_refused():
