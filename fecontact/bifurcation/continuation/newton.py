@@ -67,6 +67,8 @@ def improve(weights: Vector, steps: Matrix, count: int) -> float:
 
 # Step of rounding, in the size of the solution, after which its equations serve as they are.
 _AT_REST = 1e-13
+# Smallest factor by which a step of the damped method is shortened.
+_SMALLEST_FACTOR = 1e-4
 # A matrix is kept as long as each step is shorter than this part of the one before.
 _SERVES = 0.2
 # By this factor an error is likely to fall with a matrix that is kept along a curve.
@@ -191,6 +193,41 @@ def _polished(
     u, size = u + change, norm(problem, change)
     moved = exact and size > _AT_REST * (1.0 + norm(problem, u))
     return u, problem.linearise(u) if moved else linearisation, size
+
+
+def damped_newton(
+    problem: Problem, u: Array, row: Array, tolerance: float, iterations: int
+) -> tuple[Array, float, bool]:
+    """Newton's method at a fixed value of ``row @ u``, with steps shortened until residuals fall.
+
+    It ends with a step shorter than ``tolerance`` times 1 + |u|. Returns u, the norm of the
+    residual, and whether it has converged.
+    """
+    linearised = problem.linearise(u)
+    left = float(np.linalg.norm(linearised.residual))
+    for _ in range(iterations):
+        step = linearised.solve(row, -np.append(linearised.residual, 0.0))
+        # Rounding must not move a parameter that is fixed beyond its bounds.
+        step -= (row @ step) / (row @ row) * row
+        factor, size = 1.0, norm(problem, step)
+        small = size < tolerance * (1.0 + norm(problem, u))
+        if not math.isfinite(size):
+            break
+        while True:
+            try:
+                trial = problem.linearise(u + factor * step)
+                found = float(np.linalg.norm(trial.residual))
+            except AnalysisError:
+                found = math.inf
+            if found < (1.0 - 0.1 * factor) * left or (small and math.isfinite(found)):
+                break
+            factor *= 0.5
+            if factor < _SMALLEST_FACTOR:
+                return u, left, False
+        u, linearised, left = u + factor * step, trial, found
+        if small:
+            return u, left, True
+    return u, left, False
 
 
 def finished(

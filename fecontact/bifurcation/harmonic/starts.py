@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.newton import damped_newton
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
@@ -189,43 +190,21 @@ def corrected(
         return problem, found[0]
     name = list(problem.field.parameters)[problem.free]
     where = f"at {name} = {u[-1]:.6g}, from the period {problem.period(u):.6g} s"
-    weights = problem.weights()
 
     def motion(u: Array) -> float:
         return float(np.abs(problem.coefficients(u)[1:]).max())
 
     begin = motion(u)
-    linearised = problem.linearise(u)
-    norm = float(np.linalg.norm(linearised.residual))
-    for _ in range(_CORRECTIONS):
-        step = linearised.solve(row, -np.append(linearised.residual, 0.0))
-        if not np.isfinite(step).all():
-            break
-        factor, size = 1.0, np.sqrt(weights @ step**2)
-        small = size < tolerance * (1.0 + np.sqrt(weights @ u**2))
-        while True:
-            try:
-                trial = problem.linearise(u + factor * step)
-                left = float(np.linalg.norm(trial.residual))
-            except AnalysisError:
-                left = np.inf
-            if left < (1.0 - 0.1 * factor) * norm or (small and np.isfinite(left)):
-                break
-            factor /= 2.0
-            if factor < 1e-4:
-                raise AnalysisError(f"No periodic orbit was found {where}: Newton's method does "
-                                    f"not converge (residual {norm:.3g}); start nearer to it, or "
-                                    f"take other than {problem.harmonics} harmonics.")
-        u, linearised, norm = u + factor * step, trial, left
-        if small:
-            if problem.autonomous and motion(u) <= 1e-4 * begin:
-                raise AnalysisError(f"No periodic orbit was found {where}: the iteration ends "
-                                    f"without any motion, as at an equilibrium; start from a "
-                                    f"motion of larger amplitude.")
-            return replace(problem, reference=problem.coefficients(u).copy()), u
-    raise AnalysisError(f"No periodic orbit was found {where}: Newton's method does not converge "
-                        f"(residual {norm:.3g}); start nearer to it, or take other than "
-                        f"{problem.harmonics} harmonics.")
+    u, norm, converged = damped_newton(problem, u, row, tolerance, _CORRECTIONS)
+    if not converged:
+        raise AnalysisError(f"No periodic orbit was found {where}: Newton's method does not "
+                            f"converge (residual {norm:.3g}); start nearer to it, or take other "
+                            f"than {problem.harmonics} harmonics.")
+    if problem.autonomous and motion(u) <= 1e-4 * begin:
+        raise AnalysisError(f"No periodic orbit was found {where}: the iteration ends without any "
+                            f"motion, as at an equilibrium; start from a motion of larger "
+                            f"amplitude.")
+    return replace(problem, reference=problem.coefficients(u).copy()), u
 
 
 def doubled(problem: HarmonicProblem, u: Array) -> Start:

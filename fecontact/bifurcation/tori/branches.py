@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.newton import damped_newton
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import NeimarkSackerPoint
 from fecontact.bifurcation.continuation.problem import (
@@ -38,8 +39,8 @@ from fecontact.system.fields.vector_field import VectorField, require_field
 # Factors of the first step, tried in this order to leave a Neimark-Sacker point.
 _FIRST_STEPS = (1.0, 0.3, 0.1, 3.0)
 _SAMPLES = 2001
-# Newton's method at fixed parameter: steps, and smallest factor of a step.
-_CORRECTIONS, _SMALLEST = 30, 1e-3
+# Newton's method at fixed parameter: steps, and size of the last one.
+_CORRECTIONS, _TOLERANCE = 30, 1e-9
 # Part of the torus in the harmonics of the second frequency below which it is an orbit.
 _ORBIT = 1e-6
 
@@ -266,38 +267,16 @@ def _corrected(problem: TorusProblem, u: Array) -> tuple[TorusProblem, Array]:
     """
     row = np.zeros_like(u)
     row[-1] = 1.0
-    weights = problem.weights()
-    where = f"at {list(problem.field.parameters)[problem.free]} = {u[-1]:.6g}"
-    linearised = problem.linearise(u)
-    norm = float(np.linalg.norm(linearised.residual))
-    for _ in range(_CORRECTIONS):
-        step = linearised.solve(row, -np.append(linearised.residual, 0.0))
-        step[-1] = 0.0
-        size = float(np.sqrt(weights @ step**2))
-        if not np.isfinite(size):
-            break
-        factor, small = 1.0, size < 1e-9 * (1.0 + float(np.sqrt(weights @ u**2)))
-        while True:
-            try:
-                trial = problem.linearise(u + factor * step)
-                left = float(np.linalg.norm(trial.residual))
-            except FecontactError:
-                left = np.inf
-            if left < (1.0 - 0.1 * factor) * norm or (small and np.isfinite(left)):
-                break
-            factor *= 0.5
-            if factor < _SMALLEST:
-                raise AnalysisError(f"No torus was found {where}: Newton's method does not "
-                                    f"converge; start nearer to it, or take other harmonics.")
-        u, linearised, norm = u + factor * step, trial, left
-        if small:
-            X = problem.coefficients(u) / problem.scales[problem.layout.columns]
-            if 1 in problem.unknown and np.abs(X[2 * problem.orders[0] + 1 :]).max() < (
-                    _ORBIT * np.abs(X).max()):
-                break
-            return replace(problem, reference=problem.coefficients(u).copy()), u
-    raise AnalysisError(f"No torus was found {where}: Newton's method ends at a periodic orbit or "
-                        f"nowhere; start from a steady quasi-periodic run.")
+    u, _, converged = damped_newton(problem, u, row, _TOLERANCE, _CORRECTIONS)
+    X = problem.coefficients(u) / problem.scales[problem.layout.columns]
+    orbit = 1 in problem.unknown and np.abs(X[2 * problem.orders[0] + 1 :]).max() < (
+        _ORBIT * np.abs(X).max())
+    if not converged or orbit:
+        name, end = list(problem.field.parameters)[problem.free], "a periodic orbit"
+        raise AnalysisError(f"No torus was found at {name} = {u[-1]:.6g}: Newton's method "
+                            f"{f'ends at {end}' if converged else 'does not converge'}; start from "
+                            f"a steady quasi-periodic run, or take other harmonics.")
+    return replace(problem, reference=problem.coefficients(u).copy()), u
 
 
 def _followed(
