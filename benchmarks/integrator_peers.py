@@ -45,12 +45,12 @@ def _frozen(problem: Problem) -> tuple[Any, Any, Any]:
     """Compiled ``rate(t, y, out)`` and ``jacobian(t, y, out)``, and what must outlive them."""
     arrays = problem.system.arrays
     n, _, m = arrays.rows.shape
-    room = {"given": np.zeros(dynamics.GIVEN), "pull": np.zeros(m),
-            "nodes": np.zeros((3, 2 * n))}
+    workspace = {"given": np.zeros(dynamics.GIVEN), "pull": np.zeros(m),
+                 "nodes": np.zeros((3, 2 * n))}
     scratch = allocate(dynamics.Gradients, {
         nodes.NODES: n, nodes.MODES: m, nodes.AXES: 2, nodes.MEMORY: int(arrays.memory.max()),
         nodes.COMBINATIONS: 0})
-    held = {**room, **{f"g{k}": item for k, item in enumerate(scratch)},
+    held = {**workspace, **{f"g{k}": item for k, item in enumerate(scratch)},
             **{f"b{k}": item for k, item in enumerate(blocks_of(problem.system.basis, arrays))},
             **{f"s{k}": item for k, item in enumerate(arrays) if isinstance(item, np.ndarray)}}
     lines = [f"    {name} = carray(pointer({item.ctypes.data}), {item.shape}, "

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 PACKAGE = Path(__file__).resolve().parent.parent / "fecontact"
-ROOMS = ("core", "fem", "half_space", "laws", "reduction", "system", "integrate", "analysis",
-         "bifurcation", "measured", "output", "study", "sweeps", "fitting", "cli")
+SUBPACKAGES = ("core", "fem", "half_space", "laws", "reduction", "system", "integrate", "analysis",
+               "bifurcation", "measured", "output", "study", "sweeps", "fitting", "cli")
 # Subpackages that do not import each other, although the one stands above the other.
 STRANGERS = {("laws", "fem"), ("study", "output")}
 # Modules that hold nothing but public names under which people look for them.
@@ -50,24 +50,26 @@ def arrows() -> dict[str, set[str]]:
             for module in MODULES}
 
 
-def room(module: str) -> str:
+def subpackage(module: str) -> str:
     parts = module.split(".")
     return parts[1] if len(parts) > 1 else ""
 
 
-def test_there_is_nothing_beside_the_rooms():
+def test_there_is_nothing_beside_the_subpackages():
     folders = {path.name for path in PACKAGE.iterdir() if path.is_dir()} - {"__pycache__"}
     files = {path.name for path in PACKAGE.iterdir() if path.is_file()}
-    assert folders == set(ROOMS)
+    assert folders == set(SUBPACKAGES)
     assert files == {"__init__.py", "__init__.pyi", "__main__.py", "py.typed",
                      *(f"{name}.{ending}" for name in NAMESPACES for ending in ("py", "pyi"))}
 
 
-@pytest.mark.parametrize("name", ROOMS)
-def test_rooms_import_only_from_rooms_above_them(name):
-    above = {other for other in ROOMS[: ROOMS.index(name)] if (name, other) not in STRANGERS}
+@pytest.mark.parametrize("name", SUBPACKAGES)
+def test_subpackages_import_only_from_those_above(name):
+    above = {other for other in SUBPACKAGES[: SUBPACKAGES.index(name)]
+             if (name, other) not in STRANGERS}
     wrong = {f"{module} -> {target}" for module, targets in arrows().items()
-             if room(module) == name for target in targets if room(target) not in {name, *above}}
+             if subpackage(module) == name
+             for target in targets if subpackage(target) not in {name, *above}}
     assert not wrong
 
 

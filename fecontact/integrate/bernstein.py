@@ -79,10 +79,10 @@ def split(b, left):
 
 
 @helper
-def first_below(b, room):
+def first_below(b, workspace):
     """First s at which p falls below zero, to a resolution of FINEST; NOWHERE if it does not.
 
-    Zero is not below, and a dip shorter than FINEST may be missed. ``room`` (DEPTH, n + 1) is
+    Zero is not below, and a dip shorter than FINEST may be missed. ``workspace`` (DEPTH, n + 1) is
     workspace; b is kept.
 
     The step is bisected, the left half first, until the coefficients of an interval have one sign
@@ -93,17 +93,17 @@ def first_below(b, room):
     n = len(b)
     # Stack of the remaining intervals, the earliest on top, with their widths in the last column.
     for i in range(n):
-        room[0, i] = b[i]
-    room[0, n] = 1.0
+        workspace[0, i] = b[i]
+    workspace[0, n] = 1.0
     waiting, begin = 1, 0.0
     while waiting > 0:
-        part, width = room[waiting - 1, :n], room[waiting - 1, n]
+        part, width = workspace[waiting - 1, :n], workspace[waiting - 1, n]
         if part[0] < 0.0:
             return begin
         bound = smallest(part)
         if bound < 0.0 and width > FINEST:
-            split(part, room[waiting, :n])
-            room[waiting - 1, n] = room[waiting, n] = 0.5 * width
+            split(part, workspace[waiting, :n])
+            workspace[waiting - 1, n] = workspace[waiting, n] = 0.5 * width
             waiting += 1
             continue
         begin += width
@@ -126,23 +126,23 @@ def variations(b):
 
 
 @helper
-def sign_changes(b, room, row, places):
+def sign_changes(b, workspace, row, places):
     """Fill ``places`` with the s at which p changes sign, ascending; return their number.
 
     Sign changes closer than FINEST may be missed, as may those beyond the length of ``places``.
-    ``room`` (DEPTH, n + 1) and ``row`` (n + 1,) are workspace; b is kept.
+    ``workspace`` (DEPTH, n + 1) and ``row`` (n + 1,) are workspace; b is kept.
     """
     n = len(b)
     for i in range(n):
-        room[0, i] = b[i]
-    room[0, n] = 1.0
+        workspace[0, i] = b[i]
+    workspace[0, n] = 1.0
     waiting, begin, found, sign = 1, 0.0, 0, 0.0
     while waiting > 0:
-        part, width = room[waiting - 1, :n], room[waiting - 1, n]
+        part, width = workspace[waiting - 1, :n], workspace[waiting - 1, n]
         changes = variations(part)
         if changes > 1 and width > FINEST:
-            split(part, room[waiting, :n])
-            room[waiting - 1, n] = room[waiting, n] = 0.5 * width
+            split(part, workspace[waiting, :n])
+            workspace[waiting - 1, n] = workspace[waiting, n] = 0.5 * width
             waiting += 1
             continue
         first, last = 0.0, 0.0

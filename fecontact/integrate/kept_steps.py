@@ -52,7 +52,7 @@ class KeptSteps:
         return self.part(slice(int(np.searchsorted(self.time, end))))
 
 
-def room_for_rows(keep: bool, numbers: int) -> int:
+def workspace_for_rows(keep: bool, numbers: int) -> int:
     """Rows that a run has room for, of so many numbers each; none unless it keeps some."""
     if not keep:
         return 0
@@ -72,19 +72,19 @@ def halve(kept: Any, counts: Integers) -> None:
 class GrowingRows:
     """Rows of a run that is not compiled, with room for so many of them; none for no room."""
 
-    def __init__(self, room: int) -> None:
-        self._room, self._every, self._passed = room, 1, 0
+    def __init__(self, workspace: int) -> None:
+        self._workspace, self._every, self._passed = workspace, 1, 0
         self._rows: list[tuple[float, Array]] = []
 
     def add(self, time: float, state_at: Callable[[float], Array]) -> None:
         """Keep the state at a time, unless it is one of those that are left out by now."""
-        if not self._room or (self._rows and not time > self._rows[-1][0]):
+        if not self._workspace or (self._rows and not time > self._rows[-1][0]):
             return
         self._passed += 1
         if self._passed >= self._every:
             self._rows.append((time, state_at(time)))
             self._passed = 0
-        if len(self._rows) == self._room:
+        if len(self._rows) == self._workspace:
             self._rows, self._every = self._rows[1::2], 2 * self._every
 
     @property

@@ -23,75 +23,75 @@ _AMPLE = 1.5
 
 
 @routine
-def choose_near(h, problem, progress, room):
-    """Let ``room.near`` be the nodes that may touch in a step of about the length h.
+def choose_near(h, problem, progress, workspace):
+    """Let ``workspace.near`` be the nodes that may touch in a step of about the length h.
 
-    Fills ``room.clearance`` (n + 1,): that of all nodes at the start of the step, then how far they
-    may move without one that is left out touching.
+    Fills ``workspace.clearance`` (n + 1,): that of all nodes at the start of the step, then how far
+    they may move without one that is left out touching.
     """
     s, blocks, control = problem.system, problem.blocks, problem.control
     n, m = len(blocks.nodes), len(control.largest)
     if n <= FEW:
         return
     for j in range(n):
-        room.clearance[j] = (room.ends[0, n + j] + s.gap[j] + control.untouched[j]
-                             - control.ground[HIGHEST])
+        workspace.clearance[j] = (workspace.ends[0, n + j] + s.gap[j] + control.untouched[j]
+                                  - control.ground[HIGHEST])
     move = 0.0
     for i in range(m):
         move += control.largest[i] * h * (abs(progress.state[m + i])
                                           + 0.5 * h * abs(progress.rate[m + i]))
     if not _AMPLE * move < 1e300:
-        _take(math.inf, blocks, room)
+        _take(math.inf, blocks, workspace)
         return
     # Steps of about the same length have the same nodes.
-    _take(2.0 ** math.ceil(math.log2(max(_AMPLE * move, 1e-300))), blocks, room)
+    _take(2.0 ** math.ceil(math.log2(max(_AMPLE * move, 1e-300))), blocks, workspace)
 
 
 @helper
-def extend_near(y, problem, progress, room):
+def extend_near(y, problem, progress, workspace):
     """Take all nodes as near that may touch where the modal displacements are y[:m]."""
     largest = problem.control.largest
     if len(problem.blocks.nodes) > FEW:
         move = 0.0
         for i in range(len(largest)):
             move += largest[i] * abs(y[i] - progress.state[i])
-        reach_out(move, problem.blocks, room)
+        reach_out(move, problem.blocks, workspace)
 
 
 @helper
-def reach_out(move, blocks, room):
+def reach_out(move, blocks, workspace):
     """Take all nodes as near that may touch where no node has moved further than ``move``."""
     n = len(blocks.nodes)
-    if n > FEW and not move < room.clearance[n]:
-        _take(2.0 * move, blocks, room)
+    if n > FEW and not move < workspace.clearance[n]:
+        _take(2.0 * move, blocks, workspace)
 
 
 @helper
-def set_end(problem, progress, room):
-    """Fill rates and gradients after the step, and ``room.nodes`` with all nodes and their forces.
+def set_end(problem, progress, workspace):
+    """Fill rates and gradients after the step, and ``workspace.nodes``: all nodes and their forces.
 
     Gradients of nodes that are not near are left as they are, zero.
     """
-    s, near = problem.system, room.near
+    s, near = problem.system, workspace.near
     n = len(s.gap)
-    extend_near(room.after, problem, progress, room)
+    extend_near(workspace.after, problem, progress, workspace)
     every = near.used[0] == n
-    dynamics.set_rate_and_gradients(room.after, s, near, room.given, room.load,
-                                    room.nodes if every else room.slots, room.gradients_after,
-                                    room.rate_after)
+    dynamics.set_rate_and_gradients(workspace.after, s, near, workspace.given, workspace.load,
+                                    workspace.nodes if every else workspace.slots,
+                                    workspace.gradients_after, workspace.rate_after)
     if every:
         return
-    dynamics.project(problem.blocks, room.after, room.nodes[0], room.nodes[1])
-    for j in range(room.nodes.shape[1]):
-        room.nodes[2, j] = 0.0
+    dynamics.project(problem.blocks, workspace.after, workspace.nodes[0], workspace.nodes[1])
+    for j in range(workspace.nodes.shape[1]):
+        workspace.nodes[2, j] = 0.0
     for at in range(near.used[0]):
-        room.nodes[2, n + near.nodes[at]] = room.slots[2, n + at]
+        workspace.nodes[2, n + near.nodes[at]] = workspace.slots[2, n + at]
 
 
 @routine
-def _take(reach, blocks, room):
+def _take(reach, blocks, workspace):
     """Take the nodes of a clearance up to ``reach``; those taken count as without clearance."""
-    near, clearance = room.near, room.clearance
+    near, clearance = workspace.near, workspace.clearance
     n = len(blocks.nodes)
     found, same, left_out = 0, 0, math.inf
     for j in range(n):

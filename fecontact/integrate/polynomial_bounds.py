@@ -24,16 +24,16 @@ _FEW = 4
 
 
 @routine
-def may_switch(step, problem, progress, room):
+def may_switch(step, problem, progress, workspace):
     """True if :func:`needs_search` may return True; costs less.
 
-    ``room.ends`` and ``room.nodes`` hold the nodes at both ends, ``room.given`` the motion of the
-    ground at the end.
+    ``workspace.ends`` and ``workspace.nodes`` hold the nodes at both ends, ``workspace.given`` the
+    motion of the ground at the end.
     """
     s, control = problem.system, problem.control
     if len(s.gap) <= _FEW and control.ground[STEEPEST] == 0.0:
-        return _nodes_may_switch(step.moved, step.h, s, problem.blocks, control, room)
-    return _modes_may_switch(step, problem, progress, room)
+        return _nodes_may_switch(step.moved, step.h, s, problem.blocks, control, workspace)
+    return _modes_may_switch(step, problem, progress, workspace)
 
 
 @helper
@@ -47,9 +47,9 @@ def _range(first, last, k1, k2, k3):
 
 
 @helper
-def _nodes_may_switch(moved, h, s, blocks, control, room):
+def _nodes_may_switch(moved, h, s, blocks, control, workspace):
     """Tests of :func:`needs_search` for few nodes on flat ground, without slip of open nodes."""
-    levels, ends, nodes, dense = control.levels, room.ends, room.nodes, room.dense
+    levels, ends, nodes, dense = control.levels, workspace.ends, workspace.nodes, workspace.dense
     shapes = blocks.shapes
     n, m = len(s.gap), len(control.largest)
     some = False
@@ -87,28 +87,28 @@ def _nodes_may_switch(moved, h, s, blocks, control, room):
 
 
 @helper
-def _modes_may_switch(step, problem, progress, room):
+def _modes_may_switch(step, problem, progress, workspace):
     """Tests of :func:`needs_search` for many nodes or wavy ground, by bounds on the modes."""
     s, blocks, control = problem.system, problem.blocks, problem.control
-    bounds, levels, ends, nodes, dense = (control.ground, control.levels, room.ends, room.nodes,
-                                          room.dense)
-    h, moved, near = step.h, step.moved, room.near
+    bounds, levels, ends, nodes, dense = (control.ground, control.levels, workspace.ends,
+                                          workspace.nodes, workspace.dense)
+    h, moved, near = step.h, step.moved, workspace.near
     n, m = len(s.gap), len(control.largest)
     # Sums over the modes before each one.
-    moves, speeds = room.inner[0], room.inner[1]
+    moves, speeds = workspace.inner[0], workspace.inner[1]
     moves[0], speeds[0] = 0.0, 0.0
     furthest = 0.0
     for i in range(m):
         largest = control.largest[i]
-        furthest += largest * abs(room.after[i] - progress.state[i])
+        furthest += largest * abs(workspace.after[i] - progress.state[i])
         moves[i + 1] = moves[i] + largest * _departure(dense[0, i], dense[1, i], dense[2, i])
         speeds[i + 1] = speeds[i] + largest * _departure(
             dense[0, m + i], dense[1, m + i], dense[2, m + i])
-    reach_out(furthest + moves[m], blocks, room)
+    reach_out(furthest + moves[m], blocks, workspace)
     wavy = bounds[STEEPEST] != 0.0
     if wavy:
-        set_heights(motion.motion_given(room.given), s, bounds, nodes[0], ends[2, n : 2 * n])
-    later = room.given[motion.SPEED]
+        set_heights(motion.motion_given(workspace.given), s, bounds, nodes[0], ends[2, n : 2 * n])
+    later = workspace.given[motion.SPEED]
     some = False
     for at in range(near.used[0]):
         j = near.nodes[at]
@@ -152,15 +152,15 @@ def _departure(k1, k2, k3):
 
 
 @routine
-def needs_search(moved, h, s, bounds, levels, slip_scale, room):
+def needs_search(moved, h, s, bounds, levels, slip_scale, workspace):
     """True if forces within the step may differ from what the values at its ends suggest.
 
     A gap or slip velocity may change sign more often than its end values show, a contact be twice
     as deep in between, or slip begin and end. ``levels`` (k, n) are the penetrations at which
-    normal forces begin; ``moved`` is the motion of the ground. Row SEARCH of ``room.polynomials``
-    marks the quantities concerned.
+    normal forces begin; ``moved`` is the motion of the ground. Row SEARCH of
+    ``workspace.polynomials`` marks the quantities concerned.
     """
-    c = room.polynomials
+    c = workspace.polynomials
     n = levels.shape[1]
     for j in range(n):
         if s.rows.shape[1] > 2:

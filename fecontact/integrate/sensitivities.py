@@ -14,7 +14,7 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate import step_loop
-from fecontact.integrate.collocation.room import chosen_collocation
+from fecontact.integrate.collocation.workspace import chosen_collocation
 from fecontact.integrate.derivative_check import doubts
 from fecontact.integrate.ensembles import Ensemble, ensemble
 from fecontact.integrate.field_runs.saltation import Passage, joined, passages, with_passages

@@ -97,28 +97,28 @@ def _project(blocks, v, columns, out):
 
 
 @routine
-def set_polynomials(s, blocks, bounds, before, after, room):
-    """Fill ``room.polynomials`` (6, 2 n, 3 n or 4 n) with the coefficients over a step.
+def set_polynomials(s, blocks, bounds, before, after, workspace):
+    """Fill ``workspace.polynomials`` (6, 2 n, 3 n or 4 n) with the coefficients over a step.
 
     Velocities of the nodes along the ground, heights with their gap, and where the ground is not
-    flat displacements along it, in space along both tangents. ``room.nodes`` holds what
+    flat displacements along it, in space along both tangents. ``workspace.nodes`` holds what
     :func:`fecontact.integrate.rodas5p.dynamics.project` says of the end.
     """
-    out, inner = room.polynomials, room.inner
+    out, inner = workspace.polynomials, workspace.inner
     n = len(s.gap)
     columns = 2 * n
     if bounds[STEEPEST] != 0.0:
         columns = (s.rows.shape[1] + 1) * n
-    tableau.inner_coefficients(before, after, room.dense, inner)
+    tableau.inner_coefficients(before, after, workspace.dense, inner)
     _project(blocks, before, columns, out[0])
     for k in range(3):
         _project(blocks, inner[k], columns, out[1 + k])
     for j in range(n):
-        out[4, j] = room.nodes[1, j]
-        out[4, n + j] = room.nodes[0, n + j]
+        out[4, j] = workspace.nodes[1, j]
+        out[4, n + j] = workspace.nodes[0, n + j]
     for first in range(2 * n, columns, n):
         for j in range(n):
-            out[4, first + j] = room.nodes[0, 2 * (first - 2 * n) + j]
+            out[4, first + j] = workspace.nodes[0, 2 * (first - 2 * n) + j]
     for k in range(COEFFICIENTS):
         for j in range(n):
             out[k, n + j] += s.gap[j]
@@ -150,13 +150,13 @@ def set_heights(moved, s, bounds, places, heights):
 
 
 @helper
-def keep_ends(n, room):
+def keep_ends(n, workspace):
     """Copy the end of the step to the start of the next."""
     for k in range(2):
-        for j in range(room.ends.shape[1]):
-            room.ends[k, j] = room.nodes[k, j]
+        for j in range(workspace.ends.shape[1]):
+            workspace.ends[k, j] = workspace.nodes[k, j]
     for j in range(n):
-        room.ends[2, j] = room.ends[2, n + j]
+        workspace.ends[2, j] = workspace.ends[2, n + j]
 
 
 @helper
@@ -232,7 +232,7 @@ def changes(b, polynomial, halves, places):
     """Fill ``places`` with the parts of the step at which a step polynomial changes its sign.
 
     Returns how many there are. Sets b (5,) to the coefficients of the node's own motion;
-    ``halves`` (bernstein.DEPTH, 6) is room.
+    ``halves`` (bernstein.DEPTH, 6) is workspace.
     """
     _set_own(polynomial, b)
     bound = _ground_bound(polynomial)
@@ -248,19 +248,19 @@ def changes(b, polynomial, halves, places):
 
 
 @helper
-def _changes_on_moving_ground(b, bound, polynomial, room, places):
+def _changes_on_moving_ground(b, bound, polynomial, workspace, places):
     shift = polynomial.shift
     bend = 0.0
     for k in range(COEFFICIENTS - 2):
         bend = max(bend, 12.0 * abs(b[k] - 2.0 * b[k + 1] + b[k + 2]))
     # Stack of intervals, the earliest on top: start, width, own motion and ground at both ends.
     found, waiting = 0, 1
-    room[0, 0], room[0, 1] = 0.0, 1.0
-    room[0, 2], room[0, 3] = b[0] + shift, b[COEFFICIENTS - 1] + shift
-    room[0, 4], room[0, 5] = ground_part(0.0, polynomial), ground_part(1.0, polynomial)
-    sign = room[0, 2] - room[0, 4]
+    workspace[0, 0], workspace[0, 1] = 0.0, 1.0
+    workspace[0, 2], workspace[0, 3] = b[0] + shift, b[COEFFICIENTS - 1] + shift
+    workspace[0, 4], workspace[0, 5] = ground_part(0.0, polynomial), ground_part(1.0, polynomial)
+    sign = workspace[0, 2] - workspace[0, 4]
     while waiting > 0:
-        top = room[waiting - 1]
+        top = workspace[waiting - 1]
         begin, width, p, q, f, g = top[0], top[1], top[2], top[3], top[4], top[5]
         reach = 0.125 * bend * width * width + 0.5 * bound * width
         middle = 0.5 * (f + g)
@@ -271,7 +271,7 @@ def _changes_on_moving_ground(b, bound, polynomial, room, places):
             u = bernstein.value(b, half, polynomial.row) + shift
             v = ground_part(half, polynomial)
             top[0], top[1], top[2], top[3], top[4], top[5] = half, 0.5 * width, u, q, v, g
-            below = room[waiting]
+            below = workspace[waiting]
             below[0], below[1], below[2], below[3], below[4], below[5] = (begin, 0.5 * width, p, u,
                                                                           f, v)
             waiting += 1

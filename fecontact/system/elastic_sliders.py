@@ -15,7 +15,7 @@ from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.laws.friction.planar import along_slip
 from fecontact.laws.friction.stribeck import no_friction
-from fecontact.system.node_forces import force_room, node_forces
+from fecontact.system.node_forces import force_workspace, node_forces
 from fecontact.system.nodes import SystemArrays, ground_motion, memory_of, node_motion
 from fecontact.system.powers import BRISTLES, FRICTION, POWER_COUNT
 
@@ -134,7 +134,7 @@ def return_to_limits(t, y, s, counts, force, rates):
 @kernel
 def return_states(times: Vector, states: Matrix, s: SystemArrays, counts: IntegerVector) -> None:
     """Return all deflections of states (N, size) at N times to their limits."""
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     for k in range(len(times)):
         return_to_limits(times[k], states[k], s, counts, force, rates)
 
@@ -142,7 +142,7 @@ def return_states(times: Vector, states: Matrix, s: SystemArrays, counts: Intege
 @kernel
 def excesses(t: float, y: Vector, s: SystemArrays, counts: IntegerVector, out: Matrix) -> None:
     """Fill out (n, elements) with |z| less the limit of each element [m]; -inf where none is."""
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     limits = limits_at(ground_motion(t, s), y, s, counts, force, rates)
     out[:] = -np.inf
     for j in range(len(counts)):
@@ -153,7 +153,7 @@ def excesses(t: float, y: Vector, s: SystemArrays, counts: IntegerVector, out: M
 @kernel
 def stick_again(t: float, y: Vector, s: SystemArrays, counts: IntegerVector, ends: Matrix) -> None:
     """Return the elements to their limits for which ``ends`` (n, elements) is not zero."""
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     limits = limits_at(ground_motion(t, s), y, s, counts, force, rates)
     for j in range(len(counts)):
         z = memory_of(j, y, s)

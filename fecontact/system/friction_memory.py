@@ -9,7 +9,7 @@ from fecontact.core.records import Block, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.laws.base import FrictionLaw
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.system.node_forces import force_room, node_forces
+from fecontact.system.node_forces import force_workspace, node_forces
 from fecontact.system.nodes import SystemArrays, ground_motion, memory_of, node_motion
 from fecontact.system.powers import storing_power
 
@@ -17,7 +17,7 @@ from fecontact.system.powers import storing_power
 @kernel
 def bristle_history(times: Vector, states: Matrix, s: SystemArrays, out: Block) -> None:
     """Fill out (2, N, n): what the bristles store, and the power into it at constant force."""
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     for i in range(len(times)):
         y, moved = states[i], ground_motion(times[i], s)
         for j in range(len(s.rows)):
@@ -35,7 +35,7 @@ def bristle_history(times: Vector, states: Matrix, s: SystemArrays, out: Block) 
 def _settle(t: float, y: Vector, s: SystemArrays) -> None:
     """Bring z of each node to z' = 0 by implicit Euler steps of increasing length."""
     n = len(s.rows)
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     moved = ground_motion(t, s)
     for j in range(n):
         count = s.memory[j]

@@ -7,7 +7,7 @@ from fecontact.core.records import Block, Matrix, Vector
 from fecontact.system.kernels import given_at, linear_rates, rates_under
 from fecontact.system.node_forces import (
     axis_force,
-    force_room,
+    force_workspace,
     friction_entry,
     node_gradients,
     slip_entry,
@@ -97,7 +97,7 @@ def _contact_gradients(t, y, s, gradients, active, out):
     """
     n, d, m = s.rows.shape
     moved = ground_motion(t, s)
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     partial = np.empty((d + 1, 2 * d))
     count = 0
     for j in range(n):
@@ -143,7 +143,7 @@ def _fill_rates(t, x, s, load, force, rates, f):
 @kernel
 def batch_rates(t: Vector, x: Matrix, s: SystemArrays, f: Matrix) -> None:
     """Fill f (N, 2 m + n s) with y' at times t (N,) and states x (N, 2 m + n s)."""
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     load = np.empty(s.rows.shape[2])
     _fill_rates(t, x, s, load, force, rates, f)
 
@@ -172,8 +172,8 @@ def _add_contact(j, pushes, s, partial, gradient, rate, out):
 @borrowing
 def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
     # Counting references to what is made for it costs as much as the laws.
-    load, load_p, force, room, memory, shifts, pushes, pushes_p = vectors
-    rates, room_rates, partial, gradient, stiffening = matrices
+    load, load_p, force, workspace, memory, shifts, pushes, pushes_p = vectors
+    rates, workspace_rates, partial, gradient, stiffening = matrices
     n, d, m = s.rows.shape
     states = len(rates)
     differs = len(P) > 0
@@ -211,7 +211,7 @@ def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
             if differs:
                 set_shifts(j, y, s, r, basis_moves, moved, moved_p, shifts)
                 pressing_p = node_rates(j, node, z, shifts, s, laws, force, partial,
-                                        (room, room_rates, memory), pushes_p)
+                                        (workspace, workspace_rates, memory), pushes_p)
                 for axis in range(d):
                     for i in range(m):
                         P[c, m + i] += s.rows[j, axis, i] * pushes_p[axis]
@@ -241,8 +241,8 @@ def batch_derivatives(
     _, d, m = s.rows.shape
     states = s.memory.max()
     step = h if len(P) > 0 else 0.0
-    force, rates = force_room(s)
-    beside, rates_beside = force_room(s)
+    force, rates = force_workspace(s)
+    beside, rates_beside = force_workspace(s)
     _fill_derivatives(t, x, s, r, laws_beside(s, r, step),
                       (np.empty(m), np.empty(m), force, beside, np.empty(states),
                        np.empty(2 * d), np.empty(d), np.empty(d)),

@@ -25,7 +25,7 @@ import numpy as np
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Block, Matrix, Vector
 from fecontact.laws.signatures import signal_at
-from fecontact.system.node_forces import axis_force, force_room, friction_entry, node_forces
+from fecontact.system.node_forces import axis_force, force_workspace, friction_entry, node_forces
 from fecontact.system.nodes import SystemArrays, ground_motion, memory_of, node_motion
 from fecontact.system.polynomial_forces import add_polynomial_forces, has_polynomial
 
@@ -48,7 +48,7 @@ def contact_state(t: float, y: Vector, s: SystemArrays, out: Matrix) -> None:
     """
     n, d, _ = s.rows.shape
     moved = ground_motion(t, s)
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     for j in range(n):
         node = node_forces(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force, rates)
         contact, row = node.contact, out[j]
@@ -155,7 +155,7 @@ def right_hand_side(t: float, y: Vector, s: SystemArrays, out: Vector) -> None:
     """Fill out (2 m + n s,) with y'."""
     load = np.empty(s.rows.shape[2])
     moved = given_at(t, s, load)
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     rates_under(load, moved, y, s, force, rates, out)
 
 

@@ -33,7 +33,7 @@ def friction_entries(states, s):
 
 
 @helper
-def force_room(s):
+def force_workspace(s):
     """Arrays for what a friction law says at a node of a system: ``force`` and ``rates``."""
     states = s.memory.max()
     return (np.empty(friction_entries(states, s)),

@@ -189,16 +189,16 @@ def _pressing_rate(j, node, F_p, shifts, s, laws):
 
 
 @helper
-def node_rates(j, node, z, shifts, s, laws, force, partial, room, out):
+def node_rates(j, node, z, shifts, s, laws, force, partial, workspace, out):
     """Fill out (d,) with the derivatives of the forces on node j along its axes.
 
     Returns that of the force that friction sees. ``shifts`` are those of :func:`set_shifts`;
     ``node``, ``force`` and ``partial`` are results of
-    :func:`fecontact.system.node_forces.node_gradients`. Of ``room``, for the results of friction
-    with memory, the last is filled with what the friction law's own parameters add to the rates of
-    its internal variables; the others are overwritten.
+    :func:`fecontact.system.node_forces.node_gradients`. Of ``workspace``, for the results of
+    friction with memory, the last is filled with what the friction law's own parameters add to the
+    rates of its internal variables; the others are overwritten.
     """
-    room_force, room_rates, memory = room
+    workspace_force, workspace_rates, memory = workspace
     contact, F, h, d = node.contact, node.normal, laws.step, s.rows.shape[1]
     states = len(memory)
     ground, slope = 0.0, (0.0, 0.0)
@@ -231,10 +231,10 @@ def node_rates(j, node, z, shifts, s, laws, force, partial, room, out):
         memory[i] = 0.0
     for k in range(len(laws.friction)):
         weight = _WEIGHTS[k] / (12.0 * h)
-        set_friction(j, contact.slip, node.pressing, z, laws.friction[k, j], s, room_force,
-                     room_rates)
+        set_friction(j, contact.slip, node.pressing, z, laws.friction[k, j], s, workspace_force,
+                     workspace_rates)
         for tangent in range(d - 1):
-            out[2 * tangent] -= weight * room_force[friction_entry(tangent, states)]
+            out[2 * tangent] -= weight * workspace_force[friction_entry(tangent, states)]
         for i in range(s.memory[j]):
-            memory[i] += weight * room_rates[i, 0]
+            memory[i] += weight * workspace_rates[i, 0]
     return pressing_p

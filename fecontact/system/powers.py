@@ -3,7 +3,7 @@
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Vector
 from fecontact.laws.signatures import signal_at
-from fecontact.system.node_forces import force_room, friction_entry, node_forces, normal_force
+from fecontact.system.node_forces import force_workspace, friction_entry, node_forces, normal_force
 from fecontact.system.nodes import (
     NODES,
     SystemArrays,
@@ -136,7 +136,7 @@ def set_powers(t, y, s, stick_speed, out, nodes):
     """
     n = len(s.rows)
     moved = ground_motion(t, s)
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     body_powers(t, y, s, out)
     for j in range(n):
         add_node_powers(j, node_motion(j, y, s), moved, memory_of(j, y, s), stick_speed[j], s,

@@ -103,8 +103,8 @@ def test_the_tangent_of_a_compiled_step_is_that_of_all_equations(batches):
     far = replace(start, u=np.append(start.u[:-1], 1400.0 / TURN))
     found = problem.batch_maker(options).batch(problem, start, 0.01, 6, far)
     assert batches[0] >= 3
-    room = problem.equations(500.0 / TURN).room
-    assert 1 <= room.coupled[0] < 12
+    workspace = problem.equations(500.0 / TURN).workspace
+    assert 1 <= workspace.coupled[0] < 12
     for at in found.points:
         unit = np.zeros(len(u))
         unit[-1] = 1.0

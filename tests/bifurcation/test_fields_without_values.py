@@ -79,7 +79,7 @@ def third(t, x, p, out):
 
 def test_resonances_of_a_field_that_ends_beside_the_orbit(monkeypatch):
     box = {"e": (-0.3, 0.3), "f": (-0.3, 0.3)}
-    field, t, circle = circle_field(third, e=-0.2, f=-0.1, room=0.05)
+    field, t, circle = circle_field(third, e=-0.2, f=-0.1, workspace=0.05)
     branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "e",
                           method=Collocation(intervals=16), bounds=box["e"], scales=np.ones(3))
     tori = codim2_curve(field, branch.of_kind("Neimark-Sacker")[0], "f", bounds=box)

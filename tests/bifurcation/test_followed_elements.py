@@ -171,10 +171,10 @@ def test_work_grows_with_the_number_of_elements_alone(dimension):
     system = (plane("several") if dimension == 2 else in_space()).with_(
         friction=IwanFriction(2.0, 0.8, elements=40))
     problem, u = start(contact_field(system, ["drive.frequency_hz"]), 2, 32)
-    room = problem.equations(float(u[-1])).room
-    assert room.J.shape == (32, 2 * dimension, 2 * dimension)
-    assert room.z.shape == (32, 40 * (dimension - 1))
-    assert room.by_node.shape == (dimension - 1, 32, 5 * dimension)
+    workspace = problem.equations(float(u[-1])).workspace
+    assert workspace.J.shape == (32, 2 * dimension, 2 * dimension)
+    assert workspace.z.shape == (32, 40 * (dimension - 1))
+    assert workspace.by_node.shape == (dimension - 1, 32, 5 * dimension)
 
 
 def test_derivatives_to_an_unknown_period():
@@ -232,7 +232,7 @@ def test_nodes_without_elements_have_no_deflection():
                                                frequency_hz=0.9 / TURN),
         friction={"one": IwanFriction(0.5, 0.5, elements=2), "other": Frictionless()})
     problem, u = start(contact_field(system, ["drive.frequency_hz"]), 2, 32)
-    problem.equations(float(u[-1])).room.z[:] = np.nan
+    problem.equations(float(u[-1])).workspace.z[:] = np.nan
     z = problem.linearise(u).memory
     assert z.shape == (32, 4)
     assert np.isfinite(z).all()

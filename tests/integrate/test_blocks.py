@@ -126,7 +126,7 @@ def test_nodes_left_out_of_some_blocks():
             run.problem.control.untouched[:] = -np.inf
         counts = []
         while run.advance(20) == 0:
-            counts.append(int(run.room.near.used[0]))
+            counts.append(int(run.workspace.near.used[0]))
         runs.append(run)
         least.append(min(counts))
     one, *others = runs

@@ -19,8 +19,8 @@ from fecontact.laws import (
     Sine,
 )
 
-for room in ("laws", "system"):
-    sys.path.insert(0, str(Path(__file__).parents[1] / room))
+for workspace in ("laws", "system"):
+    sys.path.insert(0, str(Path(__file__).parents[1] / workspace))
 
 import test_space as space  # noqa: E402
 from test_friction_laws import every_law  # noqa: E402

@@ -147,10 +147,10 @@ def test_pieces_of_steps_of_other_solvers_are_exact_to_degree_four():
 
     run = start(drop(), START, np.array([0.0, 1.0]), rtol=1e-6, work=False, method="rodas5p")
     _set_interpolant(np.array([course(s) for s in np.linspace(0.0, 1.0, 5)]), run.progress,
-                     run.room)
+                     run.workspace)
     for s in (0.0, 0.1, 0.4, 0.8, 1.0):
-        found = [tableau.one_interpolated.py_func(s, k, run.progress.state, run.room.after,
-                                                  run.room.dense) for k in range(2)]
+        found = [tableau.one_interpolated.py_func(s, k, run.progress.state, run.workspace.after,
+                                                  run.workspace.dense) for k in range(2)]
         assert found == pytest.approx(course(s), rel=1e-13, abs=1e-13)
 
 

@@ -251,8 +251,8 @@ def test_parameters_of_a_system_are_looked_up_once(monkeypatch):
 
 
 def test_checks_of_single_lanes_know_one_set_of_blocks():
-    problem, _, room = many(1, lambda _: np.zeros(2)).spare()
-    assert room.near is problem.blocks
+    problem, _, workspace = many(1, lambda _: np.zeros(2)).spare()
+    assert workspace.near is problem.blocks
 
 
 def test_no_reversal_of_slip_is_missed():

@@ -100,15 +100,15 @@ def test_results_are_those_of_all_nodes(case, work):
     assert n > FEW
     counts, closed = [], []
     while own.advance(3) == 0:
-        counts.append(int(own.room.near.used[0]))
+        counts.append(int(own.workspace.near.used[0]))
         closed.append(np.flatnonzero(own.progress.gradients.partial[:, 1].any(axis=1)))
-        assert set(closed[-1]) <= set(own.room.near.nodes[: counts[-1]].tolist())
+        assert set(closed[-1]) <= set(own.workspace.near.nodes[: counts[-1]].tolist())
     other.advance(10**6)
     # Few at first and between impacts, most in contact: the list follows.
     assert min(counts) < 0.6 * n
     assert max(map(len, closed)) > 0.8 * n
     assert own.statistics == other.statistics
-    assert other.room.near.used[0] == n
+    assert other.workspace.near.used[0] == n
     for name in ("states", "work"):
         a, b = getattr(own, name), getattr(other, name)
         assert np.abs(a - b).max() <= 1e-8 * np.abs(b).max(), name
@@ -130,14 +130,14 @@ def test_events_are_those_of_all_nodes(case):
 def test_states_far_from_the_start_find_their_nodes():
     run, _ = runs_of(*beam())
     run.advance(60)
-    problem, progress, room = run.problem, run.progress, run.room
-    blocks, near, rng = problem.blocks, room.near, np.random.default_rng(1)
+    problem, progress, workspace = run.problem, run.progress, run.workspace
+    blocks, near, rng = problem.blocks, workspace.near, np.random.default_rng(1)
     counts = []
     for size in 10.0 ** rng.uniform(-9.0, -4.0, 40):
-        near_nodes.choose_near(1e-12, problem, progress, room)
+        near_nodes.choose_near(1e-12, problem, progress, workspace)
         before = near.nodes[: near.used[0]].tolist()
         y = progress.state + size * rng.normal(size=10)
-        near_nodes.extend_near(y, problem, progress, room)
+        near_nodes.extend_near(y, problem, progress, workspace)
         k = near.used[0]
         found = near.nodes[:k].tolist()
         gaps = problem.system.rows[:, 1] @ y[:5] + problem.system.gap
@@ -161,7 +161,7 @@ def test_runs_go_on_bit_for_bit():
     whole.advance(10**6)
     while parts.advance(7) == 0:
         # A run that goes on from a checkpoint has lost the contents of its work arrays.
-        parts = replace(parts, room=driver.room_for(5, NODES, 0, 2, parts.problem.blocks))
+        parts = replace(parts, workspace=driver.workspace_for(5, NODES, 0, 2, parts.problem.blocks))
     assert np.array_equal(whole.states, parts.states)
     assert np.array_equal(whole.work, parts.work)
 
@@ -184,7 +184,7 @@ def test_nodes_with_memory_and_derivatives_take_all_nodes():
                 driver.start(*beam(), np.array([0.0, 1e-3]), rtol=1e-5, vary=True)):
         assert np.isneginf(run.problem.control.untouched).all()
         run.advance(5)
-        assert run.room.near.used[0] == NODES
+        assert run.workspace.near.used[0] == NODES
 
 
 @pytest.mark.parametrize(("rows", "columns", "length"), [

@@ -34,9 +34,9 @@ SOLVERS = {solver.name: solver for solver in (Auto(), SERIES, STEPS)}
 
 
 @kernel
-def first_zero(p: Vector, limit: float, room: Matrix) -> float:
+def first_zero(p: Vector, limit: float, workspace: Matrix) -> float:
     """First zero found by the kernels."""
-    return polynomials.first_zero(p, limit, room)
+    return polynomials.first_zero(p, limit, workspace)
 
 
 def oscillator(w=(0.0, 900.0), damping=(0.0, 0.02), y=((1.0, 0.6),), **parts):
@@ -122,7 +122,7 @@ def assert_no_contact_missed(seed):
 def test_the_first_zero_of_random_polynomials():
     rng = np.random.default_rng(0)
     count = polynomials.COEFFICIENTS
-    room = np.zeros((polynomials.DEPTH + 3, count))
+    workspace = np.zeros((polynomials.DEPTH + 3, count))
     for trial in range(3000):
         if trial % 2:
             p = np.poly(rng.uniform(0.0, 1.5, rng.integers(1, 7)))[::-1]
@@ -136,26 +136,27 @@ def test_the_first_zero_of_random_polynomials():
         roots = np.roots(c[::-1])
         roots = roots[np.abs(roots.imag) < 1e-9].real
         first = min([root for root in roots if 0.0 < root <= limit], default=2.0 * limit)
-        assert first_zero(c, limit, room) == pytest.approx(first, abs=1e-7)
+        assert first_zero(c, limit, workspace) == pytest.approx(first, abs=1e-7)
 
 
 def test_zeros_that_touch():
     """(x - a)^2 + e has two zeros, or none, however near they are."""
-    count, room = polynomials.COEFFICIENTS, np.zeros((polynomials.DEPTH + 3,
-                                                      polynomials.COEFFICIENTS))
+    count, workspace = polynomials.COEFFICIENTS, np.zeros((polynomials.DEPTH + 3,
+                                                           polynomials.COEFFICIENTS))
     for a in np.random.default_rng(1).uniform(0.05, 0.95, 300):
         for distance in (1e-3, 1e-5, 1e-7):
             c = np.zeros(count)
             c[:3] = a * a - distance**2, -2.0 * a, 1.0
-            assert first_zero(c, 1.0, room) == pytest.approx(a - distance, abs=1e-15 / distance)
+            assert first_zero(c, 1.0, workspace) == pytest.approx(a - distance,
+                                                                  abs=1e-15 / distance)
             c[0] = a * a + distance**2
-            assert first_zero(c, 1.0, room) == 2.0
+            assert first_zero(c, 1.0, workspace) == 2.0
     c = np.zeros(count)
-    assert first_zero(c, 1.0, room) == 2.0  # zero everywhere
+    assert first_zero(c, 1.0, workspace) == 2.0  # zero everywhere
     c[1] = 1.0
-    assert first_zero(c, 1.0, room) == 2.0  # zero at the start alone
+    assert first_zero(c, 1.0, workspace) == 2.0  # zero at the start alone
     c[1] = -1.0
-    assert first_zero(c, 1.0, room) == 0.0
+    assert first_zero(c, 1.0, workspace) == 0.0
 
 
 # Laws --------------------------------------------------------------------------------------------

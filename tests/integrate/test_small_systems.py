@@ -60,7 +60,7 @@ def assert_as_said(values, said):
 def test_what_step_loops_take_for_granted(modes, nodes):
     said = method.SMALL.values(modes, nodes)
     run = run_of(system(modes, nodes))
-    tuples = (run.problem, run.progress, run.room, run.output, run.variation)
+    tuples = (run.problem, run.progress, run.workspace, run.output, run.variation)
     found = sum(assert_as_said(values, said) for values in tuples)
     assert found >= sum(map(len, said.values()))
 
@@ -83,8 +83,8 @@ def test_same_results_as_by_the_step_loop_of_all_systems(modes, nodes):
     own, other = (run_of(system(modes, nodes), max_step=2e-5) for _ in range(2))
     assert method.advance_for(own.problem, own.variation) is not method.advance
     own.advance(400)
-    method.advance(method.Data(other.problem, other.progress, other.room, other.output, other.kept,
-                               other.variation, other.watch), 400)
+    method.advance(method.Data(other.problem, other.progress, other.workspace, other.output,
+                               other.kept, other.variation, other.watch), 400)
     assert own.statistics == other.statistics
     assert own.time == pytest.approx(other.time, rel=1e-12)
     for name in ("state", "rate", "work", "power"):
@@ -96,7 +96,7 @@ def test_same_results_as_by_the_step_loop_of_all_systems(modes, nodes):
 def test_what_derivatives_take_for_granted(modes):
     said = propagation.SMALL.values(modes, 1)
     run = run_of(system(modes, 1), vary=True)
-    tuples = (run.problem, run.progress, run.room, run.output, run.variation)
+    tuples = (run.problem, run.progress, run.workspace, run.output, run.variation)
     found = sum(assert_as_said(values, said) for values in tuples)
     assert found >= sum(map(len, said.values()))
 

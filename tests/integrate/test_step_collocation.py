@@ -400,7 +400,7 @@ def test_what_step_loops_take_for_granted(modes, nodes):
     system = block(modes, nodes, normal=RoughSurface(10e6, 10e-6, 40.0))
     run = driver.start(system, np.zeros(2 * modes), np.linspace(0.0, 0.1, 11), rtol=1e-8,
                        method="radau")
-    tuples = (run.problem, run.progress, run.room, run.output, run.collocation)
+    tuples = (run.problem, run.progress, run.workspace, run.output, run.collocation)
     found = sum(assert_as_said(values, said) for values in tuples)
     assert found >= sum(map(len, said.values()))
     assert Variation not in said

@@ -5,8 +5,8 @@ import pytest
 from systems import mass_in_y
 
 from fecontact.core.compiled import kernel
-from fecontact.integrate.collocation.room import Collocation, collocation_for
 from fecontact.integrate.collocation.step_polynomials import first_switch
+from fecontact.integrate.collocation.workspace import Collocation, collocation_for
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.rodas5p.state import Problem
 from fecontact.laws import RoughSurface

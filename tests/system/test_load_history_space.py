@@ -23,7 +23,7 @@ from fecontact.laws import (
 from fecontact.system.nodes import GroundMotion
 from fecontact.system.quasistatic.given import travelling
 from fecontact.system.quasistatic.increment import evaluate
-from fecontact.system.quasistatic.pose import pose_for, room_for
+from fecontact.system.quasistatic.pose import pose_for, workspace_for
 from fecontact.system.quasistatic.sliders import sliders_of
 
 C, LIMIT = 2e4, 4.0  # of `jenkins()`
@@ -321,7 +321,7 @@ def test_the_matrix_is_the_derivative_of_the_balance(ground, friction):
     arrays, n, m = travelling(system), 4, 6
     sliders = sliders_of(system, 0.82, None, np.full(n, 1e7))
     e = sliders.limit.shape[1]
-    pose, room = pose_for(m, n, e, 2), room_for(m, n, e, 2, np.ones(m))
+    pose, workspace = pose_for(m, n, e, 2), workspace_for(m, n, e, 2, np.ones(m))
     rng = np.random.default_rng(4)
     body = np.array([1e-4, -2e-4, -4e-5, 5e-5, -4e-5, 1e-4])
     pose.q[:] = np.linalg.solve(system.basis.T[0], body)
@@ -329,10 +329,10 @@ def test_the_matrix_is_the_derivative_of_the_balance(ground, friction):
     pose.left[:] = np.tile(arrays.rows[:, ::2] @ pose.q, e)
     pose.left[:2] += 1e-7 * rng.standard_normal((2, 2 * e))
     pose.left[2:] += 2e-2 * rng.choice([-1.0, 1.0], (2, 2 * e))
-    room.multiplier[:] = 0.1 * rng.standard_normal((n, 2 * e))
+    workspace.multiplier[:] = 0.1 * rng.standard_normal((n, 2 * e))
     given = np.zeros(m), GroundMotion(1e-5, 0.0, -2e-5, 0.0), sliders, arrays
-    evaluate(*given, pose, room, 1)
-    found, start = room.matrix.copy(), pose.q.copy()
+    evaluate(*given, pose, workspace, 1)
+    found, start = workspace.matrix.copy(), pose.q.copy()
     size = np.linalg.norm(pose.force.reshape(n, e, 2), axis=2)
     limits = sliders.limit * pose.node[:, 1, None]
     assert (size[:2] < 0.99 * limits[:2]).all()
@@ -343,8 +343,8 @@ def test_the_matrix_is_the_derivative_of_the_balance(ground, friction):
         for part in (-2.0, -1.0, 1.0, 2.0):
             pose.q[:] = start
             pose.q[k] += part * 1e-8
-            evaluate(*given, pose, room, 0)
-            values.append(room.residual.copy())
+            evaluate(*given, pose, workspace, 0)
+            values.append(workspace.residual.copy())
         expected[:, k] = -(values[0] - 8.0 * values[1] + 8.0 * values[2] - values[3]) / 12e-8
     assert found == pytest.approx(expected, rel=1e-6, abs=1e-7 * np.abs(expected).max())
     assert np.abs(found - found.T).max() > 1e-3 * np.abs(found).max()

@@ -44,7 +44,7 @@ def distinguished(
     if they fill the same box to a fifth of its size.
     """
     labels: list[Integers] = []
-    motions = _room(0, 1, len(scale))
+    motions = _workspace(0, 1, len(scale))
     for read in parts:
         found = read()
         found = found._replace(points=np.ascontiguousarray(found.points))
@@ -69,7 +69,7 @@ def distinguished(
                   counts[k] / len(every)) for k in order)
 
 
-def _room(number: int, rows: int, size: int) -> Motions:
+def _workspace(number: int, rows: int, size: int) -> Motions:
     return Motions(np.zeros((number, rows, size)), np.zeros(number, dtype=np.int64),
                     np.zeros(number, dtype=np.int64), np.zeros(1, dtype=np.int64))
 
@@ -77,7 +77,7 @@ def _room(number: int, rows: int, size: int) -> Motions:
 def _grown(motions: Motions, number: int, rows: int) -> Motions:
     """Motions in larger arrays, for ``number`` motions of ``rows`` states."""
     count = int(motions.number[0])
-    made = _room(max(number, count), rows, motions.points.shape[2])
+    made = _workspace(max(number, count), rows, motions.points.shape[2])
     made.points[:count, : motions.points.shape[1]] = motions.points[:count]
     made.rows[:count], made.kind[:count] = motions.rows[:count], motions.kind[:count]
     made.number[0] = count

@@ -115,7 +115,7 @@ def continuation(
                 step = batch.step
                 continue
         # Scales that have grown make the same step longer.
-        step = min(step, _longest(problem, here, options), _OVERSHOOT * _room(here, options))
+        step = min(step, _longest(problem, here, options), _OVERSHOOT * _to_bounds(here, options))
         rounded = False
         try:
             reached = _step(problem, here, step, options)
@@ -287,14 +287,15 @@ def _round_corner(
         step *= _FARTHER
 
 
-def _room(here: Solution, options: ContinuationOptions) -> float:
+def _to_bounds(here: Solution, options: ContinuationOptions) -> float:
     """Length along the tangent to the nearest bound of a parameter ahead."""
-    room = np.inf
+    nearest = np.inf
     for place, low, high in options.box:
         slope = float(here.tangent[place])
         if slope != 0.0:
-            room = min(room, ((high if slope > 0.0 else low) - float(here.u[place])) / slope)
-    return room
+            ahead = (high if slope > 0.0 else low) - float(here.u[place])
+            nearest = min(nearest, ahead / slope)
+    return nearest
 
 
 def _believable(

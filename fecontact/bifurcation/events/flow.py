@@ -25,7 +25,7 @@ from fecontact.integrate.nonsmooth.equations import (
     pushing_row,
     slipping_force,
 )
-from fecontact.integrate.nonsmooth.event_search import Room
+from fecontact.integrate.nonsmooth.event_search import Workspace
 from fecontact.integrate.nonsmooth.problem import (
     CREEP,
     FORCE,
@@ -34,9 +34,9 @@ from fecontact.integrate.nonsmooth.problem import (
     RATE,
     SLIP,
     STICK,
+    Evaluation,
     NonsmoothProblem,
     Progress,
-    Workspace,
 )
 from fecontact.integrate.nonsmooth.rigid_stops import change_contacts_at
 from fecontact.integrate.nonsmooth.transitions import decide_clusters
@@ -143,10 +143,10 @@ class Rows(NamedTuple):
     states: Annotated[Array, ANY, STATES]
 
 
-class FlowRoom(NamedTuple):
+class FlowWorkspace(NamedTuple):
     """Workspace of a step: ``full`` and ``rate`` for a state with work; stages and derivatives."""
 
-    workspace: Workspace
+    evaluation: Evaluation
     full: Vector
     rate: Vector
     around: Annotated[Array, STATES]
@@ -169,7 +169,7 @@ class Data(NamedTuple):
     progress: Reached
     output: Rows
     slopes: Matrix
-    room: FlowRoom
+    workspace: FlowWorkspace
 
 
 class Step(NamedTuple):
@@ -182,49 +182,50 @@ class Step(NamedTuple):
 
 
 @helper
-def _rates_in(t, y, p, given, room, out):
+def _rates_in(t, y, p, given, workspace, out):
     """Rates of the states y at a time."""
-    _rates(t, y, p, given.status, given.closed, room.workspace, room.full, room.rate, out)
+    _rates(t, y, p, given.status, given.closed, workspace.evaluation, workspace.full,
+           workspace.rate, out)
 
 
 @routine
-def _add_differences(t, y, given, room):
-    """Fill ``room.J`` with the derivatives of the rates: by states, time and parameter."""
-    p, near, around, out, d = given.problem, room.near, room.around, room.J, len(y)
+def _add_differences(t, y, given, workspace):
+    """Fill ``workspace.J`` with the derivatives of the rates: by states, time and parameter."""
+    p, near, around, out, d = given.problem, workspace.near, workspace.around, workspace.J, len(y)
     out[:] = 0.0
-    _rates_in(t, y, p, given, room, near)
+    _rates_in(t, y, p, given, workspace, near)
     for i in range(d):
         step = PART * given.sizes[i]
-        side = _direction(i, step, p, given.status, room.workspace)
+        side = _direction(i, step, p, given.status, workspace.evaluation)
         for k in range(5):
             weight = _BOTH[k] if side == 0 else _ONE[k] * side
             if weight == 0.0:
                 continue
             around[:] = y
             around[i] += step * (k - 2 if side == 0 else k * side)
-            _rates_in(t, around, p, given, room, near)
+            _rates_in(t, around, p, given, workspace, near)
             for j in range(d):
                 out[j, i] += weight * near[j] / step
         # The slip velocities at y itself, for the next state.
-        _rates_in(t, y, p, given, room, near)
+        _rates_in(t, y, p, given, workspace, near)
     if given.tick > 0.0:
         for k in range(5):
             if _BOTH[k] != 0.0:
-                _rates_in(t + (k - 2) * given.tick, y, p, given, room, near)
+                _rates_in(t + (k - 2) * given.tick, y, p, given, workspace, near)
                 for j in range(d):
                     out[j, d] += _BOTH[k] * near[j] / given.tick
-    _rates_in(t, y, given.above, given, room, near)
+    _rates_in(t, y, given.above, given, workspace, near)
     for j in range(d):
         out[j, d + 1] += near[j] / (2.0 * given.change)
-    _rates_in(t, y, given.below, given, room, near)
+    _rates_in(t, y, given.below, given, workspace, near)
     for j in range(d):
         out[j, d + 1] -= near[j] / (2.0 * given.change)
 
 
 @routine
-def _set_stages(t, h, y, given, room):
+def _set_stages(t, h, y, given, workspace):
     """Fill the states and slopes of all stages of a step, the last of which is its end."""
-    places, slopes = room.places, room.stages
+    places, slopes = workspace.places, workspace.stages
     for stage in range(STAGES + 1):
         for i in range(len(y)):
             total = 0.0
@@ -232,7 +233,7 @@ def _set_stages(t, h, y, given, room):
                 total += (A[stage, k] if stage < STAGES else B[k]) * slopes[k, i]
             places[stage, i] = y[i] + h * total
         node = C[stage] if stage < STAGES else 1.0
-        _rates_in(t + node * h, places[stage], given.problem, given, room, slopes[stage])
+        _rates_in(t + node * h, places[stage], given.problem, given, workspace, slopes[stage])
 
 
 @helper
@@ -275,10 +276,10 @@ def _aim(t, h, last, smallest, data):
 @routine
 def _attempt(step, last, smallest, data):
     """Try a step; its outcome, and the length of the next one."""
-    given, room, h = data.given, data.room, step.h
+    given, workspace, h = data.given, data.workspace, step.h
     _set_stages(given.begin + given.sign * step.t, given.sign * h, data.progress.state, given,
-                room)
-    size = _error(h, given.sizes, given.rtol, room.stages)
+                workspace)
+    size = _error(h, given.sizes, given.rtol, workspace.stages)
     if not size <= 1.0:
         shorter = h * (max(0.2, 0.9 * size**-0.125) if math.isfinite(size) else 0.1)
         if shorter < _SHORTEST * (data.output.times[-1] + abs(given.begin)):
@@ -292,12 +293,12 @@ def _attempt(step, last, smallest, data):
 @routine
 def _close(step, writes, data):
     """Carry the derivatives over a step, by the same stages."""
-    given, room, slopes = data.given, data.room, data.slopes
-    J, moved, varied, length = room.J, room.moved, room.varied, given.sign * step.h
+    given, workspace, slopes = data.given, data.workspace, data.slopes
+    J, moved, varied, length = workspace.J, workspace.moved, workspace.varied, given.sign * step.h
     d = len(slopes)
     for stage in range(STAGES if d > 0 else 0):
         _add_differences(given.begin + given.sign * step.t + C[stage] * length,
-                         room.places[stage], given, room)
+                         workspace.places[stage], given, workspace)
         for i in range(d):
             for j in range(d + 2):
                 moved[i, j] = slopes[i, j]
@@ -318,13 +319,13 @@ def _close(step, writes, data):
 @helper
 def _fill(row, output, step, data):
     """Fill a row of the output, which is at the end of the step."""
-    output.states[row] = data.room.places[STAGES]
+    output.states[row] = data.workspace.places[STAGES]
 
 
 @helper
 def _go_on(step, h, data):
     """Make the end of the step the state of the motion."""
-    data.progress.state[:] = data.room.places[STAGES]
+    data.progress.state[:] = data.workspace.places[STAGES]
     return RUNNING, h
 
 
@@ -350,7 +351,7 @@ def _pressed(j, p, w):
 
 @kernel
 def observe(
-    p: NonsmoothProblem, w: Workspace, times: Vector, states: Matrix,
+    p: NonsmoothProblem, w: Evaluation, times: Vector, states: Matrix,
     status: IntegerVector, closed: IntegerVector, full: Vector, rate: Vector, margins: Matrix,
     rates: Matrix,
 ) -> None:
@@ -388,7 +389,7 @@ def observe(
 
 @kernel
 def strike_rows(
-    p: NonsmoothProblem, w: Workspace, t: float, state: Vector, status: IntegerVector,
+    p: NonsmoothProblem, w: Evaluation, t: float, state: Vector, status: IntegerVector,
     closed: IntegerVector, full: Vector, rate: Vector, held: Matrix, pushing: Matrix,
     speeds: Vector, coefficients: Vector,
 ) -> None:
@@ -414,19 +415,19 @@ def strike_rows(
 
 @kernel
 def decide(
-    p: NonsmoothProblem, w: Workspace, progress: Progress, room: Room,
+    p: NonsmoothProblem, w: Evaluation, progress: Progress, workspace: Workspace,
     t: float, near: float, slow: float,
 ) -> float:
     """Change the contact state at a moment as a run does; NO_ACCELERATION or NO_IMPULSES where that
     is impossible, else the time of a flight.
 
-    What ``room`` marks changes: see :func:`fecontact.integrate.nonsmooth.rigid_stops` and
+    What ``workspace`` marks changes: see :func:`fecontact.integrate.nonsmooth.rigid_stops` and
     :func:`fecontact.integrate.nonsmooth.transitions.decide_clusters`.
     """
     if p.rigid != 0:
-        return change_contacts_at(p.change)(t, p, progress, room, w, slow, 0.0, 0.0,
-                                            room.slopes[0])
-    decide_clusters(t, p, progress, room, near, w, room.slopes[0])
+        return change_contacts_at(p.change)(t, p, progress, workspace, w, slow, 0.0, 0.0,
+                                            workspace.slopes[0])
+    decide_clusters(t, p, progress, workspace, near, w, workspace.slopes[0])
     return 0.0
 
 

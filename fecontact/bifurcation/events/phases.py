@@ -12,7 +12,7 @@ from fecontact.bifurcation.events.flow import (
     PART,
     STATES,
     Data,
-    FlowRoom,
+    FlowWorkspace,
     Given,
     Reached,
     Rows,
@@ -27,7 +27,7 @@ from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.records import allocate
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.nonsmooth.driver import nonsmooth_problem
-from fecontact.integrate.nonsmooth.problem import STICK, NonsmoothProblem, workspace_for
+from fecontact.integrate.nonsmooth.problem import STICK, NonsmoothProblem, evaluation_for
 from fecontact.integrate.solvers import SetValued
 from fecontact.integrate.step_loop import FINISHED
 from fecontact.system.powers import POWER_COUNT
@@ -158,7 +158,7 @@ class Motion:
         self.problem, self.rubbing = self._problem(values)
         self.clusters, self.nodes = len(self.problem.rows), len(self.problem.cluster)
         self.modes = self.problem.rows.shape[1]
-        self._workspace = workspace_for(self.problem)
+        self._evaluation = evaluation_for(self.problem)
         full = np.zeros((2, 2 * self.modes + POWER_COUNT + self.nodes))
         self._full, self._rate = full[0].copy(), full[1].copy()
 
@@ -224,9 +224,9 @@ class Motion:
         sizes, rows = {STATES: d}, Rows(np.abs(times), states)
         reached = allocate(Reached, sizes, state=np.array(start, dtype=float),
                            numbers=np.array([0.0, min(self.longest, rows.times[-1])]))
-        room = allocate(FlowRoom, sizes, workspace=self._workspace, full=self._full,
-                        rate=self._rate)
-        ended = flow(Data(given, reached, rows, slopes, room), _MOST_STEPS)
+        workspace = allocate(FlowWorkspace, sizes, evaluation=self._evaluation, full=self._full,
+                             rate=self._rate)
+        ended = flow(Data(given, reached, rows, slopes, workspace), _MOST_STEPS)
         if ended != FINISHED or not np.isfinite(states).all():
             raise AnalysisError("The motion between two events could not be followed.")
         return states, slopes
@@ -239,7 +239,7 @@ class Motion:
         """
         margins = np.empty((len(times), 2 * self.clusters + self.nodes))
         rates = np.empty_like(states)
-        observe(self.problem if problem is None else problem, self._workspace,
+        observe(self.problem if problem is None else problem, self._evaluation,
                 np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states),
                 *phase.arrays, self._full, self._rate, margins, rates)
         margins[:, 2 * self.clusters :][:, self._unwatched] = np.inf
@@ -313,7 +313,7 @@ class Motion:
         """See :func:`fecontact.bifurcation.events.flow.strike_rows`."""
         k, n, m = self.clusters, self.nodes, self.modes
         found = (np.empty((n + k, m)), np.empty((n + k, m)), np.empty(n + k), np.empty(n))
-        strike_rows(self.problem if problem is None else problem, self._workspace, t,
+        strike_rows(self.problem if problem is None else problem, self._evaluation, t,
                     np.ascontiguousarray(state), *phase.arrays, self._full, self._rate, *found)
         return found
 

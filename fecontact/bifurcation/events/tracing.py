@@ -8,7 +8,7 @@ from fecontact.bifurcation.events.flow import decide
 from fecontact.bifurcation.events.phases import PERIOD, Motion, Phase
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
-from fecontact.integrate.nonsmooth.event_search import Room, room_for
+from fecontact.integrate.nonsmooth.event_search import Workspace, workspace_for
 from fecontact.integrate.nonsmooth.problem import (
     OPEN,
     SLIP_SIZE,
@@ -127,10 +127,10 @@ def _followed(
 ) -> tuple[list[Phase], Array, Array]:
     """Phases from a state on, the last of which is cut, with begins and states there."""
     progress = progress_for(motion.problem, motion.rubbing, start, begin, 0.0)
-    room = room_for(motion.problem)
+    workspace = workspace_for(motion.problem)
     phases: list[Phase] = []
     begins, states, t = [begin], [start], begin
-    _first_state(motion, progress, room, t)
+    _first_state(motion, progress, workspace, t)
     if motion.problem.rigid == 0:
         progress.closed[:] = 1
     while True:
@@ -146,7 +146,7 @@ def _followed(
             raise AnalysisError("A compliant contact opens.")
         ending = phase.ending(event)
         t += after
-        moved = _decided(motion, progress, room, t, end, ending)
+        moved = _decided(motion, progress, workspace, t, end, ending)
         if event >= 2 * motion.clusters and not phase.closed[event - 2 * motion.clusters]:
             struck = motion.strike_at(t, end, ending, moved[motion.modes :])
             ending = phase.ending(event, struck)
@@ -163,48 +163,48 @@ def _require_known(motion: Motion, phase: Phase) -> None:
         raise AnalysisError("A compliant contact opens.")
 
 
-def _first_state(motion: Motion, progress: Progress, room: Room, t: float) -> None:
+def _first_state(motion: Motion, progress: Progress, workspace: Workspace, t: float) -> None:
     """Decide which clusters stick and which stops are closed at the start."""
     phase = Phase(tuple(progress.status.tolist()), tuple(progress.closed.tolist()), PERIOD)
     d = 2 * motion.modes
     heights = motion.observed(np.array([t]), progress.state[None, :d], phase)[0][0]
-    for flags in (room.released, room.arrived, room.touched, room.parting):
+    for flags in (workspace.released, workspace.arrived, workspace.touched, workspace.parting):
         flags[:] = False
     if motion.problem.rigid:
         scale = float(motion.sizes[: motion.modes].max())
-        room.touched[:] = heights[2 * motion.clusters :] <= _AT_REST * scale
-    _require_decided(motion, progress, room, t)
+        workspace.touched[:] = heights[2 * motion.clusters :] <= _AT_REST * scale
+    _require_decided(motion, progress, workspace, t)
 
 
-def _require_decided(motion: Motion, progress: Progress, room: Room, t: float) -> None:
+def _require_decided(motion: Motion, progress: Progress, workspace: Workspace, t: float) -> None:
     fastest = float(motion.sizes[motion.modes :].max())
     progress.largest[SLIP_SIZE] = fastest
     # Elsewhere it is the time of a flight.
-    if decide(motion.problem, motion._workspace, progress, room, t, _NEAR * fastest,
+    if decide(motion.problem, motion._evaluation, progress, workspace, t, _NEAR * fastest,
               1e-12 * fastest) in (NO_ACCELERATION, NO_IMPULSES):
         raise AnalysisError("The contact state is not unique there.")
 
 
 def _decided(
-    motion: Motion, progress: Progress, room: Room, t: float, state: Array, phase: Phase
+    motion: Motion, progress: Progress, workspace: Workspace, t: float, state: Array, phase: Phase
 ) -> Array:
     """The state after an event, and the new contact state in ``progress``."""
     d, event, k = 2 * motion.modes, phase.event, motion.clusters
     progress.state[:d] = state
     progress.status[:], progress.closed[:] = phase.arrays
-    for flags in (room.released, room.arrived, room.touched, room.parting):
+    for flags in (workspace.released, workspace.arrived, workspace.touched, workspace.parting):
         flags[:] = False
     if event < 2 * k:
         c = event // 2
         if phase.status[c] == STICK:
-            room.released[c] = True
+            workspace.released[c] = True
             progress.status[c] = released_sense(event)
         else:
-            room.arrived[c] = True
+            workspace.arrived[c] = True
     else:
-        flags = room.parting if phase.closed[event - 2 * k] else room.touched
+        flags = workspace.parting if phase.closed[event - 2 * k] else workspace.touched
         flags[event - 2 * k] = True
-    _require_decided(motion, progress, room, t)
+    _require_decided(motion, progress, workspace, t)
     return progress.state[:d].copy()
 
 

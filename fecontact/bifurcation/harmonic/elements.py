@@ -91,18 +91,18 @@ def _along_one_tangent(j, X, T, s, count, offsets, values, derivatives, r, z, ro
     pieces = cut_pieces(path, s)
     own = rows[0] if derivatives else nothing
     own[:, :] = 0.0
-    room, p, done = np.empty((5, 2 * L)), s.friction_parameters[j], 1
+    workspace, p, done = np.empty((5, 2 * L)), s.friction_parameters[j], 1
     held, sliding = np.zeros(N), np.zeros(N)
     turned = np.zeros((N if derivatives else 0, 2 * L))
     start = moved_at(path, 0, 0.0, s)[0] + path.slides * ground_motion(0.0, s).travel
     for i in range(count):
         if not follow_along(path, pieces, limit_of(j, i, count, 1.0, s), p[1 + i],
                             start + offsets[i], p[0], s, z[:, i], r[0], (held, sliding, turned),
-                            own, room):
+                            own, workspace):
             done = 0
     if not derivatives:
         return done, timed
-    stiffness, limits, kept = 0.0, 0.0, room[0]
+    stiffness, limits, kept = 0.0, 0.0, workspace[0]
     kept[:] = 0.0
     for n in range(N):
         stiffness += held[n]

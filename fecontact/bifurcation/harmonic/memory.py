@@ -27,7 +27,7 @@ from fecontact.core.dense_lu import factorise, solve, solve_rows
 from fecontact.core.records import Array4, Block, IntegerVector, Matrix, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.system.node_forces import (
-    force_room,
+    force_workspace,
     node_forces,
     normal_force,
     pressing_force,
@@ -410,7 +410,7 @@ def march(
             _take_slip(j, t, y, s, slip)
         for first in range(0, k, max(b, 1)):
             alone = blocks[j] > 0
-            force, rates = force_room(s)
+            force, rates = force_workspace(s)
             if alone:
                 take_element(j, first // b, k // b, s, p)
                 force, rates = np.empty(2 * (4 + b)), np.empty((b, 4 + b))

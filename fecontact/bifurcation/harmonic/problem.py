@@ -102,17 +102,17 @@ class CompiledLinearisation(HarmonicLinearisation):
 
     def _evaluated(self, derivatives: bool) -> tuple[Array, ...]:
         """Residual, z and forces at the samples; and derivatives, condensed and in the mean."""
-        room, m = self._equations.room, self.problem.layout.displacements
+        workspace, m = self._equations.workspace, self.problem.layout.displacements
         forces, mean = np.empty((self.problem.samples, m)), np.empty((m, 2 * m))
         # The parameter may lie beside the range of the equations, where they hold too.
         if not evaluate(np.ascontiguousarray(self.u), DERIVATIVES if derivatives else RESIDUAL,
                         self._equations, forces, mean, _NONE, _NONE, _NONE):
             raise AnalysisError(UNREPEATED)
-        found = room.residual.copy(), room.z.copy(), forces
-        n = len(room.residual)
+        found = workspace.residual.copy(), workspace.z.copy(), forces
+        n = len(workspace.residual)
         if not derivatives:
             return found
-        condensed = room.condensed.reshape(n, n + 1).copy()
+        condensed = workspace.condensed.reshape(n, n + 1).copy()
         return *found, zero_left_out(condensed, self.problem.left_out), mean
 
     @cached_property
@@ -307,7 +307,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         if not (evaluate(u, ORBIT, e, forces, mean, row, self.weights(), along)
                 and math.isfinite(weighted_norm(self.weights(), along))):
             return None
-        return u, along, forces, mean, e.room.z.copy()
+        return u, along, forces, mean, e.workspace.z.copy()
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Test functions of the multipliers, if known, and of orbits that shrink to rest."""

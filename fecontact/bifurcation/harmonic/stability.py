@@ -125,7 +125,7 @@ def _floquet(problem: Balance, T: float, J: Array) -> Floquet:
         return _of_transitions(problem, T, M, J)
     for k in range(layout.states - layout.memory, layout.states):
         J[:, k, k] -= LEAK / T
-    factors, rates, nothing, widths = _room(N, len(points), layout.states)
+    factors, rates, nothing, widths = _workspace(N, len(points), layout.states)
     condensation.condense(J, rates, nothing, widths, T, basis, slopes, 0, factors)
     if problem.autonomous or not layout.displacements or layout.states < _MANY:
         return floquet_of(factors, problem.autonomous)
@@ -153,7 +153,7 @@ def _of_transitions(problem: Balance, T: float, M: Array, J: Array) -> Floquet:
 
 
 @cache
-def _room(
+def _workspace(
     intervals: int, points: int, states: int
 ) -> tuple[condensation.CondensedFactors, Array, Array, Array]:
     """Workspace for factors, and what they are made with: no rates, no parameters, and widths."""

@@ -150,7 +150,7 @@ def _means(y):
 
 
 @borrowing
-def _add_begun(path, n, part, pull, spring, stuck, s, r, rows, room):
+def _add_begun(path, n, part, pull, spring, stuck, s, r, rows, workspace):
     """Add to forces r (N,), and to their derivatives, the means about a place where slip begins.
 
     ``stuck`` (2 L,) are the derivatives of z - s before.
@@ -159,7 +159,7 @@ def _add_begun(path, n, part, pull, spring, stuck, s, r, rows, room):
     _, rate, bend, third = moved_at(path, n, part, s)
     jump = pull * pressing_at(path, n, part, 1) - rate
     over = bend - pull * pressing_at(path, n, part, 2)
-    shift, by_jump, by_bend = room[0], room[1], room[2]
+    shift, by_jump, by_bend = workspace[0], workspace[1], workspace[2]
     if len(rows) > 0:
         for k in range(len(shift)):
             shift[k], by_jump[k], by_bend[k] = stuck[k], 0.0, 0.0
@@ -182,12 +182,12 @@ def _add_begun(path, n, part, pull, spring, stuck, s, r, rows, room):
 
 
 @borrowing
-def _add_ended(path, n, part, pull, spring, s, r, rows, room):
+def _add_ended(path, n, part, pull, spring, s, r, rows, workspace):
     """Add to forces r (N,), and to their derivatives, the means about a place where slip ends."""
     N = len(r)
     _, _, bend, third = moved_at(path, n, part, s)
     off, over = beyond(path, n, part, 1, pull, 0.0, s)
-    shift, by_bend = room[0], room[2]
+    shift, by_bend = workspace[0], workspace[2]
     if len(rows) > 0:
         for k in range(len(shift)):
             shift[k], by_bend[k] = 0.0, 0.0
@@ -218,7 +218,7 @@ def _count_in(side, ratio, spring, kept, sign, n, held, sliding, turned):
 
 
 @borrowing
-def follow_along(path, count, ratio, spring, kept, return_time, s, z, r, sums, rows, room):
+def follow_along(path, count, ratio, spring, kept, return_time, s, z, r, sums, rows, workspace):
     """Fill the deflections z (N,) of one element, and add its forces to r (N,).
 
     With rows (N, 2 L), derivatives of the forces about jumps are added to them, and to ``sums``
@@ -228,7 +228,7 @@ def follow_along(path, count, ratio, spring, kept, return_time, s, z, r, sums, r
     deflection, side, end, repeats = _repeated(path, count, ratio, kept, s)
     N, wanted = len(r), len(rows) > 0
     held, sliding, turned = sums
-    stuck, last = room[3], room[4]
+    stuck, last = workspace[3], workspace[4]
     for k in range(len(stuck)):
         stuck[k] = 0.0
     if wanted and side == 0.0 and end[0] >= 0:
@@ -243,15 +243,15 @@ def follow_along(path, count, ratio, spring, kept, return_time, s, z, r, sums, r
         deflection, side, ends, begins, of = _advance(path, k, ratio, deflection, side, True, s)
         again = side == 0.0 and begins >= 0.0
         if again:
-            _add_begun(path, n, begins, of * ratio, spring, stuck, s, r, rows, room)
+            _add_begun(path, n, begins, of * ratio, spring, stuck, s, r, rows, workspace)
         if ends >= 0.0:
-            _add_ended(path, n, ends, of * ratio, spring, s, r, rows, room)
+            _add_ended(path, n, ends, of * ratio, spring, s, r, rows, workspace)
             if wanted:
                 for i in range(len(stuck)):
                     stuck[i] = 0.0
                 add_row(path, n, ends, 0, of * ratio, -1.0, stuck)
         if begins >= 0.0 and not again:
-            _add_begun(path, n, begins, side * ratio, spring, stuck, s, r, rows, room)
+            _add_begun(path, n, begins, side * ratio, spring, stuck, s, r, rows, workspace)
         changed = changed or ends >= 0.0 or begins >= 0.0
         if path.last[k] < 1.0:
             continue

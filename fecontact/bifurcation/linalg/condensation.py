@@ -87,9 +87,9 @@ def with_left_ends(factors: CondensedFactors, left: Array) -> CondensedFactors:
 def _aligned(groups: int, rows: int, columns: int) -> Array:
     """Allocate (groups, rows, columns, 8), each group of eight numbers in one cache line."""
     size = groups * rows * columns * WIDTH
-    room = np.empty(size + WIDTH)
-    first = -(room.__array_interface__["data"][0] // room.itemsize) % WIDTH
-    return room[first : first + size].reshape(groups, rows, columns, WIDTH)
+    workspace = np.empty(size + WIDTH)
+    first = -(workspace.__array_interface__["data"][0] // workspace.itemsize) % WIDTH
+    return workspace[first : first + size].reshape(groups, rows, columns, WIDTH)
 
 
 @helper
@@ -115,7 +115,7 @@ def _chain_segments(local, chain, order, end):
     d, columns, _ = end.shape
     e = columns - 2 * d
     groups = len(chain) + 1
-    room, links, nothing = np.empty(WIDTH), np.empty((d, columns, WIDTH)), spread(0.0)
+    workspace, links, nothing = np.empty(WIDTH), np.empty((d, columns, WIDTH)), spread(0.0)
     places = np.empty(WIDTH, dtype=np.int64)
     _take_links(local, 0, groups, places, end)
     for group in range(1, groups):
@@ -132,7 +132,7 @@ def _chain_segments(local, chain, order, end):
             for c in range(e):
                 write(a[i, 3 * d + c], read(end[i, 2 * d + c]))
                 write(a[d + i, 3 * d + c], read(links[i, 2 * d + c]))
-        eliminate_lanes(a, d, order[group - 1], room)
+        eliminate_lanes(a, d, order[group - 1], workspace)
         for i in range(d):
             for c in range(columns):
                 write(end[i, c], read(a[d + i, d + c]))
@@ -188,7 +188,7 @@ def condense(
     e = q + with_period
     inner = (m - 1) * d
     of_states, of_common, rates = J.reshape(-1), P.reshape(-1), f.reshape(-1)
-    room, step, width = np.empty(WIDTH), np.empty(WIDTH), np.empty(WIDTH)
+    workspace, step, width = np.empty(WIDTH), np.empty(WIDTH), np.empty(WIDTH)
     # Start of the interval of each lane, counted in collocation points.
     first_point, places = np.empty(WIDTH, dtype=np.int64), np.empty(WIDTH, dtype=np.int64)
     for group in range(groups):
@@ -222,7 +222,7 @@ def condense(
                 for c in range(q):
                     write(a[row, inner + 2 * d + with_period + c],
                           read(step) * gather(of_common, places, c))
-        eliminate_lanes(a, inner, factors.inner_order[group], room)
+        eliminate_lanes(a, inner, factors.inner_order[group], workspace)
         for lane in range(WIDTH):
             j = lane * groups + group
             if j < N:

@@ -11,7 +11,7 @@ from fecontact.core.lanes.vectors import WIDTH, magnitude, read, spread, where_l
 
 
 @helper
-def _with_pivot(a, k, order, room):
+def _with_pivot(a, k, order, workspace):
     """Move the largest entry of column k to row k in each lane; returns and stores its inverse."""
     rows, columns, _ = a.shape
     largest, place = magnitude(read(a[k, k])), spread(float(k))
@@ -19,17 +19,17 @@ def _with_pivot(a, k, order, room):
         size = magnitude(read(a[i, k]))
         place = where_larger(size, largest, spread(float(i)), place)
         largest = where_larger(size, largest, size, largest)
-    write(room, place)
-    row, same = int(room[0]), True
+    write(workspace, place)
+    row, same = int(workspace[0]), True
     for lane in range(1, WIDTH):
-        same = same and room[lane] == room[0]
+        same = same and workspace[lane] == workspace[0]
     if same and row != k:
         for c in range(columns):
             above = read(a[k, c])
             write(a[k, c], read(a[row, c]))
             write(a[row, c], above)
     for lane in range(WIDTH):
-        row = int(room[lane])
+        row = int(workspace[lane])
         if row != k:
             order[k, lane], order[row, lane] = order[row, lane], order[k, lane]
             if not same:
@@ -41,10 +41,10 @@ def _with_pivot(a, k, order, room):
 
 
 @helper
-def eliminate_lanes(a, count, order, room):
+def eliminate_lanes(a, count, order, workspace):
     """Eliminate the first columns of a (rows, columns, 8); ``order`` (rows, 8) is filled.
 
-    ``order`` says which row came to each place; ``room`` (8,) is overwritten. Four columns are
+    ``order`` says which row came to each place; ``workspace`` (8,) is overwritten. Four columns are
     eliminated from the rows below at once: less is read and written.
     """
     rows, columns, _ = a.shape
@@ -54,7 +54,7 @@ def eliminate_lanes(a, count, order, room):
     for first in range(0, count, 4):
         last = min(first + 4, count)
         for k in range(first, last):
-            inverse = _with_pivot(a, k, order, room)
+            inverse = _with_pivot(a, k, order, workspace)
             for i in range(k + 1, rows):
                 factor = read(a[i, k]) * inverse
                 write(a[i, k], factor)

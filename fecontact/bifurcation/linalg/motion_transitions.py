@@ -70,8 +70,8 @@ def motion_transitions(
     N, d, s = out.shape[0], out.shape[1], len(points)
     m = d // 2
     size, columns = s * m, s * m + d
-    room = np.empty((size * columns + 1) * WIDTH)
-    a = room[: size * columns * WIDTH].reshape((size, columns, WIDTH))
+    workspace = np.empty((size * columns + 1) * WIDTH)
+    a = workspace[: size * columns * WIDTH].reshape((size, columns, WIDTH))
     order, pivots = np.empty((size, WIDTH), dtype=np.int64), np.empty(WIDTH)
     places = np.empty(WIDTH, dtype=np.int64)
     values = J.reshape(-1)

@@ -21,7 +21,6 @@ import numpy as np
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.dense_lu import backward, factorise, forward
-from fecontact.integrate.collocation.room import Collocation
 from fecontact.integrate.collocation.stages import (
     move_back,
     place_scale,
@@ -43,6 +42,7 @@ from fecontact.integrate.collocation.tableau import (
     STAGES,
     TWICE,
 )
+from fecontact.integrate.collocation.workspace import Collocation
 from fecontact.integrate.rodas5p import dynamics, stage_solver
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import tableau as rows
@@ -67,14 +67,14 @@ _JUMP = 1e-3
 
 
 @routine
-def _linearise(t, Y, moved, problem, room, vary, forced):
+def _linearise(t, Y, moved, problem, workspace, vary, forced):
     """Put the derivatives of the accelerations at Y into J, those to the parameter into ``forced``.
 
     ``moved`` is how the ground moves at time t.
     """
     v = vary.variation
     dynamics.set_gradients(Y, problem.system, problem.blocks, moved, v.nodes, v.inside)
-    stage_solver.assemble(problem.system, problem.blocks, v.inside, room.reduced)
+    stage_solver.assemble(problem.system, problem.blocks, v.inside, workspace.reduced)
     if vary.width != 0.0:
         _set_forced(t, Y, moved, problem, vary, forced)
 
@@ -180,9 +180,9 @@ def _size(x, speeds, problem, progress):
 
 
 @routine
-def _error_at(at, h, problem, progress, room, c, v):
+def _error_at(at, h, problem, progress, workspace, c, v):
     """Largest relative error of a column, by what its polynomial misses at one of the places."""
-    m, J = c.accelerations.shape[1], room.reduced.J
+    m, J = c.accelerations.shape[1], workspace.reduced.J
     speeds, largest = speed_scale(problem, progress), 0.0
     g, to_place = SPEED_PART[at] * h, PLACE_PART[at] * h * h
     for k in range(m):
@@ -285,7 +285,7 @@ def _cross(t, near, problem, c, vary):
 @kernel(by_address=True)
 def propagate(
     t: float, h: float, latest: float, before: float, near: float, problem: run_arrays.Problem,
-    progress: run_arrays.Progress, room: run_arrays.Room, c: Collocation, vary: Vary,
+    progress: run_arrays.Progress, workspace: run_arrays.Workspace, c: Collocation, vary: Vary,
 ) -> float:
     """Carry the columns over the step whose stages ``c`` holds; return the largest error of one.
 
@@ -295,19 +295,19 @@ def propagate(
     """
     s, v = problem.system, vary.variation
     count, m = v.pushed.shape
-    J, forced = room.reduced.J, v.pushed[count - 1]
+    J, forced = workspace.reduced.J, v.pushed[count - 1]
     v.pushed[count - 1] = 0.0
     after = np.nextafter(t, np.inf)
-    dynamics.set_given(after, s, room.given, room.load)
-    _linearise(after, progress.state, dynamics.motion_given(room.given), problem, room, vary,
-               forced)
+    dynamics.set_given(after, s, workspace.given, workspace.load)
+    _linearise(after, progress.state, dynamics.motion_given(workspace.given), problem, workspace,
+               vary, forced)
     _set_rates(0, 0.0, J, v)
     for i in range(STAGES):
         set_stage(i, h, progress, c)
         if i == STAGES - 1 and before > 0.0:
             move_back(before, h, c)
         _linearise(min(t + POINTS[i] * h, latest), c.y, dynamics.motion_given(c.given[i]), problem,
-                   room, vary, forced)
+                   workspace, vary, forced)
         set_matrix_rows(i, h, J, c)
         _set_rates(i + 1, POINTS[i] * h, J, v)
     factorise(c.matrix, STAGES * m, c.pivots)
@@ -316,9 +316,10 @@ def propagate(
     for at in range(LOOKS):
         look(at, c)
         now = min(t + PLACES[at] * h, latest)
-        dynamics.set_given(now, s, room.given, room.load)
-        _linearise(now, c.y, dynamics.motion_given(room.given), problem, room, vary, forced)
-        error = _error_at(at, h, problem, progress, room, c, v)
+        dynamics.set_given(now, s, workspace.given, workspace.load)
+        _linearise(now, c.y, dynamics.motion_given(workspace.given), problem, workspace, vary,
+                   forced)
+        error = _error_at(at, h, problem, progress, workspace, c, v)
         largest = max(largest, error) if error < np.inf else np.inf
     if before > 0.0:
         _cross(min(t + h, latest), near * h, problem, c, vary)

@@ -7,14 +7,6 @@ import numpy as np
 
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.collocation.columns import propagate_at
-from fecontact.integrate.collocation.room import (
-    AGAIN,
-    BEGINS,
-    ITERATIONS,
-    PAST,
-    WHOLE,
-    Collocation,
-)
 from fecontact.integrate.collocation.stages import extrapolate, solve_stages
 from fecontact.integrate.collocation.step_polynomials import (
     first_switch,
@@ -30,6 +22,14 @@ from fecontact.integrate.collocation.tableau import (
     POINTS,
     SPEED_TERMS,
     STAGES,
+)
+from fecontact.integrate.collocation.workspace import (
+    AGAIN,
+    BEGINS,
+    ITERATIONS,
+    PAST,
+    WHOLE,
+    Collocation,
 )
 from fecontact.integrate.rodas5p import dynamics, state
 from fecontact.integrate.rodas5p.error_control import take_scales
@@ -81,7 +81,7 @@ class Data(NamedTuple):
 
     problem: state.Problem
     progress: state.Progress
-    room: state.Room
+    workspace: state.Workspace
     output: state.Output
     kept: state.Output
     collocation: Collocation
@@ -103,17 +103,17 @@ class Step(NamedTuple):
 
 
 @routine
-def _set_begin(t, end, problem, progress, room, c):
+def _set_begin(t, end, problem, progress, workspace, c):
     """Accelerations, and powers, just after t, where the equations may have changed."""
     s, control = problem.system, problem.control
     after = np.nextafter(t, end)
-    dynamics.set_given(after, s, room.given, room.load)
-    dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, room.given, room.load,
-                                    room.nodes, room.scratch, c.rate)
+    dynamics.set_given(after, s, workspace.given, workspace.load)
+    dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, workspace.given,
+                                    workspace.load, workspace.nodes, workspace.scratch, c.rate)
     for k in range(c.accelerations.shape[1]):
         c.accelerations[0, k] = c.rate[len(c.rate) // 2 + k]
     if control.work:
-        powers_at(after, progress.state, problem, room, progress.power)
+        powers_at(after, progress.state, problem, workspace, progress.power)
     progress.counts[RATES] += 1
 
 
@@ -139,15 +139,15 @@ def _set_work(x, c, out):
 @routine
 def _aim(t, h, last, smallest, data):
     """The next step to try, of about the length h, or exactly that if the last one was cut."""
-    problem, progress, room, output, c = (data.problem, data.progress, data.room,
-                                          data.output, data.collocation)
+    problem, progress, workspace, output, c = (data.problem, data.progress, data.workspace,
+                                               data.output, data.collocation)
     end = output.times[-1]
     if last == TAKEN:
         # The predicted length may be too short to change the time.
         if not t + h > t:
             h = smallest
         if c.flags[BEGINS] != 0:
-            _set_begin(t, end, problem, progress, room, c)
+            _set_begin(t, end, problem, progress, workspace, c)
         take_scales(problem.control, progress)
         c.cuts[:] = 0.0
     stop, latest, is_break = next_stop(t, problem.control.breaks, end)
@@ -239,8 +239,8 @@ def _switch(h, near, solved, error, problem, progress, c):
 @routine
 def _attempt(step, last, smallest, data):
     """Try a step; its outcome, and the length of the next one."""
-    problem, progress, room, output, c, vary = (data.problem, data.progress, data.room, data.output,
-                                                data.collocation, data.vary)
+    problem, progress, workspace, output, c, vary = (data.problem, data.progress, data.workspace,
+                                                     data.output, data.collocation, data.vary)
     control, numbers, t = problem.control, progress.numbers, step.t
     # The derivatives of forces jump where these switch: steps with columns end there exactly.
     varies = len(vary.variation.columns) > 0
@@ -249,13 +249,13 @@ def _attempt(step, last, smallest, data):
     _set_given(step, np.nextafter(t, output.times[-1]), problem.system, c)
     extrapolate(step.h, progress, c)
     before = 2.0 * c.cuts[PAST] if exactly else 0.0
-    solved = solve_stages(step.h, before, problem, progress, room, c)
+    solved = solve_stages(step.h, before, problem, progress, workspace, c)
     error = moved = np.inf
     if solved:
         set_polynomials(step.h, progress, c)
-        error = moved = step_error(step, problem, progress, room, c)
+        error = moved = step_error(step, problem, progress, workspace, c)
         if error <= 1.0 and control.work:
-            error = max(error, work_error(step, before, problem, progress, room, c))
+            error = max(error, work_error(step, before, problem, progress, workspace, c))
     # A switch this near to an end counts as being there; the one at which the step before ended
     # has been passed.
     near, part, roughly = max(_TIME * abs(t), smallest), 2.0, False
@@ -275,7 +275,7 @@ def _attempt(step, last, smallest, data):
         return CUT, h * (1.0 + c.cuts[PAST])
     if error <= 1.0 and varies:
         error = max(error, propagate_at(vary.propagate)(
-            t, step.h, step.latest, before, near, problem, progress, room, c, vary)
+            t, step.h, step.latest, before, near, problem, progress, workspace, c, vary)
             / vary.variation.tolerance)
     if not error <= 1.0:
         numbers[REJECTED_LAST] = 1.0
@@ -293,5 +293,5 @@ def _attempt(step, last, smallest, data):
 
 METHOD = Method("collocation", Data, _aim, _attempt, _fill, _go_on, close=_close, places=4)
 # Runs by collocation are of these systems, with any number of columns, or none.
-SMALL = Sized(partial(step_loop, METHOD), (state.Problem, state.Progress, state.Room,
+SMALL = Sized(partial(step_loop, METHOD), (state.Problem, state.Progress, state.Workspace,
                                           state.Output, Collocation))

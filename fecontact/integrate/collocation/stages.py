@@ -4,8 +4,8 @@ import numpy as np
 
 from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import backward, factorise, forward
-from fecontact.integrate.collocation.room import BEGINS, ITERATIONS, JACOBIANS
 from fecontact.integrate.collocation.tableau import ONCE, POINTS, RATE_TERMS, STAGES, TWICE
+from fecontact.integrate.collocation.workspace import BEGINS, ITERATIONS, JACOBIANS
 from fecontact.integrate.rodas5p import dynamics, stage_solver
 from fecontact.integrate.rodas5p.state import SPEED_SCALE
 from fecontact.integrate.rodas5p.step_length import LAST_STEP
@@ -91,7 +91,7 @@ def set_matrix_rows(i, h, J, c):
 
 
 @routine
-def _improve(h, before, anew, problem, progress, room, c):
+def _improve(h, before, anew, problem, progress, workspace, c):
     """One iteration of Newton's method; how much it changes, in units of the tolerance.
 
     Each stage has a Jacobian of its own, as stiffness changes a thousandfold where slip ends.
@@ -102,11 +102,11 @@ def _improve(h, before, anew, problem, progress, room, c):
         set_stage(i, h, progress, c)
         if i == STAGES - 1 and before > 0.0:
             move_back(before, h, c)
-        dynamics.set_rate_and_gradients(c.y, s, blocks, c.given[i], c.load[i], room.nodes,
-                                        room.scratch, c.rate)
+        dynamics.set_rate_and_gradients(c.y, s, blocks, c.given[i], c.load[i], workspace.nodes,
+                                        workspace.scratch, c.rate)
         if anew:
-            stage_solver.assemble(s, blocks, room.scratch, room.reduced)
-            set_matrix_rows(i, h, room.reduced.J, c)
+            stage_solver.assemble(s, blocks, workspace.scratch, workspace.reduced)
+            set_matrix_rows(i, h, workspace.reduced.J, c)
         for k in range(m):
             c.right[i * m + k] = c.rate[m + k] - c.accelerations[i + 1, k]
     if anew:
@@ -134,7 +134,7 @@ def _improve(h, before, anew, problem, progress, room, c):
 
 
 @helper
-def solve_stages(h, before, problem, progress, room, c):
+def solve_stages(h, before, problem, progress, workspace, c):
     """Solve for the accelerations at the stages; whether that has succeeded.
 
     The last stage is that part of the step ``before`` its end: a step that ends at a switch of
@@ -143,7 +143,7 @@ def solve_stages(h, before, problem, progress, room, c):
     last, anew = np.inf, True
     for iteration in range(_MOST_ITERATIONS):
         c.flags[ITERATIONS] = iteration
-        size = _improve(h, before, anew, problem, progress, room, c)
+        size = _improve(h, before, anew, problem, progress, workspace, c)
         if not size < np.inf:
             return False
         if size < _AT_ONCE:

@@ -97,7 +97,7 @@ def look(place, c):
 
 
 @routine
-def step_error(step, problem, progress, room, c):
+def step_error(step, problem, progress, workspace, c):
     """Error of a step in units of what is allowed, by the residual of the equations within it.
 
     The acceleration that is missing at a place in the step is a velocity over the time in which it
@@ -108,11 +108,12 @@ def step_error(step, problem, progress, room, c):
     speeds, error = speed_scale(problem, progress), 0.0
     for at in range(LOOKS):
         look(at, c)
-        dynamics.set_given(min(step.t + PLACES[at] * h, step.latest), s, room.given, room.load)
-        dynamics.set_rate_and_gradients(c.y, s, blocks, room.given, room.load, room.nodes,
-                                        room.scratch, c.rate)
-        stage_solver.assemble(s, blocks, room.scratch, room.reduced)
-        J, g, to_place = room.reduced.J, SPEED_PART[at] * h, PLACE_PART[at] * h * h
+        dynamics.set_given(min(step.t + PLACES[at] * h, step.latest), s, workspace.given,
+                           workspace.load)
+        dynamics.set_rate_and_gradients(c.y, s, blocks, workspace.given, workspace.load,
+                                        workspace.nodes, workspace.scratch, c.rate)
+        stage_solver.assemble(s, blocks, workspace.scratch, workspace.reduced)
+        J, g, to_place = workspace.reduced.J, SPEED_PART[at] * h, PLACE_PART[at] * h * h
         for k in range(m):
             missing = c.rate[m + k]
             for i in range(RATE_TERMS):
@@ -133,11 +134,12 @@ def step_error(step, problem, progress, room, c):
             scale = max(place_scale(k, problem, progress), abs(c.after[k])) * c.tolerance
             error = max(error, missing * to_place / scale)
         for j in range(n):
-            if room.nodes[2, n + j] != 0.0:
+            if workspace.nodes[2, n + j] != 0.0:
                 slip = 0.0
                 for k in range(m):
                     slip += s.rows[j, 0, k] * c.small_right[k]
-                distance = abs(room.nodes[1, j] - s.sliding[j, 0, 0] * room.given[dynamics.SPEED])
+                moved = s.sliding[j, 0, 0] * workspace.given[dynamics.SPEED]
+                distance = abs(workspace.nodes[1, j] - moved)
                 part = abs(slip) * g / (control.slip_part * (control.slip_scale[j] + distance))
                 if part > error:
                     error = part
@@ -147,7 +149,7 @@ def step_error(step, problem, progress, room, c):
 
 
 @routine
-def powers_at(t, y, problem, room, out):
+def powers_at(t, y, problem, workspace, out):
     """Fill ``out`` (P,) with the powers of the system and of its nodes."""
     s = problem.system
     m = s.rows.shape[2]
@@ -156,7 +158,8 @@ def powers_at(t, y, problem, room, out):
     moved = ground_motion(t, s)
     for j in range(len(s.gap)):
         add_node_powers(j, node_motion(j, y, s), moved, y[2 * m :], problem.control.stick_speed[j],
-                        s, room.scratch.force[0], room.scratch.rates[0], out, out[POWER_COUNT:])
+                        s, workspace.scratch.force[0], workspace.scratch.rates[0], out,
+                        out[POWER_COUNT:])
 
 
 @helper
@@ -173,7 +176,7 @@ def _energy_scale(h, control, progress, c):
 
 
 @routine
-def work_error(step, before, problem, progress, room, c):
+def work_error(step, before, problem, progress, workspace, c):
     """Error of the work of a step in units of what is allowed; fills the powers and their works.
 
     The last powers are taken that part of the step ``before`` its end, as the forces are.
@@ -185,11 +188,12 @@ def work_error(step, before, problem, progress, room, c):
         set_stage(i, h, progress, c)
         if i == STAGES - 1 and before > 0.0:
             move_back(before, h, c)
-        powers_at(min(step.t + POINTS[i] * h, step.latest), c.y, problem, room, c.powers[i + 1])
+        powers_at(min(step.t + POINTS[i] * h, step.latest), c.y, problem, workspace,
+                  c.powers[i + 1])
     energy, missing = _energy_scale(h, problem.control, progress, c), 0.0
     for at in range(LOOKS):
         look(at, c)
-        powers_at(min(step.t + PLACES[at] * h, step.latest), c.y, problem, room, c.looked)
+        powers_at(min(step.t + PLACES[at] * h, step.latest), c.y, problem, workspace, c.looked)
         for k in range(count):
             power = c.looked[k]
             for i in range(RATE_TERMS):

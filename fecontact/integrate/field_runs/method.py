@@ -78,7 +78,7 @@ class Progress(NamedTuple):
     J: Matrix
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Workspace for a step: its end, stages, factors, and what events are sought with."""
 
     after: Vector
@@ -125,7 +125,7 @@ class Data(NamedTuple):
 
     field: FieldKernel
     progress: Progress
-    room: Room
+    workspace: Workspace
     output: Output
     varied: Varied
     watch: Watch
@@ -167,63 +167,65 @@ def _aim(t, h, last, smallest, data):
 
 
 @routine
-def _set_time_rate(step, field, progress, room):
-    """Fill ``room.time_rate`` with df/dt at the start of a step."""
+def _set_time_rate(step, field, progress, workspace):
+    """Fill ``workspace.time_rate`` with df/dt at the start of a step."""
     part, evaluate = 1e-4 * step.h, evaluate_at(field.evaluate)
     near, far = step.t + part, step.t + 2.0 * part
-    evaluate(near, progress.state, field, room.right)
-    evaluate(far, progress.state, field, room.base)
+    evaluate(near, progress.state, field, workspace.right)
+    evaluate(far, progress.state, field, workspace.base)
     for k in range(len(progress.state)):
-        room.time_rate[k] = 0.0
+        workspace.time_rate[k] = 0.0
         if far > near > step.t:
-            room.time_rate[k] = (4.0 * (room.right[k] - progress.rate[k])
-                                 - (room.base[k] - progress.rate[k])) / (far - step.t)
+            workspace.time_rate[k] = (4.0 * (workspace.right[k] - progress.rate[k])
+                                      - (workspace.base[k] - progress.rate[k])) / (far - step.t)
 
 
 @routine
-def _take(step, field, progress, room):
-    """All stages of a step, and its end in ``room.after``."""
+def _take(step, field, progress, workspace):
+    """All stages of a step, and its end in ``workspace.after``."""
     d, evaluate = len(progress.state), evaluate_at(field.evaluate)
     G = 1.0 / (step.h * tableau.GAMMA)
     for i in range(d):
         for k in range(d):
-            room.factors[i, k] = -progress.J[i, k]
-        room.factors[i, i] += G
-    factorise(room.factors, d, room.pivots)
+            workspace.factors[i, k] = -progress.J[i, k]
+        workspace.factors[i, i] += G
+    factorise(workspace.factors, d, workspace.pivots)
     for i in range(tableau.STAGES):
-        u = room.stages[i]
+        u = workspace.stages[i]
         if i == 0:
             for k in range(d):
                 u[k] = progress.rate[k]
         else:
-            tableau.combined(tableau.A[i], 1.0, progress.state, room.stages, room.stage)
+            tableau.combined(tableau.A[i], 1.0, progress.state, workspace.stages, workspace.stage)
             now = min(step.t + tableau.NODES[i] * step.h, step.target)
-            evaluate(now, room.stage, field, room.base)
-            tableau.combined(tableau.C[i], 1.0 / step.h, room.base, room.stages, room.right)
+            evaluate(now, workspace.stage, field, workspace.base)
+            tableau.combined(tableau.C[i], 1.0 / step.h, workspace.base, workspace.stages,
+                             workspace.right)
             for k in range(d):
-                u[k] = room.right[k]
+                u[k] = workspace.right[k]
         for k in range(d):
-            u[k] += tableau.TIME[i] * step.h * room.time_rate[k]
-        solve(room.factors, room.pivots, u)
+            u[k] += tableau.TIME[i] * step.h * workspace.time_rate[k]
+        solve(workspace.factors, workspace.pivots, u)
     for k in range(d):
-        room.after[k] = room.stage[k] + room.stages[tableau.STAGES - 1, k]
+        workspace.after[k] = workspace.stage[k] + workspace.stages[tableau.STAGES - 1, k]
     progress.counts[RATES] += tableau.STAGES
 
 
 @routine
-def _error(step, field, progress, room, rtol):
+def _error(step, field, progress, workspace, rtol):
     """Error of a step as a multiple of what is allowed; rates and Jacobian where it is allowed."""
     error = 0.0
     for k in range(len(progress.state)):
-        size = max(progress.sizes[k], abs(room.after[k]))
-        error = max(error, abs(room.stages[tableau.STAGES - 1, k]) / size)
+        size = max(progress.sizes[k], abs(workspace.after[k]))
+        error = max(error, abs(workspace.stages[tableau.STAGES - 1, k]) / size)
         # Comparisons with NaN are false: make sure that it is not lost.
-        if not abs(room.after[k]) < np.inf:
+        if not abs(workspace.after[k]) < np.inf:
             error = np.inf
     if error <= rtol:
-        derive_at(field.derive)(step.target, room.after, field, room.rate_after, room.J_after)
+        derive_at(field.derive)(step.target, workspace.after, field, workspace.rate_after,
+                                workspace.J_after)
         for k in range(len(progress.state)):
-            if not abs(room.rate_after[k]) < np.inf:
+            if not abs(workspace.rate_after[k]) < np.inf:
                 error = np.inf
     return error / rtol
 
@@ -231,29 +233,29 @@ def _error(step, field, progress, room, rtol):
 @routine
 def _attempt(step, last, smallest, data):
     """Try a step; its outcome, and the length of the next one."""
-    field, progress, room, output = data.field, data.progress, data.room, data.output
+    field, progress, workspace, output = data.field, data.progress, data.workspace, data.output
     if last == TAKEN:
-        _set_time_rate(step, field, progress, room)
-    _take(step, field, progress, room)
-    error = _error(step, field, progress, room, output.rtol)
+        _set_time_rate(step, field, progress, workspace)
+    _take(step, field, progress, workspace)
+    error = _error(step, field, progress, workspace, output.rtol)
     if not error <= 1.0:
         progress.numbers[REJECTED_LAST] = 1.0
         if not error < np.inf:
-            room.stages[:] = 0.0
+            workspace.stages[:] = 0.0
         return FAILED if error < np.inf else NOT_A_NUMBER, step.h * growth(root_of(error))
-    tableau.dense_coefficients(room.stages, room.dense)
+    tableau.dense_coefficients(workspace.stages, workspace.dense)
     return TAKEN, next_length(step.h, root_of(error), output.longest, progress.numbers)
 
 
 @routine
 def _find_end(step, data):
     """Note the events of a step; the part of it after which the run ends."""
-    progress, room, watch = data.progress, data.room, data.watch
+    progress, workspace, watch = data.progress, data.workspace, data.watch
     if len(watch.own) == 0:
         return BEYOND
-    tableau.inner_coefficients(progress.state, room.after, room.dense, room.inner)
-    set_own_places(progress.state, room, watch)
-    view = _View(step, progress.state, room.after, room.dense, room.right)
+    tableau.inner_coefficients(progress.state, workspace.after, workspace.dense, workspace.inner)
+    set_own_places(progress.state, workspace, watch)
+    view = _View(step, progress.state, workspace.after, workspace.dense, workspace.right)
     begun = watch.counts[FOUND]
     for look in range(_LOOKS):
         for k in range(len(watch.own)):
@@ -265,19 +267,20 @@ def _find_end(step, data):
 def _close(step, writes, data):
     """Carry the columns over a step."""
     if len(data.varied.columns):
-        propagate(step, data.field, data.progress, data.room, data.varied)
+        propagate(step, data.field, data.progress, data.workspace, data.varied)
 
 
 @routine
 def _fill(row, output, step, data):
     """Fill a row of the output; the columns are stored and restarted there."""
-    progress, room, varied = data.progress, data.room, data.varied
+    progress, workspace, varied = data.progress, data.workspace, data.varied
     if output.times[row] == step.target:
-        for k in range(len(room.after)):
-            output.states[row, k] = room.after[k]
+        for k in range(len(workspace.after)):
+            output.states[row, k] = workspace.after[k]
     else:
         part = (output.times[row] - step.t) / step.h
-        tableau.interpolated(part, progress.state, room.after, room.dense, output.states[row])
+        tableau.interpolated(part, progress.state, workspace.after, workspace.dense,
+                             output.states[row])
     for i in range(len(varied.columns)):
         for k in range(len(varied.columns)):
             varied.transitions[row, i, k] = varied.columns[i, k]
@@ -287,22 +290,22 @@ def _fill(row, output, step, data):
 @routine
 def _stop_at(part, step, data):
     """End the run at a part of the step."""
-    progress, room = data.progress, data.room
-    tableau.interpolated(part, progress.state, room.after, room.dense, room.right)
+    progress, workspace = data.progress, data.workspace
+    tableau.interpolated(part, progress.state, workspace.after, workspace.dense, workspace.right)
     for k in range(len(progress.state)):
-        progress.state[k] = room.right[k]
+        progress.state[k] = workspace.right[k]
 
 
 @routine
 def _go_on(step, h, data):
     """Make the end of the step the state of the run."""
-    progress, room = data.progress, data.room
+    progress, workspace = data.progress, data.workspace
     d = len(progress.state)
     for i in range(d):
-        progress.state[i], progress.rate[i] = room.after[i], room.rate_after[i]
-        progress.sizes[i] = max(progress.sizes[i], abs(room.after[i]))
+        progress.state[i], progress.rate[i] = workspace.after[i], workspace.rate_after[i]
+        progress.sizes[i] = max(progress.sizes[i], abs(workspace.after[i]))
         for k in range(d):
-            progress.J[i, k] = room.J_after[i, k]
+            progress.J[i, k] = workspace.J_after[i, k]
     return RUNNING, h
 
 

@@ -10,7 +10,7 @@ from fecontact.core.types import Array
 from fecontact.integrate.bernstein import DEPTH
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
-from fecontact.integrate.field_runs.method import Data, Output, Progress, Room, advance
+from fecontact.integrate.field_runs.method import Data, Output, Progress, Workspace, advance
 from fecontact.integrate.field_runs.python_functions import PythonFunction
 from fecontact.integrate.field_runs.variational import Varied, varied_for
 from fecontact.integrate.rodas5p import tableau
@@ -42,7 +42,7 @@ class FieldSteps(StepRun):
         Kernels of the field for the integrator, with a workspace of their own.
     function : PythonFunction or None
         Where Python evaluates it.
-    progress, room, output, varied, watch
+    progress, workspace, output, varied, watch
         State, workspace and results of the integrator; it keeps nothing between outputs.
     """
 
@@ -50,7 +50,7 @@ class FieldSteps(StepRun):
     kernel: FieldKernel
     function: PythonFunction | None
     progress: Progress
-    room: Room
+    workspace: Workspace
     output: Output
     varied: Varied
     watch: Watch
@@ -72,8 +72,8 @@ class FieldSteps(StepRun):
         AnalysisError
             If a complex step that was asked for turned out wrong.
         """
-        status = int(advance(Data(self.kernel, self.progress, self.room, self.output, self.varied,
-                                  self.watch), most))
+        status = int(advance(Data(self.kernel, self.progress, self.workspace, self.output,
+                                  self.varied, self.watch), most))
         if self.function is not None and self.function.error is not None:
             raise self.function.error
         if status != RUNNING:
@@ -137,9 +137,9 @@ def start_field(
         Progress(numbers, np.zeros(COUNTS, dtype=np.int64), np.array(state, dtype=float),
                  np.zeros(d), _FLOOR * np.array(field.state_scales(values), dtype=float),
                  np.zeros((d, d))),
-        Room(vectors[0], vectors[1], squares[0], np.zeros((tableau.STAGES, d)), vectors[2],
-             vectors[3], vectors[4], vectors[5], squares[1], np.zeros(d, dtype=np.int64),
-             np.zeros((3, d)), np.zeros((3, d)), np.zeros((3, COEFFICIENTS)),
-             np.zeros((DEPTH, COEFFICIENTS + 1))),
+        Workspace(vectors[0], vectors[1], squares[0], np.zeros((tableau.STAGES, d)), vectors[2],
+                  vectors[3], vectors[4], vectors[5], squares[1], np.zeros(d, dtype=np.int64),
+                  np.zeros((3, d)), np.zeros((3, d)), np.zeros((3, COEFFICIENTS)),
+                  np.zeros((DEPTH, COEFFICIENTS + 1))),
         Output(times, np.zeros((len(times), d)), float(rtol), longest),
         varied_for(d if vary else 0, len(times)), watch_for(field, events, False))

@@ -113,13 +113,13 @@ def _solve(h, varied):
 
 
 @routine
-def propagate(step, field, progress, room, varied):
-    """Carry the columns over an accepted step, whose last Jacobian is ``room.J_after``.
+def propagate(step, field, progress, workspace, varied):
+    """Carry the columns over an accepted step, whose last Jacobian is ``workspace.J_after``.
 
     A step over which differences may change much is divided: what shrinks has to be as accurate as
     what grows.
     """
-    steep = max(steepest(progress.J, progress.sizes), steepest(room.J_after, progress.sizes))
+    steep = max(steepest(progress.J, progress.sizes), steepest(workspace.J_after, progress.sizes))
     parts = int(min(max(np.ceil(step.h * steep / _LARGEST), 1.0), _MOST_PARTS))
     for part in range(parts):
         for stage in range(3):
@@ -127,9 +127,9 @@ def propagate(step, field, progress, room, varied):
             if part == parts - 1 and stage == 2:
                 for i in range(len(J)):
                     for k in range(len(J)):
-                        J[i, k] = room.J_after[i, k]
+                        J[i, k] = workspace.J_after[i, k]
             else:
                 at = (part + _NODES[stage]) / parts
-                tableau.interpolated(at, progress.state, room.after, room.dense, varied.x)
+                tableau.interpolated(at, progress.state, workspace.after, workspace.dense, varied.x)
                 derive_at(field.derive)(step.t + at * step.h, varied.x, field, varied.f, J)
         _solve(step.h / parts, varied)

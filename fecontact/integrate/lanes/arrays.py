@@ -119,7 +119,7 @@ class LaneProgress(NamedTuple):
     fresh: Annotated[Integers, 1]
 
 
-class LaneRoom(NamedTuple):
+class LaneWorkspace(NamedTuple):
     """Workspace for one step of all lanes.
 
     Attributes
@@ -218,7 +218,7 @@ class Lanes(NamedTuple):
     system: LaneSystem
     control: LaneControl
     progress: LaneProgress
-    room: LaneRoom
+    workspace: LaneWorkspace
 
 
 def lanes_for(
@@ -236,4 +236,4 @@ def lanes_for(
     progress = allocate(LaneProgress, sizes, numbers=numbers, state=state, extremes=extremes,
                         runs=np.full(WIDTH, -1, dtype=np.int64))
     return Lanes(parameters, start, LaneSystem(*views[:counted], *laws),
-                 LaneControl(*views[counted:]), progress, allocate(LaneRoom, sizes))
+                 LaneControl(*views[counted:]), progress, allocate(LaneWorkspace, sizes))

@@ -22,7 +22,7 @@ from fecontact.integrate.lanes.arrays import (
 )
 from fecontact.integrate.rodas5p.blocks import one_block
 from fecontact.integrate.rodas5p.driver import control_for, start
-from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Room
+from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Workspace
 from fecontact.integrate.series.branches import series_pay
 from fecontact.integrate.small_systems import FEW
 from fecontact.integrate.step_loop import FINISHED, RUNNING
@@ -197,15 +197,15 @@ class SideBySide:
         return lanes_for(kind.shapes, kind.limits, [*laws, int(ground[0]), int(kind.steady)],
                          kind.modes, kind.nodes)
 
-    def spare(self) -> tuple[Problem, Progress, Room]:
+    def spare(self) -> tuple[Problem, Progress, Workspace]:
         """Arrays of a run for checks of single lanes, which take the numbers of a lane."""
         problem = self._spare.problem
         own = _copied(problem._replace(
             blocks=one_block(problem.blocks.shapes, self._kind.nodes),
             control=problem.control._replace(speed_scale=0.0)))
         # All nodes are near.
-        room = _copied(self._spare.room)._replace(near=own.blocks)
-        return own, _copied(self._spare.progress), room
+        workspace = _copied(self._spare.workspace)._replace(near=own.blocks)
+        return own, _copied(self._spare.progress), workspace
 
     def _dealt_to(self, runs: LaneRuns, workers: int) -> LaneRuns:
         """Return the runs with a longer queue; at the end each worker takes few at once."""

@@ -123,7 +123,7 @@ def _take(where, values, out):
 @routine
 def _begin(b):
     """Rates, forces and first steps of lanes that have just been filled."""
-    s, progress, w = b.system, b.progress, b.room
+    s, progress, w = b.system, b.progress, b.workspace
     t, new = read(progress.numbers[TIME]), mask_of(progress.fresh[0])
     equations.set_given(t, s, w.load)
     speed = equations.ground_speed(t, s)
@@ -175,13 +175,13 @@ def _aim(t, b):
 
 
 @routine
-def _missed_part(lane, t, h, target, b, problem, progress, room):
+def _missed_part(lane, t, h, target, b, problem, progress, workspace):
     """Part of a lane's step to which it has to be shortened; 1 if none.
 
-    By the functions for one run, on ``problem``, ``progress`` and ``room``, which take the lane's
-    numbers; but ``problem.control.speed_scale`` is zero.
+    By the functions for one run, on ``problem``, ``progress`` and ``workspace``, which take the
+    lane's numbers; but ``problem.control.speed_scale`` is zero.
     """
-    mine, w, s, control = b.progress, b.room, problem.system, problem.control
+    mine, w, s, control = b.progress, b.workspace, problem.system, problem.control
     again, smallest = mine.numbers[AGAIN, lane], mine.numbers[SMALLEST, lane]
     if again >= _MOST_AGAIN:
         return 1.0
@@ -208,16 +208,16 @@ def _missed_part(lane, t, h, target, b, problem, progress, room):
         mine.numbers[SPEED_SCALE, lane], b.control.numbers[LEAST_SPEED, lane])
     control.ground[QUICKEST] = b.control.numbers[arrays.QUICKEST, lane]
     for k in range(2 * m):
-        progress.state[k], room.after[k] = mine.state[k, lane], w.after[k, lane]
+        progress.state[k], workspace.after[k] = mine.state[k, lane], w.after[k, lane]
         for row in range(3):
-            room.dense[row, k] = w.dense[row, k, lane]
+            workspace.dense[row, k] = w.dense[row, k, lane]
     for j in range(2 * n):
-        room.nodes[0, j], room.nodes[1, j] = w.places[j, lane], w.speeds[j, lane]
+        workspace.nodes[0, j], workspace.nodes[1, j] = w.places[j, lane], w.speeds[j, lane]
     moved = GroundMotion(0.0, mine.ground[lane], 0.0, 0.0)
-    set_polynomials(s, problem.blocks, control.ground, progress.state, room.after, room)
-    if needs_search(moved, h, s, control.ground, control.levels, control.slip_scale, room):
+    set_polynomials(s, problem.blocks, control.ground, progress.state, workspace.after, workspace)
+    if needs_search(moved, h, s, control.ground, control.levels, control.slip_scale, workspace):
         one = Step(t, h, target, target, moved, 0.0, False)
-        part = first_missed_at(control.missed)(one, int(again), problem, progress, room)
+        part = first_missed_at(control.missed)(one, int(again), problem, progress, workspace)
         if part * h > 100.0 * smallest and part < 1.0:
             return part
     return 1.0
@@ -226,7 +226,7 @@ def _missed_part(lane, t, h, target, b, problem, progress, room):
 @routine
 def _write_outputs(lane, t, h, target, b, runs):
     """Write the outputs of a lane up to the end of its step; whether they were the last."""
-    progress, w = b.progress, b.room
+    progress, w = b.progress, b.workspace
     run, row, count = progress.runs[lane], progress.rows[lane], runs.times.shape[1]
     while row < count and runs.times[run, row] <= target:
         part = (runs.times[run, row] - t) / h
@@ -271,9 +271,9 @@ def _set_next(h, error, caution, good, missed, part, b):
 
 
 @helper
-def _attempt(active, b, runs, problem, progress, room):
+def _attempt(active, b, runs, problem, progress, workspace):
     """Try a step in all lanes."""
-    s, control, mine, w = b.system, b.control, b.progress, b.room
+    s, control, mine, w = b.system, b.control, b.progress, b.workspace
     numbers = mine.numbers
     t = read(numbers[TIME])
     checks.note_extremes(control, mine)
@@ -295,7 +295,7 @@ def _attempt(active, b, runs, problem, progress, room):
             w.stage[0, lane] = 1.0
             if (doubt >> lane) & 1:
                 w.stage[0, lane] = _missed_part(lane, w.work[0, 0, lane], w.right[0, lane],
-                                                w.right[1, lane], b, problem, progress, room)
+                                                w.right[1, lane], b, problem, progress, workspace)
         part = read(w.stage[0])
         missed = part < 1.0
     switched = (switched | equations.switches(w.forces, mine.forces)) & passed & ~missed
@@ -336,11 +336,11 @@ def _attempt(active, b, runs, problem, progress, room):
 
 def advance(
     b: arrays.Lanes, runs: arrays.LaneRuns, problem: run_arrays.Problem,
-    progress: run_arrays.Progress, room: run_arrays.Room, most: int,
+    progress: run_arrays.Progress, workspace: run_arrays.Workspace, most: int,
 ) -> int:
     """Go on until ``most`` steps have been tried in all lanes; returns how it ended.
 
-    ``problem``, ``progress`` and ``room`` are those of some run of the same kind, as room for
+    ``problem``, ``progress`` and ``workspace`` are those of some run of the same kind, as room for
     checks of single lanes. It is compiled for each size: ``SMALL``.
     """
     active = _fill(b, runs)
@@ -353,7 +353,7 @@ def advance(
                 return HUNGRY
         if b.progress.fresh[0] != 0:
             _begin(b)
-        _attempt(active, b, runs, problem, progress, room)
+        _attempt(active, b, runs, problem, progress, workspace)
         runs.counts[ATTEMPTS] += 1
         active = 0
         for lane in range(WIDTH):
@@ -365,5 +365,5 @@ def advance(
 # The arrays of the run that checks of single lanes are made with are among these.
 SMALL = Sized(
     lambda given: kernel(advance, constants=given, nogil=True),
-    (run_arrays.Problem, run_arrays.Progress, run_arrays.Room, arrays.LaneSystem,
-     arrays.LaneControl, arrays.LaneProgress, arrays.LaneRoom, arrays.LaneRuns), FEW)
+    (run_arrays.Problem, run_arrays.Progress, run_arrays.Workspace, arrays.LaneSystem,
+     arrays.LaneControl, arrays.LaneProgress, arrays.LaneWorkspace, arrays.LaneRuns), FEW)

@@ -26,13 +26,13 @@ _FIRST = 5
 
 
 @routine
-def take(step, p, progress, w, room):
-    """Put the state at the end of a step into ``room.new``.
+def take(step, p, progress, w, workspace):
+    """Put the state at the end of a step into ``workspace.new``.
 
-    slopes[0] of ``room.slopes`` (SLOPES, size) is Y' at its begin, slopes[STAGES] becomes that at
-    its end; all have to be finite. Works enter no stage, only the end.
+    slopes[0] of ``workspace.slopes`` (SLOPES, size) is Y' at its begin, slopes[STAGES] becomes that
+    at its end; all have to be finite. Works enter no stage, only the end.
     """
-    Y, slopes, new = progress.state, room.slopes, room.new
+    Y, slopes, new = progress.state, workspace.slopes, workspace.new
     m, h = p.rows.shape[1], step.h
     for stage in range(1, STAGES):
         # Sums are written out; slopes that a stage does not combine have the factor zero.
@@ -46,14 +46,14 @@ def take(step, p, progress, w, room):
                           + a[7] * slopes[7, i] + a[8] * slopes[8, i] + a[9] * slopes[9, i]
                           + a[10] * slopes[10, i])
             new[i] = Y[i] + h * total
-        set_rates(min(step.t + C[stage] * h, step.latest), new, p, progress, w, room,
+        set_rates(min(step.t + C[stage] * h, step.latest), new, p, progress, w, workspace,
                   slopes[stage])
         if B[stage] != 0.0:
-            set_powers(new, p, progress, w, room, slopes[stage, 2 * m :])
+            set_powers(new, p, progress, w, workspace, slopes[stage, 2 * m :])
     for i in range(len(Y)):
         new[i] = Y[i] + h * _combined(B, slopes, i)
-    set_rates(min(step.t + h, step.latest), new, p, progress, w, room, slopes[STAGES])
-    set_powers(new, p, progress, w, room, slopes[STAGES, 2 * m :])
+    set_rates(min(step.t + h, step.latest), new, p, progress, w, workspace, slopes[STAGES])
+    set_powers(new, p, progress, w, workspace, slopes[STAGES, 2 * m :])
 
 
 @helper
@@ -65,9 +65,9 @@ def _combined(row, slopes, i):
 
 
 @helper
-def error(h, Y, limits, room):
+def error(h, Y, limits, workspace):
     """Error of a step in units of what is allowed, ``rtol (floor + |Y|)``, the largest of all."""
-    new, slopes, rtol, floor = room.new, room.slopes, limits.rtol, limits.floor
+    new, slopes, rtol, floor = workspace.new, workspace.slopes, limits.rtol, limits.floor
     fifth, third, finite = 0.0, 0.0, True
     for i in range(len(Y)):
         allowed = 1.0 / (rtol * (floor[i] + max(abs(Y[i]), abs(new[i]))))
@@ -83,10 +83,10 @@ def error(h, Y, limits, room):
 
 
 @routine
-def prepare_dense(step, p, progress, w, room):
-    """Fill ``room.parts`` (PARTS, size) for `interpolate`; needs three more slopes."""
+def prepare_dense(step, p, progress, w, workspace):
+    """Fill ``workspace.parts`` (PARTS, size) for `interpolate`; needs three more slopes."""
     t, h, Y = step.t, step.h, progress.state
-    new, slopes, parts, state = room.new, room.slopes, room.parts, room.state
+    new, slopes, parts, state = workspace.new, workspace.slopes, workspace.parts, workspace.state
     m = p.rows.shape[1]
     for extra in range(len(A_DENSE)):
         stage, row = STAGES + 1 + extra, A_DENSE[extra]
@@ -94,8 +94,8 @@ def prepare_dense(step, p, progress, w, room):
             state[i] = Y[i] + h * (
                 _combined(row, slopes, i) + row[12] * slopes[12, i] + row[13] * slopes[13, i]
                 + row[14] * slopes[14, i])
-        set_rates(t + C_DENSE[extra] * h, state, p, progress, w, room, slopes[stage])
-        set_powers(state, p, progress, w, room, slopes[stage, 2 * m :])
+        set_rates(t + C_DENSE[extra] * h, state, p, progress, w, workspace, slopes[stage])
+        set_powers(state, p, progress, w, workspace, slopes[stage, 2 * m :])
     for i in range(len(Y)):
         change = new[i] - Y[i]
         parts[0, i] = change

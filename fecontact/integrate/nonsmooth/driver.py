@@ -14,7 +14,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.integrate.coefficients import Coefficient, node_values
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
-from fecontact.integrate.kept_steps import KeptSteps, room_for_rows
+from fecontact.integrate.kept_steps import KeptSteps, workspace_for_rows
 from fecontact.integrate.nonsmooth import problem as kinds
 from fecontact.integrate.nonsmooth.equations import compiled_derivative
 from fecontact.integrate.nonsmooth.event_log import note_events
@@ -207,30 +207,32 @@ def start(
         most = np.inf if max_step is None else float(max_step)
         limits = limits._replace(longest=min(longest_between_events(system, times), most))
     sizes = len(progress.state), len(progress.carried), system.basis.contact_nodes
-    room = room_for_rows(keep_steps, sum(sizes))
+    workspace = workspace_for_rows(keep_steps, sum(sizes))
     output, kept = (kinds.Output(rows, *(np.empty((len(rows), size)) for size in sizes))
-                    for rows in (times, np.zeros(room)))
-    workspace = kinds.workspace_for(problem)
+                    for rows in (times, np.zeros(workspace)))
+    evaluation = kinds.evaluation_for(problem)
     loop: Callable[..., int]
     watch = watch_for(system, events, False)
     watch = watch._replace(note=note_events.address if events else 0)
     data = problem, limits, progress, output, kept
     if solid and restitution is not None:
         from fecontact.integrate.nonsmooth import impact_steps
-        from fecontact.integrate.nonsmooth.space_impulses import impact_room_for
+        from fecontact.integrate.nonsmooth.space_impulses import impact_workspace_for
         _require_no_events(events)
         loop = partial(impact_steps.run_impact_steps,
-                       impact_steps.Data(*data, impact_room_for(problem)))
+                       impact_steps.Data(*data, impact_workspace_for(problem)))
     elif method == "event-driven":
         from fecontact.integrate.nonsmooth.event_driven import Data, run_for
-        from fecontact.integrate.nonsmooth.event_search import room_for
-        loop = partial(run_for(problem), Data(*data, workspace, room_for(problem), watch))
+        from fecontact.integrate.nonsmooth.event_search import workspace_for
+        loop = partial(run_for(problem), Data(*data, evaluation, workspace_for(problem), watch))
     else:
         from fecontact.integrate.nonsmooth import time_stepping
-        from fecontact.integrate.nonsmooth.stepping_room import room_for as stepping_room
+        from fecontact.integrate.nonsmooth.stepping_workspace import (
+            workspace_for as stepping_workspace,
+        )
         _require_no_events(events)
         loop = partial(time_stepping.run_steps, time_stepping.Data(
-            *data, workspace, stepping_room(problem)))
+            *data, evaluation, stepping_workspace(problem)))
     return Run(loop, progress, output, kept, watch, method)
 
 

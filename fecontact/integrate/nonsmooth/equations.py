@@ -33,8 +33,8 @@ from fecontact.integrate.nonsmooth.problem import (
     SLOPE,
     SLOPE_OF,
     STICK,
+    Evaluation,
     NonsmoothProblem,
-    Workspace,
 )
 from fecontact.laws.signatures import signal_at
 from fecontact.system.kernels import body_acceleration, given_at
@@ -52,7 +52,7 @@ from fecontact.system.powers import (
 
 # Y' is evaluated in many places; behind an address its code is not copied into each of them.
 DERIVATIVE = Callable[[
-    float, Vector, NonsmoothProblem, IntegerVector, IntegerVector, Workspace, Vector,
+    float, Vector, NonsmoothProblem, IntegerVector, IntegerVector, Evaluation, Vector,
 ], None]
 _derivative_at = function_at(DERIVATIVE)
 

@@ -15,7 +15,12 @@ from fecontact.core.compiled import helper, routine
 from fecontact.integrate.nonsmooth.dop853 import STAGES, error, interpolate, prepare_dense, take
 from fecontact.integrate.nonsmooth.equations import derivative, place_size
 from fecontact.integrate.nonsmooth.event_log import BEGIN, CHANGED, WITHIN, full, note_at
-from fecontact.integrate.nonsmooth.event_search import ROUNDING, Room, first_changes, least_depth
+from fecontact.integrate.nonsmooth.event_search import (
+    ROUNDING,
+    Workspace,
+    first_changes,
+    least_depth,
+)
 from fecontact.integrate.nonsmooth.problem import (
     AT_EVENT,
     CLUSTERS,
@@ -36,11 +41,11 @@ from fecontact.integrate.nonsmooth.problem import (
     SLIP_SIZE,
     STICK,
     UNCUT,
+    Evaluation,
     Limits,
     NonsmoothProblem,
     Output,
     Progress,
-    Workspace,
     aim,
     pace,
     pass_break,
@@ -95,8 +100,8 @@ class Data(NamedTuple):
     progress: Progress
     output: Output
     kept: Output
+    evaluation: Evaluation
     workspace: Workspace
-    room: Room
     watch: Watch
 
 
@@ -130,26 +135,26 @@ def _slow(part, largest):
 
 
 @helper
-def _start(t, p, limits, progress, w, room):
+def _start(t, p, limits, progress, w, workspace):
     """Decide at the start of a run which clusters stick and which stops are closed."""
     largest = progress.largest
-    derivative(t, progress.state, p, progress.status, progress.closed, w, room.rate)
+    derivative(t, progress.state, p, progress.status, progress.closed, w, workspace.rate)
     for c in range(len(p.rows)):
-        room.released[c] = room.arrived[c] = False
+        workspace.released[c] = workspace.arrived[c] = False
         largest[SLIP_SIZE] = max(largest[SLIP_SIZE], abs(w.slip[c]))
     if p.rigid != 0:
         for j in range(len(p.cluster)):
             depth = w.nodes[j, PENETRATION]
-            room.touched[j] = depth >= -ROUNDING * _place_size(j, p, limits, progress)
-            room.parting[j] = False
+            workspace.touched[j] = depth >= -ROUNDING * _place_size(j, p, limits, progress)
+            workspace.parting[j] = False
             largest[RATE_SIZE] = max(largest[RATE_SIZE], abs(w.nodes[j, RATE]))
             largest[DEPTH_SIZE] = max(largest[DEPTH_SIZE], abs(depth))
         flight = change_contacts_at(p.change)(
-            t, p, progress, room, w, _slow(_SLOW, largest), _height(p, limits, progress),
-            1e-9 * limits.longest, room.rate)
-        progress.counts[EVENTS] += 1 if room.touched.any() else 0
+            t, p, progress, workspace, w, _slow(_SLOW, largest), _height(p, limits, progress),
+            1e-9 * limits.longest, workspace.rate)
+        progress.counts[EVENTS] += 1 if workspace.touched.any() else 0
         return _outcome(flight)
-    decide_clusters(t, p, progress, room, 1e-12 * largest[SLIP_SIZE], w, room.rate)
+    decide_clusters(t, p, progress, workspace, 1e-12 * largest[SLIP_SIZE], w, workspace.rate)
     return RUNNING
 
 
@@ -166,10 +171,10 @@ def _show(t, progress, output, w):
 @routine
 def _fill(row, output, step, data):
     """Fill a row of the output."""
-    p, progress, w, room = data.problem, data.progress, data.workspace, data.room
+    p, progress, w, workspace = data.problem, data.progress, data.evaluation, data.workspace
     time, state = output.times[row], output.states[row]
-    interpolate((time - step.t) / step.h, progress.state, room.parts, state)
-    set_rates(time, state, p, progress, w, room, room.rate)
+    interpolate((time - step.t) / step.h, progress.state, workspace.parts, state)
+    set_rates(time, state, p, progress, w, workspace, workspace.rate)
     share(p, progress.status, w)
     for j in range(len(w.friction)):
         output.friction[row, j], output.normal[row, j] = w.friction[j], w.nodes[j, FORCE]
@@ -222,50 +227,50 @@ def _first_place(place):
 
 
 @helper
-def _mark_past(high, found, room):
+def _mark_past(high, found, workspace):
     """Mark what changes up to a part of the step; whether anything has just begun to move."""
     again = False
-    for k in range(len(room.past)):
-        room.past[k] = found and room.place[k] <= high
-        again = again or (room.past[k] and room.fresh[k] and high < EARLY)
+    for k in range(len(workspace.past)):
+        workspace.past[k] = found and workspace.place[k] <= high
+        again = again or (workspace.past[k] and workspace.fresh[k] and high < EARLY)
     return again
 
 
 @helper
-def _accept(step, p, progress, output, w, room):
+def _accept(step, p, progress, output, w, workspace):
     """Go on to the end of a step without events."""
     Y, status, closed, t = progress.state, progress.status, progress.closed, step.target
     for i in range(len(Y)):
-        Y[i] = room.new[i]
-        room.slopes[0, i] = room.slopes[STAGES, i]
+        Y[i] = workspace.new[i]
+        workspace.slopes[0, i] = workspace.slopes[STAGES, i]
     if step.at_break:
         pass_break(step, p, progress, output)
     for c in range(len(status)):
-        room.fresh[c] = False
+        workspace.fresh[c] = False
     for j in range(len(closed)):
-        room.fresh[len(status) + j] = room.flights[j, YOUNG] != 0.0
+        workspace.fresh[len(status) + j] = workspace.flights[j, YOUNG] != 0.0
     any_held = False
     for c in range(len(p.rows)):
-        room.held[c] = status[c] == STICK
-        any_held = any_held or room.held[c]
+        workspace.held[c] = status[c] == STICK
+        any_held = any_held or workspace.held[c]
     if p.rigid != 0:
-        settle(t, p, status, closed, w, room.rate, Y)
+        settle(t, p, status, closed, w, workspace.rate, Y)
     elif any_held:
         set_slips(t, Y, p, w)
-        hold_velocity(p, room.held, w, Y)
+        hold_velocity(p, workspace.held, w, Y)
     if step.at_break:
-        derivative(t, Y, p, status, closed, w, room.slopes[0])
+        derivative(t, Y, p, status, closed, w, workspace.slopes[0])
 
 
 @helper
-def _holds_on(p, progress, w, room):
+def _holds_on(p, progress, w, workspace):
     """True if the repeated step ends just before its event.
 
     Then all that was to let go still holds, and what was to touch down is still open.
     """
     clusters, holds = len(p.rows), True
-    for k in range(len(room.past)):
-        if room.past[k]:
+    for k in range(len(workspace.past)):
+        if workspace.past[k]:
             holds = holds and (
                 progress.closed[k - clusters] == 1 and w.nodes[k - clusters, FORCE] > 0.0
                 if k >= clusters else not w.pressing[k] > 0.0 if progress.status[k] == OPEN
@@ -275,66 +280,67 @@ def _holds_on(p, progress, w, room):
 
 
 @helper
-def _mark_clusters(again, p, progress, w, room):
+def _mark_clusters(again, p, progress, w, workspace):
     """Tell the marked clusters that begin to slip from those that come to rest.
 
     None is released if the moment is the begin of the step, looked at ``again``.
     """
     status = progress.status
     for c in range(len(p.rows)):
-        past = room.past[c]
-        room.released[c] = past and status[c] == STICK and w.pressing[c] > 0.0 and not again
-        room.arrived[c] = past and (status[c] == 1 or status[c] == -1)
-        if room.released[c]:
+        past = workspace.past[c]
+        workspace.released[c] = past and status[c] == STICK and w.pressing[c] > 0.0 and not again
+        workspace.arrived[c] = past and (status[c] == 1 or status[c] == -1)
+        if workspace.released[c]:
             status[c] = 1 if w.total[c] > 0.0 else -1
 
 
 @helper
-def _change_stops(t, again, p, limits, progress, w, room):
+def _change_stops(t, again, p, limits, progress, w, workspace):
     """Impacts, partings and changes of friction at rigid stops.
 
     Returns the longest flight of a rebound [s], or why there is none.
     """
     clusters, closed, largest = len(p.rows), progress.closed, progress.largest
     slow = _slow(0.01 * limits.rtol, largest)
-    _mark_clusters(again, p, progress, w, room)
+    _mark_clusters(again, p, progress, w, workspace)
     for j in range(len(p.cluster)):
-        event = room.past[clusters + j]
+        event = workspace.past[clusters + j]
         # A flight that has begun without speed and ends at once is none: the stop stays closed.
-        if (again and event and closed[j] == 0 and room.fresh[clusters + j]
+        if (again and event and closed[j] == 0 and workspace.fresh[clusters + j]
                 and abs(w.nodes[j, RATE]) <= slow):
             closed[j] = HELD
-        room.touched[j] = event and closed[j] == 0
-        room.parting[j] = event and closed[j] == 1
+        workspace.touched[j] = event and closed[j] == 0
+        workspace.parting[j] = event and closed[j] == 1
     return change_contacts_at(p.change)(
-        t, p, progress, room, w, slow, _height(p, limits, progress), 1e-9 * limits.longest,
-        room.slopes[0])
+        t, p, progress, workspace, w, slow, _height(p, limits, progress), 1e-9 * limits.longest,
+        workspace.slopes[0])
 
 
 @helper
-def _change_clusters(t, again, p, progress, w, room):
+def _change_clusters(t, again, p, progress, w, workspace):
     """Release the marked clusters that stick, bring those that slip to rest, press open ones."""
     for j in range(len(p.cluster)):
         c = p.cluster[j]
-        room.touched[j] = room.past[c] and progress.status[c] == OPEN
-    _mark_clusters(again, p, progress, w, room)
-    decide_clusters(t, p, progress, room, 1e-9 * progress.largest[SLIP_SIZE], w, room.slopes[0])
+        workspace.touched[j] = workspace.past[c] and progress.status[c] == OPEN
+    _mark_clusters(again, p, progress, w, workspace)
+    decide_clusters(t, p, progress, workspace, 1e-9 * progress.largest[SLIP_SIZE], w,
+                    workspace.slopes[0])
 
 
 @routine
 def _begin(t, data):
     """Decide which clusters stick and which stops are closed at the start of a run."""
-    p, progress, w, room, watch = (data.problem, data.progress, data.workspace, data.room,
-                                   data.watch)
-    room.fresh[:] = False
-    outcome = _start(t, p, data.limits, progress, w, room)
+    p, progress, w, workspace, watch = (data.problem, data.progress, data.evaluation,
+                                        data.workspace, data.watch)
+    workspace.fresh[:] = False
+    outcome = _start(t, p, data.limits, progress, w, workspace)
     if outcome == RUNNING:
-        derivative(t, progress.state, p, progress.status, progress.closed, w, room.slopes[0])
+        derivative(t, progress.state, p, progress.status, progress.closed, w, workspace.slopes[0])
         if watch.note != 0:
-            note_at(watch.note)(aim(t, 0.0, CUT, 0.0, data), 0.0, BEGIN, p, progress, w, room,
+            note_at(watch.note)(aim(t, 0.0, CUT, 0.0, data), 0.0, BEGIN, p, progress, w, workspace,
                                 watch)
             derivative(t, progress.state, p, progress.status, progress.closed, w,
-                       room.slopes[0])
+                       workspace.slopes[0])
     _show(t, progress, data.output, w)
     return outcome
 
@@ -348,13 +354,13 @@ def _full(data):
 @helper
 def _take_to_event(step, data):
     """Take a step that ends where a contact changes, if it has any length."""
-    p, progress, w, room = data.problem, data.progress, data.workspace, data.room
+    p, progress, w, workspace = data.problem, data.progress, data.evaluation, data.workspace
     if step.h > 0.0:
-        take(step, p, progress, w, room)
+        take(step, p, progress, w, workspace)
         row = progress.counts[OUTPUTS]
         looked_into = data.output.times[row] <= step.target or len(data.kept.times) > 0
         if p.rigid != 0 or data.watch.note != 0 or looked_into:
-            prepare_dense(step, p, progress, w, room)
+            prepare_dense(step, p, progress, w, workspace)
 
 
 @routine
@@ -363,8 +369,8 @@ def _attempt(step, last, smallest, data):
 
     Where a contact changes within it, it is cut there.
     """
-    p, limits, progress, w, room = (data.problem, data.limits, data.progress, data.workspace,
-                                    data.room)
+    p, limits, progress, w, workspace = (data.problem, data.limits, data.progress, data.evaluation,
+                                         data.workspace)
     numbers, counts, largest = progress.numbers, progress.counts, progress.largest
     length = step.h
     if counts[AT_EVENT] != 0:
@@ -372,27 +378,27 @@ def _attempt(step, last, smallest, data):
         return TAKEN, length
     holds = holding(progress)
     if holds and counts[KNOWN] == 0:
-        set_rates(step.t, progress.state, p, progress, w, room, room.rate)
-        set_left(p, progress, w, room.ends[0])
+        set_rates(step.t, progress.state, p, progress, w, workspace, workspace.rate)
+        set_left(p, progress, w, workspace.ends[0])
         counts[KNOWN] = 1
-    take(step, p, progress, w, room)
-    size_of_error = error(length, progress.state, limits, room)
+    take(step, p, progress, w, workspace)
+    size_of_error = error(length, progress.state, limits, workspace)
     if not size_of_error <= 1.0:
         numbers[REPEATED] = 1.0
         h = _shortened(length, size_of_error)
         if math.isfinite(size_of_error):
             return FAILED, h
-        room.slopes[1:, :] = 0.0
+        workspace.slopes[1:, :] = 0.0
         return NOT_A_NUMBER, h if length >= 1e-6 * limits.longest else 0.0
     quick, fast, deep = _sizes(progress, w)
     if holds:
-        set_left(p, progress, w, room.ends[1])
-    prepare_dense(step, p, progress, w, room)
-    shorter = first_changes(step, p, limits, progress, w, room)
-    high, found = _first_place(room.place)
+        set_left(p, progress, w, workspace.ends[1])
+    prepare_dense(step, p, progress, w, workspace)
+    shorter = first_changes(step, p, limits, progress, w, workspace)
+    high, found = _first_place(workspace.place)
     if shorter < high and shorter * length > smallest:
         return CUT, shorter * length
-    again = _mark_past(high, found, room)
+    again = _mark_past(high, found, workspace)
     if again and length > smallest:
         # A contact that has just begun to move is too close to where it started: a shorter step.
         return CUT, 0.2 * length
@@ -409,32 +415,32 @@ def _find_end(step, data):
     watch = data.watch
     if watch.note == 0 or not step.h > 0.0:
         return BEYOND
-    return note_at(watch.note)(step, 1.0, WITHIN, data.problem, data.progress, data.workspace,
-                               data.room, watch)
+    return note_at(watch.note)(step, 1.0, WITHIN, data.problem, data.progress, data.evaluation,
+                               data.workspace, watch)
 
 
 @routine
 def _close(step, writes, data):
     """Take young flights to the end of a step."""
     if data.problem.rigid != 0 and step.h > 0.0:
-        advance(1.0, step, data.problem, data.progress, data.room)
+        advance(1.0, step, data.problem, data.progress, data.workspace)
 
 
 @routine
 def _stop_at(part, step, data):
     """End the run at a part of the step."""
-    interpolate(part, data.progress.state, data.room.parts, data.room.state)
-    data.progress.state[:] = data.room.state
+    interpolate(part, data.progress.state, data.workspace.parts, data.workspace.state)
+    data.progress.state[:] = data.workspace.state
 
 
 @routine
 def _go_on(step, h, data):
     """Make the end of the step the state of the run, and change contacts if it ends there."""
-    progress, room = data.progress, data.room
+    progress, workspace = data.progress, data.workspace
     if progress.counts[AT_EVENT] != 0:
         return _change(step, h, data)
-    _accept(step, data.problem, progress, data.output, data.workspace, room)
-    room.ends[0] = room.ends[1]
+    _accept(step, data.problem, progress, data.output, data.evaluation, workspace)
+    workspace.ends[0] = workspace.ends[1]
     progress.counts[IDLE] = 0
     if step.at_break:
         progress.counts[KNOWN] = 0
@@ -444,8 +450,8 @@ def _go_on(step, h, data):
 @routine
 def _change(step, h, data):
     """Change contacts at the end of a step; how the run stands, and the length of the next."""
-    p, limits, progress, w, room, watch = (data.problem, data.limits, data.progress,
-                                           data.workspace, data.room, data.watch)
+    p, limits, progress, w, workspace, watch = (data.problem, data.limits, data.progress,
+                                                data.evaluation, data.workspace, data.watch)
     Y, status, closed, counts = progress.state, progress.status, progress.closed, progress.counts
     times, t = data.output.times, step.target
     tiny = 1e-14 * max(abs(times[0]), abs(times[-1]))
@@ -456,27 +462,27 @@ def _change(step, h, data):
         return MINIMUM_STEP, h
     if step.h > 0.0:
         for i in range(len(Y)):
-            Y[i] = room.new[i]
+            Y[i] = workspace.new[i]
     if step.at_break:
         pass_break(step, p, progress, data.output)
-    derivative(t, Y, p, status, closed, w, room.rate)
+    derivative(t, Y, p, status, closed, w, workspace.rate)
     h = min(max(0.1 * progress.numbers[UNCUT], 1e3 * tiny), limits.longest)
-    if not again and counts[IDLE] < _MOST_HELD and _holds_on(p, progress, w, room):
+    if not again and counts[IDLE] < _MOST_HELD and _holds_on(p, progress, w, workspace):
         for i in range(len(Y)):
-            room.slopes[0, i] = room.rate[i]
+            workspace.slopes[0, i] = workspace.rate[i]
     else:
         counts[EVENTS] += 1
         if p.rigid != 0:
-            flight = _change_stops(t, again, p, limits, progress, w, room)
+            flight = _change_stops(t, again, p, limits, progress, w, workspace)
             if _outcome(flight) != RUNNING:
                 return _outcome(flight), h
             h = min(h, max(0.5 * flight, tiny))
         else:
-            _change_clusters(t, again, p, progress, w, room)
+            _change_clusters(t, again, p, progress, w, workspace)
     # Wherever the motion goes on from, an output at this moment shows what comes after.
     _show(t, progress, data.output, w)
     if watch.note != 0 and note_at(watch.note)(
-            aim(t, 0.0, CUT, 0.0, data), 0.0, CHANGED, p, progress, w, room, watch) <= 1.0:
+            aim(t, 0.0, CUT, 0.0, data), 0.0, CHANGED, p, progress, w, workspace, watch) <= 1.0:
         return STOPPED, h
     return pace(step, progress, times), h
 
@@ -486,8 +492,8 @@ METHOD = Method("events", Data, aim, _attempt, _fill, _go_on, _begin, close=_clo
 run_events = step_loop(METHOD)
 # For nodes of which each has a slip velocity of its own.
 SMALL = Sized(
-    partial(step_loop, METHOD), (NonsmoothProblem, Limits, Progress, Output, Workspace, Room), FEW,
-    lambda modes, nodes: {NonsmoothProblem: {"cluster": np.arange(nodes)}},
+    partial(step_loop, METHOD), (NonsmoothProblem, Limits, Progress, Output, Evaluation, Workspace),
+    FEW, lambda modes, nodes: {NonsmoothProblem: {"cluster": np.arange(nodes)}},
     lambda nodes: {CLUSTERS: nodes, NODE_ENTRIES: NODE_COLUMNS})
 
 

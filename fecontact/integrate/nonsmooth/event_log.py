@@ -15,14 +15,14 @@ from fecontact.core.compiled import compile_law, helper, routine
 from fecontact.integrate.bernstein import NOWHERE, from_nested, sign_changes
 from fecontact.integrate.nonsmooth.dop853 import PARTS, interpolate
 from fecontact.integrate.nonsmooth.equations import derivative
-from fecontact.integrate.nonsmooth.event_search import Room
+from fecontact.integrate.nonsmooth.event_search import Workspace
 from fecontact.integrate.nonsmooth.problem import (
     FORCE,
     STICK,
+    Evaluation,
     NonsmoothProblem,
     Progress,
     Step,
-    Workspace,
 )
 from fecontact.integrate.rodas5p.event_kernels import (
     FIRST_OWN,
@@ -42,7 +42,7 @@ from fecontact.integrate.step_polynomials import MOST
 
 # Kinds of notes: the state at the start, a step or a part of it, a change of contact.
 BEGIN, WITHIN, CHANGED = range(3)
-NOTE = Callable[[Step, float, int, NonsmoothProblem, Progress, Workspace, Room, Watch], float]
+NOTE = Callable[[Step, float, int, NonsmoothProblem, Progress, Evaluation, Workspace, Watch], float]
 note_at = function_at(NOTE)
 
 _LOOKS, _HALVINGS = 16, 44
@@ -101,37 +101,37 @@ def _counts(rising, k, watch):
 
 
 @routine
-def _look(part, step, p, progress, w, room):
-    """Put the state at a part of the step into room.state, and what acts into w; the time."""
+def _look(part, step, p, progress, w, workspace):
+    """Put the state within a step into ``workspace.state``, and what acts into w; the time."""
     t = min(step.t + part * step.h, step.latest)
-    interpolate(part, progress.state, room.parts, room.state)
-    derivative(t, room.state, p, progress.status, progress.closed, w, room.rate)
+    interpolate(part, progress.state, workspace.parts, workspace.state)
+    derivative(t, workspace.state, p, progress.status, progress.closed, w, workspace.rate)
     return t
 
 
 @routine
-def _note_linear(k, upto, step, p, progress, w, room, watch):
+def _note_linear(k, upto, step, p, progress, w, workspace, watch):
     """Note the passages of a linear function of the state."""
-    row, c, b = watch.own_parameters[k], room.nested, room.bound
+    row, c, b = watch.own_parameters[k], workspace.nested, workspace.bound
     size = watch.states.shape[1]
     c[:] = 0.0
     c[0] = -row[0]
     for i in range(size):
         c[0] += row[1 + i] * progress.state[i]
         for q in range(PARTS):
-            c[1 + q] += row[1 + i] * room.parts[q, i]
+            c[1 + q] += row[1 + i] * workspace.parts[q, i]
     from_nested(c, b)
     sign = b[0] if b[0] != 0.0 else watch.own_values[k]
     places = watch.changed[:MOST]
-    for i in range(sign_changes(b, room.halves, room.along, places)):
+    for i in range(sign_changes(b, workspace.halves, workspace.along, places)):
         sign = -sign
         if places[i] <= upto and _counts(sign > 0.0, k, watch):
-            t = _look(places[i], step, p, progress, w, room)
-            _note(watch, t, FIRST_OWN + k, -1, room.state)
+            t = _look(places[i], step, p, progress, w, workspace)
+            _note(watch, t, FIRST_OWN + k, -1, workspace.state)
 
 
 @routine
-def _note_own(k, left, right, new, step, p, progress, w, room, watch):
+def _note_own(k, left, right, new, step, p, progress, w, workspace, watch):
     """Note the change of sign of a user's function between two looks."""
     g, row, size = event_at(watch.own[k]), watch.own_parameters[k], watch.states.shape[1]
     old = watch.own_values[k]
@@ -141,71 +141,71 @@ def _note_own(k, left, right, new, step, p, progress, w, room, watch):
     low, high = left, right
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        t = _look(middle, step, p, progress, w, room)
-        value = g(t, room.state[:size], row)
+        t = _look(middle, step, p, progress, w, workspace)
+        value = g(t, workspace.state[:size], row)
         if (value >= 0.0) if rising else (value <= 0.0):
             high = middle
         else:
             low = middle
-    t = _look(high, step, p, progress, w, room)
-    _note(watch, t, FIRST_OWN + k, -1, room.state)
+    t = _look(high, step, p, progress, w, workspace)
+    _note(watch, t, FIRST_OWN + k, -1, workspace.state)
 
 
 @routine
-def _note_touch(j, left, right, step, p, progress, w, room, watch):
+def _note_touch(j, left, right, step, p, progress, w, workspace, watch):
     """Note that the normal law of a node begins or ends between two looks."""
     low, high, old = left, right, watch.zones[j]
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        _look(middle, step, p, progress, w, room)
+        _look(middle, step, p, progress, w, workspace)
         if _zone(j, p, progress, w) == old:
             low = middle
         else:
             high = middle
-    t = _look(high, step, p, progress, w, room)
-    _note_zone(j, _zone(j, p, progress, w), t, room.state, watch)
+    t = _look(high, step, p, progress, w, workspace)
+    _note_zone(j, _zone(j, p, progress, w), t, workspace.state, watch)
 
 
 @routine
-def _note_step(upto, step, p, progress, w, room, watch):
+def _note_step(upto, step, p, progress, w, workspace, watch):
     """Note the events of a step up to a part of it."""
     size = watch.states.shape[1]
     nodes = watch.counts[NODES] != 0 and p.rigid == 0
     looks = nodes
     for k in range(len(watch.own)):
         if watch.linear[k]:
-            _note_linear(k, upto, step, p, progress, w, room, watch)
+            _note_linear(k, upto, step, p, progress, w, workspace, watch)
         else:
             looks = True
     for look in range(_LOOKS if looks else 1):
         left, right = (upto * look / _LOOKS, upto * (look + 1) / _LOOKS) if looks else (0.0, upto)
-        t = _look(right, step, p, progress, w, room)
+        t = _look(right, step, p, progress, w, workspace)
         for j in range(len(watch.zones)):
             if nodes and _zone(j, p, progress, w) != watch.zones[j]:
-                _note_touch(j, left, right, step, p, progress, w, room, watch)
-                _look(right, step, p, progress, w, room)
+                _note_touch(j, left, right, step, p, progress, w, workspace, watch)
+                _look(right, step, p, progress, w, workspace)
         for k in range(len(watch.own)):
-            new = event_at(watch.own[k])(t, room.state[:size], watch.own_parameters[k])
+            new = event_at(watch.own[k])(t, workspace.state[:size], watch.own_parameters[k])
             if not watch.linear[k]:
-                _note_own(k, left, right, new, step, p, progress, w, room, watch)
-                _look(right, step, p, progress, w, room)
+                _note_own(k, left, right, new, step, p, progress, w, workspace, watch)
+                _look(right, step, p, progress, w, workspace)
             watch.own_values[k] = new
 
 
 @routine
-def _note_change(t, begin, p, progress, w, room, watch):
+def _note_change(t, begin, p, progress, w, workspace, watch):
     """Note what has changed at a moment, of which w knows; at the start, what is struck."""
     Y, size = progress.state, watch.states.shape[1]
     for j in range(len(watch.zones)):
         zone = _zone(j, p, progress, w)
         if begin:
             # A stop that is struck at the start was open before.
-            watch.zones[j] = OPEN if room.touched[j] else zone
+            watch.zones[j] = OPEN if workspace.touched[j] else zone
         if watch.counts[NODES] != 0:
-            if room.touched[j] and watch.zones[j] == OPEN and zone == OPEN:
+            if workspace.touched[j] and watch.zones[j] == OPEN and zone == OPEN:
                 _note(watch, t, TOUCH_DOWN, j, Y)
                 _note(watch, t, LIFT_OFF, j, Y)
-            room.touched[j] = False
+            workspace.touched[j] = False
             _note_zone(j, zone, t, Y, watch)
     for k in range(len(watch.own)):
         old = watch.own_values[k]
@@ -216,16 +216,16 @@ def _note_change(t, begin, p, progress, w, room, watch):
         watch.own_values[k] = new
 
 
-def _note_events(step, upto, what, p, progress, w, room, watch):
+def _note_events(step, upto, what, p, progress, w, workspace, watch):
     """Note events; the part of the step after which the run ends, or NOWHERE.
 
     Events after the first at which the run ends are dropped.
     """
     begun = watch.counts[FOUND]
     if what == WITHIN:
-        _note_step(upto, step, p, progress, w, room, watch)
+        _note_step(upto, step, p, progress, w, workspace, watch)
     else:
-        _note_change(step.t, what == BEGIN, p, progress, w, room, watch)
+        _note_change(step.t, what == BEGIN, p, progress, w, workspace, watch)
     stop = NOWHERE
     for row in range(begun, watch.counts[FOUND]):
         if watch.stops[int(watch.found[row, 1])] != 0:
@@ -244,4 +244,4 @@ def _note_events(step, upto, what, p, progress, w, room, watch):
 
 # By its address, so that it is not compiled into the loop over the steps.
 note_events = compile_law(
-    NOTE, "note_events(step, upto, what, p, progress, w, room, watch)", _note_events)
+    NOTE, "note_events(step, upto, what, p, progress, w, workspace, watch)", _note_events)

@@ -64,7 +64,7 @@ MISSED = 10.0
 ROUGHLY = 2.0**-12
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Workspace of steps from event to event, and of the search in them.
 
     Attributes
@@ -133,15 +133,15 @@ class Room(NamedTuple):
     heights: Annotated[Array, PARTS + 2]
 
 
-def room_for(problem: NonsmoothProblem) -> Room:
+def workspace_for(problem: NonsmoothProblem) -> Workspace:
     """Workspace for a problem."""
-    return allocate(Room, sizes_of(problem), given=nothing_given())
+    return allocate(Workspace, sizes_of(problem), given=nothing_given())
 
 
 @helper
-def _along(row, first, Y, room, b):
+def _along(row, first, Y, workspace, b):
     """Coefficients b of ``row Y[first:]`` over the step; returns the size of its terms."""
-    parts, begin, size = room.parts, 0.0, 0.0
+    parts, begin, size = workspace.parts, 0.0, 0.0
     for i in range(len(row)):
         begin += row[i] * Y[first + i]
         size += abs(row[i]) * (abs(Y[first + i]) + abs(parts[0, first + i]))
@@ -165,10 +165,10 @@ def _through(values, b):
 
 
 @helper
-def _set_slip(k, sign, step, p, Y, room):
+def _set_slip(k, sign, step, p, Y, workspace):
     """Put ``sign`` times the slip velocity of cluster k, raised by its rounding, into the bound."""
-    s, b, values = p.system, room.bound, room.values
-    size = _along(p.rows[k], s.rows.shape[2], Y, room, b)
+    s, b, values = p.system, workspace.bound, workspace.values
+    size = _along(p.rows[k], s.rows.shape[2], Y, workspace, b)
     factor = p.sliding[k]
     speed = factor * ground_motion(step.t, s).speed
     if p.steady != 0:
@@ -184,18 +184,18 @@ def _set_slip(k, sign, step, p, Y, room):
 
 
 @helper
-def _add_ground(j, step, p, Y, room):
+def _add_ground(j, step, p, Y, workspace):
     """Add the ground under node j to the bound; returns the part that resolves its waves."""
-    s, b, x, values = p.system, room.bound, room.along, room.values
+    s, b, x, values = p.system, workspace.bound, workspace.along, workspace.values
     if p.relief[2] == np.inf or not s.on_ground[j]:
         for i in range(len(b)):
             b[i] += p.relief[0] if s.on_ground[j] else 0.0
         return 1.0
-    _along(s.rows[j, 0], 0, Y, room, x)
+    _along(s.rows[j, 0], 0, Y, workspace, x)
     low, high = np.inf, -np.inf
     for i in range(len(x)):
         travel = ground_motion(step.t + _PLACES[i] * step.h, s).travel
-        xi = s.places[j, 0] + value(x, _PLACES[i], room.nested) - s.sliding[j, 0, 0] * travel
+        xi = s.places[j, 0] + value(x, _PLACES[i], workspace.nested) - s.sliding[j, 0, 0] * travel
         low, high = min(low, xi), max(high, xi)
         values[i] = ground_at(s.profile)(xi, s.profile_parameters)[0]
     _through(values, b)
@@ -209,7 +209,7 @@ def pressed(u, j, s):
 
 
 @helper
-def first_pressed(b, above, finest, j, s, room):
+def first_pressed(b, above, finest, j, s, workspace):
     """Fraction of the step at which the force of a penetration polynomial first exceeds a bound.
 
     ``b`` are the coefficients of the polynomial. The fraction is exact to ``finest``, the later end
@@ -218,18 +218,18 @@ def first_pressed(b, above, finest, j, s, room):
     """
     n = len(b)
     for i in range(n):
-        room[0, i] = b[i]
-    room[0, n] = 1.0
+        workspace[0, i] = b[i]
+    workspace[0, n] = 1.0
     waiting, begin = 1, 0.0
     while waiting > 0:
-        part, width = room[waiting - 1, :n], room[waiting - 1, n]
+        part, width = workspace[waiting - 1, :n], workspace[waiting - 1, n]
         if pressed(part[0], j, s) > above:
             return begin
         clear = max(pressed(smallest(part), j, s), pressed(largest(part), j, s)) <= above
         if not clear and width > finest:
-            split(part, room[waiting, :n])
+            split(part, workspace[waiting, :n])
             # The right half stays below, the left one comes on top.
-            room[waiting - 1, n] = room[waiting, n] = 0.5 * width
+            workspace[waiting - 1, n] = workspace[waiting, n] = 0.5 * width
             waiting += 1
             continue
         begin += width
@@ -240,41 +240,41 @@ def first_pressed(b, above, finest, j, s, room):
 
 
 @helper
-def _search_stops(step, p, progress, room):
+def _search_stops(step, p, progress, workspace):
     """Note where open stops close.
 
     Returns the first such part, the one to which the step has to be shortened, and whether stops
     are closed.
     """
-    s, b, Y = p.system, room.bound, progress.state
+    s, b, Y = p.system, workspace.bound, progress.state
     clusters = len(p.rows)
     first, shorter, forces = 1.0, 1.0, False
     for j in range(len(s.gap)):
         if progress.closed[j]:
             forces = True
             continue
-        if room.flights[j, YOUNG] != 0.0:
-            room.place[clusters + j] = first_landing(j, step, p, progress, room)
-            first = min(first, room.place[clusters + j])
+        if workspace.flights[j, YOUNG] != 0.0:
+            workspace.place[clusters + j] = first_landing(j, step, p, progress, workspace)
+            first = min(first, workspace.place[clusters + j])
             continue
-        size = _along(s.rows[j, 1], 0, Y, room, b)
+        size = _along(s.rows[j, 1], 0, Y, workspace, b)
         size += s.gap[j] + max(abs(p.relief[0]), abs(p.relief[1]))
         for i in range(len(b)):
             b[i] = -b[i] - s.gap[j]
         if largest(b) + p.relief[1] < 0.0:
             continue
-        shorter = min(shorter, _add_ground(j, step, p, Y, room))
+        shorter = min(shorter, _add_ground(j, step, p, Y, workspace))
         # On waves a place at which a flight has begun is no landing.
-        size = ROUNDING * size + room.flights[j, SUNK]
+        size = ROUNDING * size + workspace.flights[j, SUNK]
         for i in range(len(b)):
             b[i] = size - b[i]
-        room.place[clusters + j] = first_below(b, room.halves)
-        first = min(first, room.place[clusters + j])
+        workspace.place[clusters + j] = first_below(b, workspace.halves)
+        first = min(first, workspace.place[clusters + j])
     return first, shorter, forces
 
 
 @helper
-def _search_clusters(step, p, progress, room):
+def _search_clusters(step, p, progress, workspace):
     """Note where slip comes to rest; returns the first such part, and whether clusters stick."""
     first, forces = 1.0, False
     for k in range(len(p.rows)):
@@ -282,9 +282,9 @@ def _search_clusters(step, p, progress, room):
         if status == STICK:
             forces = True
         elif status == 1 or status == -1:
-            _set_slip(k, float(status), step, p, progress.state, room)
-            room.place[k] = first_below(room.bound, room.halves)
-            first = min(first, room.place[k])
+            _set_slip(k, float(status), step, p, progress.state, workspace)
+            workspace.place[k] = first_below(workspace.bound, workspace.halves)
+            first = min(first, workspace.place[k])
     return first, forces
 
 
@@ -298,24 +298,24 @@ def least_depth(j, p, limits):
 
 
 @helper
-def _search_nodes(first, forces, step, p, limits, progress, room):
+def _search_nodes(first, forces, step, p, limits, progress, workspace):
     """Note where clusters that are open touch the ground; returns as :func:`_search_stops`."""
-    s, b, Y, place = p.system, room.bound, progress.state, room.place
+    s, b, Y, place = p.system, workspace.bound, progress.state, workspace.place
     shorter = 1.0
     for j in range(len(s.gap)):
-        _along(s.rows[j, 1], 0, Y, room, b)
+        _along(s.rows[j, 1], 0, Y, workspace, b)
         for i in range(len(b)):
             b[i] = -b[i] - s.gap[j]
         low = pressed(smallest(b) + p.relief[0], j, s)
         high = pressed(largest(b) + p.relief[1], j, s)
         if low == 0.0 and high == 0.0:
             continue
-        part = _add_ground(j, step, p, Y, room)
+        part = _add_ground(j, step, p, Y, workspace)
         before, c = pressed(b[0], j, s), p.cluster[j]
         if progress.status[c] == OPEN:
             if before == 0.0:
                 shorter = min(shorter, part)
-                touch = first_pressed(b, 0.0, FINEST, j, s, room.halves)
+                touch = first_pressed(b, 0.0, FINEST, j, s, workspace.halves)
                 place[c] = min(place[c], touch)
                 first = min(first, touch)
             else:
@@ -326,27 +326,27 @@ def _search_nodes(first, forces, step, p, limits, progress, room):
         if max(low, high) <= above and p.relief[0] == p.relief[1] == 0.0:
             continue
         if max(pressed(smallest(b), j, s), pressed(largest(b), j, s)) > above:
-            shorter = min(shorter, part, first_pressed(b, above, ROUGHLY, j, s, room.halves))
+            shorter = min(shorter, part, first_pressed(b, above, ROUGHLY, j, s, workspace.halves))
     return first, shorter, forces
 
 
 @routine
-def first_changes(step, p, limits, progress, w, room):
-    """Fill ``room.place`` with the part of a step at which each cluster and stop first changes.
+def first_changes(step, p, limits, progress, w, workspace):
+    """Fill ``workspace.place``: the part of a step at which each cluster and stop first changes.
 
-    ``room.parts`` is the interpolation of the step, ``room.ends`` the margins at its ends where
-    anything holds. NOWHERE for those that do not change; of what comes later nothing is promised.
-    Returns the part to which the step has to be shortened because it passes a contact that its
-    stages have missed, or waves too short for it; 1 if it has not.
+    ``workspace.parts`` is the interpolation of the step, ``workspace.ends`` the margins at its ends
+    where anything holds. NOWHERE for those that do not change; of what comes later nothing is
+    promised. Returns the part to which the step has to be shortened because it passes a contact
+    that its stages have missed, or waves too short for it; 1 if it has not.
     """
-    room.place[:] = NOWHERE
+    workspace.place[:] = NOWHERE
     if p.rigid != 0:
-        first, shorter, forces = _search_stops(step, p, progress, room)
-        rest, sticking = _search_clusters(step, p, progress, room)
+        first, shorter, forces = _search_stops(step, p, progress, workspace)
+        rest, sticking = _search_clusters(step, p, progress, workspace)
         first, forces = min(first, rest), forces or sticking
     else:
-        first, forces = _search_clusters(step, p, progress, room)
-        first, shorter, forces = _search_nodes(first, forces, step, p, limits, progress, room)
+        first, forces = _search_clusters(step, p, progress, workspace)
+        first, shorter, forces = _search_nodes(first, forces, step, p, limits, progress, workspace)
     if forces:
-        first_let_go(first, step, p, progress, w, room)
+        first_let_go(first, step, p, progress, w, workspace)
     return shorter

@@ -52,7 +52,7 @@ from fecontact.integrate.nonsmooth.problem import (
     pass_break,
 )
 from fecontact.integrate.nonsmooth.space_impulses import (
-    ImpactRoom,
+    ImpactWorkspace,
     find_impulses,
     put_on_ground,
     set_matrix,
@@ -98,7 +98,7 @@ class Data(NamedTuple):
     progress: Progress
     output: Output
     kept: Output
-    room: ImpactRoom
+    workspace: ImpactWorkspace
 
 
 @helper
@@ -109,66 +109,68 @@ def _coefficient(j, slip, grip, p):
 
 
 @helper
-def _look_again(n, p, room):
+def _look_again(n, p, workspace):
     """Set weights and coefficients of a step without impact anew; whether they have changed."""
     changed = False
     for j in range(n):
-        if not room.touching[j]:
+        if not workspace.touching[j]:
             continue
         a, b = n + j, 2 * n + j
-        went = room.before[a] * room.before[a] + room.before[b] * room.before[b]
-        on = room.before[a] * room.after[a] + room.before[b] * room.after[b] > 0.25 * went
-        if room.weights[j] != 0.0 and not on:
-            room.weights[j] = 0.0
+        before, after = workspace.before, workspace.after
+        went = before[a] * before[a] + before[b] * before[b]
+        on = before[a] * after[a] + before[b] * after[b] > 0.25 * went
+        if workspace.weights[j] != 0.0 and not on:
+            workspace.weights[j] = 0.0
             changed = True
-        slip = 0.5 * math.hypot(room.before[a] + room.after[a], room.before[b] + room.after[b])
-        fresh = _coefficient(j, slip, room.grip[j], p)
-        changed = changed or abs(fresh - room.slipping[j]) > 1e-12 * fresh
-        room.slipping[j] = fresh
-        room.sticking[j] = max(room.sticking[j], fresh)
+        slip = 0.5 * math.hypot(workspace.before[a] + workspace.after[a],
+                                workspace.before[b] + workspace.after[b])
+        fresh = _coefficient(j, slip, workspace.grip[j], p)
+        changed = changed or abs(fresh - workspace.slipping[j]) > 1e-12 * fresh
+        workspace.slipping[j] = fresh
+        workspace.sticking[j] = max(workspace.sticking[j], fresh)
     return changed
 
 
 @routine
-def _observe_nodes(t, Y, closed, quick, p, room):
+def _observe_nodes(t, Y, closed, quick, p, workspace):
     """Fill rows, coefficients and [-u', s] of the nodes that touch in the middle of a step.
 
-    For the places in ``room.middle`` and the velocities of Y; whether a node is struck.
+    For the places in ``workspace.middle`` and the velocities of Y; whether a node is struck.
     """
-    s, middle, sides = p.system, room.middle, room.sides
+    s, middle, sides = p.system, workspace.middle, workspace.sides
     n, _, m = s.rows.shape
     moved = ground_motion(t, s)
     struck = False
     for j in range(n):
         contact = node_contact(j, node_motion(j, middle, s), moved, s)
-        room.touching[j] = 1 if closed[j] or contact.penetration >= 0.0 else 0
-        if not room.touching[j]:
+        workspace.touching[j] = 1 if closed[j] or contact.penetration >= 0.0 else 0
+        if not workspace.touching[j]:
             continue
-        set_rows(j, contact, p, room)
-        room.slopes[j], room.slopes[n + j] = contact.slope[0], contact.slope[1]
+        set_rows(j, contact, p, workspace)
+        workspace.slopes[j], workspace.slopes[n + j] = contact.slope[0], contact.slope[1]
         sides[j], sides[n + j] = ground_speed(0, j, moved, s), ground_speed(1, j, moved, s)
         lifted = contact.slope[0] * sides[j] + contact.slope[1] * sides[n + j]
         for place, own in ((j, lifted), (n + j, -sides[j]), (2 * n + j, -sides[n + j])):
             free, now = own, own
             for i in range(m):
-                free += room.rows[place, i] * room.change[i]
-                now += room.rows[place, i] * Y[m + i]
-            room.given[place], room.before[place] = free, now
-        struck = struck or (not closed[j] and -room.before[j] > _STILL * quick)
-        slip = math.hypot(room.before[n + j], room.before[2 * n + j])
-        room.grip[j] = friction_scale(j, contact, s)[0]
-        room.slipping[j] = _coefficient(j, slip, room.grip[j], p)
-        room.sticking[j] = max(stick_limit(j, room.grip[j], p), room.slipping[j])
-        room.weights[j] = 1.0 if slip > _STILL * quick else 0.0
+                free += workspace.rows[place, i] * workspace.change[i]
+                now += workspace.rows[place, i] * Y[m + i]
+            workspace.given[place], workspace.before[place] = free, now
+        struck = struck or (not closed[j] and -workspace.before[j] > _STILL * quick)
+        slip = math.hypot(workspace.before[n + j], workspace.before[2 * n + j])
+        workspace.grip[j] = friction_scale(j, contact, s)[0]
+        workspace.slipping[j] = _coefficient(j, slip, workspace.grip[j], p)
+        workspace.sticking[j] = max(stick_limit(j, workspace.grip[j], p), workspace.slipping[j])
+        workspace.weights[j] = 1.0 if slip > _STILL * quick else 0.0
     if struck:
-        room.weights[:] = p.tangential
+        workspace.weights[:] = p.tangential
     return struck
 
 
 @routine
-def _add_powers(t, h, Y, out, p, room):
+def _add_powers(t, h, Y, out, p, workspace):
     """Put the work of a step into ``out``; returns what the impulses took."""
-    s, rates, middle = p.system, room.rates, room.middle
+    s, rates, middle = p.system, workspace.rates, workspace.middle
     n, _, m = s.rows.shape
     for i in range(2 * m):
         middle[i] = 0.5 * (Y[i] + out[i])
@@ -176,16 +178,17 @@ def _add_powers(t, h, Y, out, p, room):
     body_powers(t, middle, s, rates)
     taken = 0.0
     for j in range(n):
-        if not room.touching[j]:
+        if not workspace.touching[j]:
             continue
-        L, rubbed = room.impulses[j] / h, 0.0
+        L, rubbed = workspace.impulses[j] / h, 0.0
         for k in range(2):
             a = (1 + k) * n + j
-            slip, speed = 0.5 * (room.before[a] + room.after[a]), room.sides[k * n + j]
-            rates[BELT_NORMAL] += belt_normal_power(L, room.slopes[k * n + j], slip, speed, s)
-            rates[BELT_FRICTION] -= room.impulses[a] / h * speed
-            rubbed += room.impulses[a] / h * slip
-        lost = -0.5 * L * (room.before[j] + room.after[j])
+            slip = 0.5 * (workspace.before[a] + workspace.after[a])
+            speed = workspace.sides[k * n + j]
+            rates[BELT_NORMAL] += belt_normal_power(L, workspace.slopes[k * n + j], slip, speed, s)
+            rates[BELT_FRICTION] -= workspace.impulses[a] / h * speed
+            rubbed += workspace.impulses[a] / h * slip
+        lost = -0.5 * L * (workspace.before[j] + workspace.after[j])
         rates[CONTACT_DAMPING] += lost
         rates[FRICTION] += rubbed
         rates[POWER_COUNT + j] += rubbed
@@ -196,13 +199,13 @@ def _add_powers(t, h, Y, out, p, room):
 
 
 @routine
-def _go(t, h, latest, Y, closed, which, quick, p, room, out):
+def _go(t, h, latest, Y, closed, which, quick, p, workspace, out):
     """One step of impulses from Y to ``out``; 0, 1 with an impact, 2 if that gained energy, or -1.
 
     ``which`` is the row of forces and closed contacts that it fills; -1 where no impulses were
     found.
     """
-    s, middle, change = p.system, room.middle, room.change
+    s, middle, change = p.system, workspace.middle, workspace.change
     n, _, m = s.rows.shape
     at = min(t + 0.5 * h, latest)
     for i in range(m):
@@ -210,50 +213,51 @@ def _go(t, h, latest, Y, closed, which, quick, p, room, out):
         middle[m + i] = Y[m + i]
     given_at(at, s, change)
     body_acceleration(change, middle, s, change)
-    set_matrix(h, p, room)
-    solve(room.matrix, room.pivots, change)
+    set_matrix(h, p, workspace)
+    solve(workspace.matrix, workspace.pivots, change)
     for i in range(m):
         change[i] = Y[m + i] + h * change[i]
-    struck = _observe_nodes(at, Y, closed, quick, p, room)
-    room.impulses[:] = 0.0
-    if room.touching.any():
-        set_pushes(p, room)
-        if not find_impulses(p.restitution, n, room):
+    struck = _observe_nodes(at, Y, closed, quick, p, workspace)
+    workspace.impulses[:] = 0.0
+    if workspace.touching.any():
+        set_pushes(p, workspace)
+        if not find_impulses(p.restitution, n, workspace):
             return -1
         for _ in range(_PASSES):
-            if struck or not _look_again(n, p, room):
+            if struck or not _look_again(n, p, workspace):
                 break
-            if not find_impulses(p.restitution, n, room):
+            if not find_impulses(p.restitution, n, workspace):
                 return -1
     for a in range(3 * n):
-        if room.touching[a % n]:
+        if workspace.touching[a % n]:
             for i in range(m):
-                change[i] += room.impulses[a] * room.pushes[a, i]
+                change[i] += workspace.impulses[a] * workspace.pushes[a, i]
         # Impulses of impacts are no forces.
-        room.forces[which, a] = 0.0 if struck else room.impulses[a] / h
+        workspace.forces[which, a] = 0.0 if struck else workspace.impulses[a] / h
     for j in range(n):
-        room.closed[which, j] = 1 if room.touching[j] and room.impulses[j] > 0.0 else 0
+        closed = workspace.touching[j] and workspace.impulses[j] > 0.0
+        workspace.closed[which, j] = 1 if closed else 0
     energy = 0.0
     for i in range(m):
         out[i], out[m + i] = Y[i] + 0.5 * h * (Y[m + i] + change[i]), change[i]
         energy += 0.5 * change[i] * change[i]
-    taken = _add_powers(at, h, Y, out, p, room)
+    taken = _add_powers(at, h, Y, out, p, workspace)
     return (2 if taken < -_GAIN * energy else 1) if struck else 0
 
 
 @helper
-def _error(struck, limits, room):
+def _error(struck, limits, workspace):
     """Difference of a whole step and two halves in units of what is allowed."""
-    m, worst = len(room.change), 0.0
+    m, worst = len(workspace.change), 0.0
     for i in range(m if struck else 2 * m):
-        room.largest[i] = max(room.largest[i], abs(room.end[i]))
-        allowed = limits.rtol * (limits.floor[i] + room.largest[i])
-        worst = max(worst, abs(room.whole[i] - room.end[i]) / allowed)
+        workspace.largest[i] = max(workspace.largest[i], abs(workspace.end[i]))
+        allowed = limits.rtol * (limits.floor[i] + workspace.largest[i])
+        worst = max(worst, abs(workspace.whole[i] - workspace.end[i]) / allowed)
     return worst
 
 
 @routine
-def _too_deep(t, Y, closed, limits, p, room):
+def _too_deep(t, Y, closed, limits, p, workspace):
     """Largest penetration of open nodes, in units of the penetration that is allowed."""
     s, worst = p.system, 0.0
     moved = ground_motion(t, s)
@@ -264,15 +268,16 @@ def _too_deep(t, Y, closed, limits, p, room):
         if depth > 0.0:
             allowed = 0.0
             for i in range(s.rows.shape[2]):
-                allowed += abs(s.rows[j, 1, i]) * limits.rtol * (limits.floor[i] + room.largest[i])
+                size = limits.floor[i] + workspace.largest[i]
+                allowed += abs(s.rows[j, 1, i]) * limits.rtol * size
             worst = max(worst, depth / allowed)
     return worst
 
 
 @helper
-def _fill_within(row, t, h, Y, out, which, output, room):
+def _fill_within(row, t, h, Y, out, which, output, workspace):
     """Fill a row in a step of length h from Y to ``out``; forces are constant in it."""
-    m, n, states = len(room.change), len(room.grip), output.states
+    m, n, states = len(workspace.change), len(workspace.grip), output.states
     part = (output.times[row] - t) / h
     for i in range(m):
         gained = out[m + i] - Y[m + i]
@@ -281,25 +286,26 @@ def _fill_within(row, t, h, Y, out, which, output, room):
     for i in range(2 * m, len(Y)):
         states[row, i] = Y[i] + part * (out[i] - Y[i])
     for j in range(n):
-        output.normal[row, j] = room.forces[which, j]
+        output.normal[row, j] = workspace.forces[which, j]
     for a in range(2 * n):
-        output.friction[row, a] = room.forces[which, n + a]
+        output.friction[row, a] = workspace.forces[which, n + a]
 
 
 @routine
 def _fill(row, output, step, data):
     """Fill a row of the output, by the first half of the step or the second."""
-    room = data.room
+    workspace = data.workspace
     half = 0.5 * step.h
     middle = step.t + half
     if output.times[row] <= middle:
-        _fill_within(row, step.t, half, data.progress.state, room.half, 1, output, room)
+        _fill_within(row, step.t, half, data.progress.state, workspace.half, 1, output, workspace)
     else:
-        _fill_within(row, middle, step.target - middle, room.half, room.end, 2, output, room)
+        _fill_within(row, middle, step.target - middle, workspace.half, workspace.end, 2, output,
+                     workspace)
 
 
 @helper
-def _fastest(p, room):
+def _fastest(p, workspace):
     """Largest velocity of a node so far."""
     s = p.system
     n, _, m = s.rows.shape
@@ -307,17 +313,17 @@ def _fastest(p, room):
     for j in range(n):
         for i in range(m):
             row = max(abs(s.rows[j, 0, i]), abs(s.rows[j, 1, i]), abs(s.rows[j, 2, i]))
-            fastest = max(fastest, row * room.largest[m + i])
+            fastest = max(fastest, row * workspace.largest[m + i])
     return fastest
 
 
 @routine
 def _begin(t, data):
     """Put the nodes on the ground; the first step fills the first row."""
-    progress, room = data.progress, data.room
-    for i in range(len(room.largest)):
-        room.largest[i] = abs(progress.state[i])
-    put_on_ground(t, progress.state, progress.closed, data.problem, room)
+    progress, workspace = data.progress, data.workspace
+    for i in range(len(workspace.largest)):
+        workspace.largest[i] = abs(progress.state[i])
+    put_on_ground(t, progress.state, progress.closed, data.problem, workspace)
     progress.counts[OUTPUTS] = 0
     return RUNNING
 
@@ -325,24 +331,24 @@ def _begin(t, data):
 @routine
 def _attempt(step, last, smallest, data):
     """Try a step and its halves; its outcome, and the length of the next one."""
-    p, limits, progress, room = data.problem, data.limits, data.progress, data.room
+    p, limits, progress, workspace = data.problem, data.limits, data.progress, data.workspace
     Y, closed, counts = progress.state, progress.closed, progress.counts
     t, length, latest, m = step.t, step.h, step.latest, p.system.rows.shape[2]
     half = 0.5 * length
-    quick = _fastest(p, room)
-    whole = _go(t, length, latest, Y, closed, 0, quick, p, room, room.whole)
-    first = _go(t, half, latest, Y, closed, 1, quick, p, room, room.half)
+    quick = _fastest(p, workspace)
+    whole = _go(t, length, latest, Y, closed, 0, quick, p, workspace, workspace.whole)
+    first = _go(t, half, latest, Y, closed, 1, quick, p, workspace, workspace.half)
     second = -1
     if first >= 0:
-        second = _go(t + half, half, latest, room.half, room.closed[1], 2, quick, p, room,
-                     room.end)
+        second = _go(t + half, half, latest, workspace.half, workspace.closed[1], 2, quick, p,
+                     workspace, workspace.end)
     if whole < 0 or first < 0 or second < 0:
         return NOT_SOLVED, 0.25 * length
     struck = whole > 0 or first > 0 or second > 0
-    worst = max(_error(struck, limits, room), _too_deep(
-        min(t + length, latest), room.end[: 2 * m], room.closed[2], limits, p, room))
+    worst = max(_error(struck, limits, workspace), _too_deep(
+        min(t + length, latest), workspace.end[: 2 * m], workspace.closed[2], limits, p, workspace))
     if not worst <= 1.0:
-        finite = math.isfinite(room.end[m])
+        finite = math.isfinite(workspace.end[m])
         h = length * max(0.1, 0.8 / math.sqrt(worst)) if worst < math.inf else 0.1 * length
         return FAILED if finite else NOT_A_NUMBER, h
     counts[IMPACTS] += (first > 0) + (second > 0)
@@ -353,10 +359,10 @@ def _attempt(step, last, smallest, data):
 @routine
 def _go_on(step, h, data):
     """Make the end of the step the state of the run."""
-    p, progress, room = data.problem, data.progress, data.room
-    progress.state[:] = room.end
-    progress.closed[:] = room.closed[2]
-    put_on_ground(step.target, progress.state, progress.closed, p, room)
+    p, progress, workspace = data.problem, data.progress, data.workspace
+    progress.state[:] = workspace.end
+    progress.closed[:] = workspace.closed[2]
+    put_on_ground(step.target, progress.state, progress.closed, p, workspace)
     if step.at_break:
         pass_break(step, p, progress, data.output)
     return pace(step, progress, data.output.times), h

@@ -198,7 +198,7 @@ def pass_break(step, p, progress, output):
         output.states[last, first + DRIVE] += work
 
 
-class Workspace(NamedTuple):
+class Evaluation(NamedTuple):
     """Results per node and per cluster of the last evaluation, and workspace for small systems."""
 
     nodes: Annotated[Array, NODES, NODE_ENTRIES]
@@ -223,9 +223,9 @@ def node_columns(problem: NonsmoothProblem) -> int:
     return SPACE_NODE_COLUMNS if problem.system.rows.shape[1] > 2 else NODE_COLUMNS
 
 
-def workspace_for(problem: NonsmoothProblem) -> Workspace:
+def evaluation_for(problem: NonsmoothProblem) -> Evaluation:
     """Workspace for a problem."""
-    return allocate(Workspace, sizes_of(problem))
+    return allocate(Evaluation, sizes_of(problem))
 
 
 def sizes_of(problem: NonsmoothProblem) -> dict[Size, int]:

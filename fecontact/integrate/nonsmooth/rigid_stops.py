@@ -46,7 +46,7 @@ from fecontact.integrate.nonsmooth.equations import (
     speed_rate,
     stick_limit,
 )
-from fecontact.integrate.nonsmooth.event_search import ROUNDING, Room
+from fecontact.integrate.nonsmooth.event_search import ROUNDING, Workspace
 from fecontact.integrate.nonsmooth.problem import (
     CLOSED,
     CREEP,
@@ -63,9 +63,9 @@ from fecontact.integrate.nonsmooth.problem import (
     SLIP_SIZE,
     SLOPE,
     STICK,
+    Evaluation,
     NonsmoothProblem,
     Progress,
-    Workspace,
 )
 from fecontact.integrate.nonsmooth.steps.flights import CLIMB, YOUNG, begin_flight
 from fecontact.integrate.nonsmooth.steps.rates import set_prescribed
@@ -89,7 +89,7 @@ RATE_ROUNDING = 1e-14
 _MOST_CORRECTIONS = 5
 
 CHANGE = Callable[[
-    float, NonsmoothProblem, Progress, Room, Workspace, float, float, float, Vector,
+    float, NonsmoothProblem, Progress, Workspace, Evaluation, float, float, float, Vector,
 ], float]
 change_contacts_at = function_at(CHANGE)
 
@@ -115,7 +115,7 @@ def _push(count, first, p, w, Y):
 
 
 @routine
-def _place(t, p, progress, room, w, out):
+def _place(t, p, progress, workspace, w, out):
     """Move stops that are touched or part onto their ground, by Newton's method.
 
     The correction ends where it no longer halves the largest distance; w and ``out`` are those at
@@ -126,7 +126,7 @@ def _place(t, p, progress, room, w, out):
     for _ in range(_MOST_CORRECTIONS):
         count, distance = 0, 0.0
         for j in range(len(p.cluster)):
-            if room.touched[j] or room.parting[j]:
+            if workspace.touched[j] or workspace.parting[j]:
                 w.indices[count], w.right[count] = j, w.nodes[j, PENETRATION]
                 distance = max(distance, abs(w.nodes[j, PENETRATION]))
                 count += 1
@@ -280,8 +280,8 @@ def _strike(t, touching, p, progress, w):
 
 
 @routine
-def _set_gaining(t, p, progress, room, w, out):
-    """Fill ``room.gaining`` from w and Y' in ``out`` before contacts change."""
+def _set_gaining(t, p, progress, workspace, w, out):
+    """Fill ``workspace.gaining`` from w and Y' in ``out`` before contacts change."""
     s, Y, status = p.system, progress.state, progress.status
     m = p.rows.shape[1]
     speed, ground = ground_motion(t, s).speed, speed_rate(t, p)
@@ -290,12 +290,13 @@ def _set_gaining(t, p, progress, room, w, out):
         for i in range(m):
             size += abs(p.rows[c, i] * Y[m + i])
             gain += p.rows[c, i] * out[m + i]
-        slips = (status[c] == 1 or status[c] == -1) and not (room.released[c] or room.arrived[c])
-        room.gaining[c] = ROUNDING * size if slips and status[c] * gain > 0.0 else math.inf
+        changes = workspace.released[c] or workspace.arrived[c]
+        slips = (status[c] == 1 or status[c] == -1) and not changes
+        workspace.gaining[c] = ROUNDING * size if slips and status[c] * gain > 0.0 else math.inf
 
 
 @routine
-def _accelerate(t, near, struck, resting, fall, p, progress, room, w, case):
+def _accelerate(t, near, struck, resting, fall, p, progress, workspace, w, case):
     """Fill a case with the forces that ``fall`` (n,), u'' without contact, asks for.
 
     Whether there is one solution. ``near`` is a slip velocity that counts as none, unless the
@@ -304,9 +305,9 @@ def _accelerate(t, near, struck, resting, fall, p, progress, room, w, case):
     n, k = len(p.cluster), len(p.rows)
     status, friction = progress.status, False
     sizes = np.empty(p.rows.shape[1])
-    set_prescribed(t, p.system, room)
+    set_prescribed(t, p.system, workspace)
     for i in range(len(sizes)):
-        sizes[i] = force_size(i, progress.state, room.pushes, p.system)
+        sizes[i] = force_size(i, progress.state, workspace.pushes, p.system)
     conditions = _conditions(resting, sizes, p, w)
     _omit_fixed(status, conditions)
     ground = speed_rate(t, p)
@@ -315,24 +316,24 @@ def _accelerate(t, near, struck, resting, fall, p, progress, room, w, case):
     for c in range(k):
         conditions.given[n + c] = p.sliding[c] * ground
         for i in range(p.rows.shape[1]):
-            conditions.given[n + c] -= p.rows[c, i] * room.rate[i]
+            conditions.given[n + c] -= p.rows[c, i] * workspace.rate[i]
         if conditions.mode[c] != STICK:
             continue
         friction = True
-        least = max(room.gaining[c], RATE_ROUNDING / _NEAR * near if struck else 0.0)
+        least = max(workspace.gaining[c], RATE_ROUNDING / _NEAR * near if struck else 0.0)
         still = abs(w.slip[c]) <= near and not status[c] * w.slip[c] > least
-        if room.released[c] and still:
+        if workspace.released[c] and still:
             conditions.mode[c] = status[c]
-        elif not (still or (not struck and (status[c] == STICK or room.arrived[c]))):
+        elif not (still or (not struck and (status[c] == STICK or workspace.arrived[c]))):
             conditions.mode[c] = 1 if w.slip[c] > 0.0 else -1
     for c in range(k):
-        room.held[c] = conditions.mode[c] == STICK
-        room.fresh[c] = room.held[c] or room.released[c]
+        workspace.held[c] = conditions.mode[c] == STICK
+        workspace.fresh[c] = workspace.held[c] or workspace.released[c]
     return solve_uniquely(conditions, case) if friction else solve_conditions(conditions, case)
 
 
 @routine
-def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w, out):
+def _decide(t, touching, struck, slow, height, brief, near, p, progress, workspace, w, out):
     """Decide which touching stops stay closed and which clusters stick; see `change_contacts`."""
     s, Y, status, closed = p.system, progress.state, progress.status, progress.closed
     n, _, m = s.rows.shape
@@ -345,7 +346,7 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
         if status[c] != FIXED:
             status[c] = OPEN
     derivative(t, Y, p, status, closed, w, out)
-    room.rate[:m] = out[m : 2 * m]
+    workspace.rate[:m] = out[m : 2 * m]
     status[:] = before
     ground = speed_rate(t, p)
     fall, resting = np.empty(n), np.zeros(n, np.bool_)
@@ -353,19 +354,19 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
     for j in range(n):
         fall[j] = w.nodes[j, CURVED] - w.nodes[j, SLOPE] * ground
         for i in range(m):
-            fall[j] -= held_row(j, i, p, w) * room.rate[i]
+            fall[j] -= held_row(j, i, p, w) * workspace.rate[i]
         blurred = 30.0 * math.sqrt(2.2e-16 * height * abs(fall[j])) + brief * abs(fall[j])
-        resting[j] = (touching[j] and not room.parting[j]
+        resting[j] = (touching[j] and not workspace.parting[j]
                       and abs(w.nodes[j, RATE]) <= max(slow, blurred))
     case = new_case(n, k)
-    if not _accelerate(t, near, struck, resting, fall, p, progress, room, w, case):
+    if not _accelerate(t, near, struck, resting, fall, p, progress, workspace, w, case):
         return NO_ACCELERATION
     flight = math.inf
     for j in range(n):
         pressed = case.pressed[j] and case.x[j] > 0.0
         closed[j] = CLOSED if resting[j] and (pressed or kept[j]) else 0
-        room.fresh[k + j] = touching[j] and closed[j] == 0
-        if room.fresh[k + j] and fall[j] > 0.0:
+        workspace.fresh[k + j] = touching[j] and closed[j] == 0
+        if workspace.fresh[k + j] and fall[j] > 0.0:
             flight = min(flight, max(0.0, -2.0 * w.nodes[j, RATE] / fall[j]))
     for c in range(k):
         if status[c] == FIXED:
@@ -374,59 +375,60 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, room, w
         for j in range(n):
             if closed[j] and p.cluster[j] == c:
                 status[c] = case.mode[c]
-        room.fresh[c] = room.fresh[c] and (status[c] == 1 or status[c] == -1)
+        workspace.fresh[c] = workspace.fresh[c] and (status[c] == 1 or status[c] == -1)
         # Slip that begins here starts from zero slip velocity.
-        before[c] = STICK if room.fresh[c] else status[c]
+        before[c] = STICK if workspace.fresh[c] else status[c]
     settle(t, p, before, closed, w, out, Y)
     derivative(t, Y, p, status, closed, w, out)
     noise = RATE_ROUNDING / _NEAR * near
     for j in range(n):
         if closed[j]:
-            room.flights[j, YOUNG] = 0.0
+            workspace.flights[j, YOUNG] = 0.0
         elif touching[j]:
-            begin_flight(j, noise, p, w, room)
+            begin_flight(j, noise, p, w, workspace)
         elif struck and abs(w.nodes[j, RATE]) > noise:
-            room.flights[j, CLIMB] = -w.nodes[j, RATE]
+            workspace.flights[j, CLIMB] = -w.nodes[j, RATE]
     return flight
 
 
-def _change_contacts(t, p, progress, room, w, slow, height, brief, out):
-    """Impact of the ``room.touched`` nodes, then which stops stay closed and which clusters stick.
+def _change_contacts(t, p, progress, workspace, w, slow, height, brief, out):
+    """Impact of ``workspace.touched`` nodes, then which stops stay closed and which clusters stick.
 
     An approach at a penetration rate within rounding is stopped, but is no impact;
-    ``room.touched`` tells afterwards which nodes had one.
-    ``room.parting`` nodes were closed and lift off, ``room.released`` clusters begin to slip in the
-    sense of their status, ``room.arrived`` ones have come to rest; HELD stops that rest close.
-    After an impact, stops whose penetration rate is below ``slow``, or whose rebound is lower than
-    the rounding of the ``height`` [m] or shorter than the time ``brief`` [s], close if a force
-    presses them. Returns the longest flight that a rebound may take [s], infinite if none,
+    ``workspace.touched`` tells afterwards which nodes had one.
+    ``workspace.parting`` nodes were closed and lift off, ``workspace.released`` clusters begin to
+    slip in the sense of their status, ``workspace.arrived`` ones have come to rest; HELD stops that
+    rest close. After an impact, stops whose penetration rate is below ``slow``, or whose rebound is
+    lower than the rounding of the ``height`` [m] or shorter than the time ``brief`` [s], close if a
+    force presses them. Returns the longest flight that a rebound may take [s], infinite if none,
     NO_ACCELERATION or NO_IMPULSES, and fills ``out`` with Y'.
     """
     Y, status, closed, largest = progress.state, progress.status, progress.closed, progress.largest
     n = len(p.cluster)
     touching = np.zeros(n, np.bool_)
     derivative(t, Y, p, status, closed, w, out)
-    _set_gaining(t, p, progress, room, w, out)
+    _set_gaining(t, p, progress, workspace, w, out)
     near = max(largest[SLIP_SIZE], largest[RATE_SIZE])
     for c in range(len(p.rows)):
         near = max(near, abs(w.slip[c]))
     for j in range(n):
-        touching[j] = room.touched[j] or closed[j] or room.parting[j]
-        if room.touched[j]:
+        touching[j] = workspace.touched[j] or closed[j] or workspace.parting[j]
+        if workspace.touched[j]:
             near = max(near, abs(w.nodes[j, RATE]))
-    _place(t, p, progress, room, w, out)
+    _place(t, p, progress, workspace, w, out)
     approached, struck = False, False
     for j in range(n):
-        rate = w.nodes[j, RATE] if room.touched[j] else 0.0
+        rate = w.nodes[j, RATE] if workspace.touched[j] else 0.0
         approached = approached or rate > 0.0
-        room.touched[j] = rate > RATE_ROUNDING * near
-        struck = struck or room.touched[j]
-        progress.counts[IMPACTS] += 1 if room.touched[j] else 0
+        workspace.touched[j] = rate > RATE_ROUNDING * near
+        struck = struck or workspace.touched[j]
+        progress.counts[IMPACTS] += 1 if workspace.touched[j] else 0
     if approached and not _strike(t, touching, p, progress, w):
         return NO_IMPULSES
-    return _decide(t, touching, struck, slow, height, brief, _NEAR * near, p, progress, room, w,
-                   out)
+    return _decide(t, touching, struck, slow, height, brief, _NEAR * near, p, progress, workspace,
+                   w, out)
 
 
 compiled_change = compile_law(
-    CHANGE, "change_contacts(t, p, progress, room, w, slow, height, brief, out)", _change_contacts)
+    CHANGE, "change_contacts(t, p, progress, workspace, w, slow, height, brief, out)",
+    _change_contacts)

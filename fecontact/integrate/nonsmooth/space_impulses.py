@@ -40,7 +40,7 @@ _SETTLED = 1e-13
 _MARGIN = 1e-12
 
 
-class ImpactRoom(NamedTuple):
+class ImpactWorkspace(NamedTuple):
     """Workspace for steps of impulses, for n nodes and m modes.
 
     Entries of the nodes are normal ones (n,), then those along the first and the second tangents.
@@ -101,7 +101,7 @@ class ImpactRoom(NamedTuple):
     pivots: IntegerVector
 
 
-def impact_room_for(problem: NonsmoothProblem) -> ImpactRoom:
+def impact_workspace_for(problem: NonsmoothProblem) -> ImpactWorkspace:
     """Workspace for a problem."""
     n, _, m = problem.system.rows.shape
     flags = np.zeros((3, n), dtype=np.int64)
@@ -109,7 +109,7 @@ def impact_room_for(problem: NonsmoothProblem) -> ImpactRoom:
     slopes, sides = np.zeros((2, 2 * n))
     weights, grip, sticking, slipping = np.zeros((4, n))
     whole, half, end = np.zeros((3, 2 * m + POWER_COUNT + n))
-    return ImpactRoom(
+    return ImpactWorkspace(
         np.zeros((3 * n, m)), np.zeros((3 * n, m)), np.zeros((3 * n, 3 * n)), given, before, after,
         impulses, rest, slopes, sides, weights, grip, sticking, slipping, np.zeros((m, m)),
         np.zeros(2 * m), np.zeros(m), np.zeros(POWER_COUNT + n), np.zeros(2 * m), whole, half, end,
@@ -117,20 +117,20 @@ def impact_room_for(problem: NonsmoothProblem) -> ImpactRoom:
 
 
 @helper
-def set_matrix(h, p, room):
+def set_matrix(h, p, workspace):
     """Factorise the matrix of a step."""
-    s, linear = p.system, room.matrix
+    s, linear = p.system, workspace.matrix
     for i in range(len(linear)):
         for k in range(len(linear)):
             linear[i, k] = 0.5 * h * s.damping[i, k] + 0.25 * h * h * s.stiffness[i, k]
         linear[i, i] += 1.0
-    factorise(linear, len(linear), room.pivots)
+    factorise(linear, len(linear), workspace.pivots)
 
 
 @helper
-def set_rows(j, contact, p, room):
+def set_rows(j, contact, p, workspace):
     """Fill the rows of node j: how modes change its height over the ground and its place."""
-    s, rows = p.system, room.rows
+    s, rows = p.system, workspace.rows
     n, _, m = s.rows.shape
     for i in range(m):
         rows[j, i] = (s.rows[j, 1, i] - contact.slope[0] * s.rows[j, 0, i]
@@ -139,9 +139,9 @@ def set_rows(j, contact, p, room):
 
 
 @routine
-def set_pushes(p, room):
+def set_pushes(p, workspace):
     """Fill ``pushes`` and ``coupling`` of the touching nodes, with the factorised matrix."""
-    s, rows, pushes, touching = p.system, room.rows, room.pushes, room.touching
+    s, rows, pushes, touching = p.system, workspace.rows, workspace.pushes, workspace.touching
     n, _, m = s.rows.shape
     for b in range(3 * n):
         j = b % n
@@ -152,117 +152,117 @@ def set_pushes(p, room):
                 pushes[b, i] = -rows[b, i]
             else:
                 pushes[b, i] = rows[b, i] if s.follows_surface else s.rows[j, 1, i]
-        solve(room.matrix, room.pivots, pushes[b])
+        solve(workspace.matrix, workspace.pivots, pushes[b])
         for a in range(3 * n):
             if touching[a % n]:
                 total = 0.0
                 for i in range(m):
                     total += rows[a, i] * pushes[b, i]
-                room.coupling[a, b] = total
+                workspace.coupling[a, b] = total
 
 
 @helper
-def _stiffest(j, n, room):
+def _stiffest(j, n, workspace):
     """Largest change of the slip velocity of node j by a unit impulse along the ground."""
-    c = room.coupling
+    c = workspace.coupling
     a, b = -c[n + j, n + j], -c[2 * n + j, 2 * n + j]
     mixed = -0.5 * (c[n + j, 2 * n + j] + c[2 * n + j, n + j])
     return 0.5 * (a + b) + math.hypot(0.5 * (a - b), mixed)
 
 
 @routine
-def _add_impulse(a, change, n, room):
+def _add_impulse(a, change, n, workspace):
     """Change an impulse, and with it the residual of the conditions."""
-    room.impulses[a] += change
+    workspace.impulses[a] += change
     for b in range(3 * n):
-        if room.touching[b % n]:
-            room.rest[b] += room.coupling[b, a] * change
+        if workspace.touching[b % n]:
+            workspace.rest[b] += workspace.coupling[b, a] * change
 
 
 @routine
-def find_impulses(restitution, n, room):
+def find_impulses(restitution, n, workspace):
     """Fill ``impulses`` of the touching nodes, and ``after``; whether they were found."""
-    x, y, c = room.impulses, room.rest, room.coupling
+    x, y, c = workspace.impulses, workspace.rest, workspace.coupling
     x[:] = 0.0
     for j in range(n):
-        y[j] = room.given[j] - restitution[j] * max(-room.before[j], 0.0)
+        y[j] = workspace.given[j] - restitution[j] * max(-workspace.before[j], 0.0)
         for a in (n + j, 2 * n + j):
-            y[a] = room.given[a] + room.weights[j] * room.before[a]
+            y[a] = workspace.given[a] + workspace.weights[j] * workspace.before[a]
     found = False
     for _ in range(_SWEEPS):
         moved, scale = 0.0, 0.0
         for j in range(n):
-            if not room.touching[j]:
+            if not workspace.touching[j]:
                 continue
             pressed = max(0.0, x[j] - y[j] / c[j, j]) if c[j, j] > 0.0 else 0.0
             moved = max(moved, abs(pressed - x[j]))
             scale = max(scale, pressed)
-            _add_impulse(j, pressed - x[j], n, room)
-            stiffest = _stiffest(j, n, room)
+            _add_impulse(j, pressed - x[j], n, workspace)
+            stiffest = _stiffest(j, n, workspace)
             if stiffest <= 0.0:
                 continue
             one, two = x[n + j] + y[n + j] / stiffest, x[2 * n + j] + y[2 * n + j] / stiffest
             size = math.hypot(one, two)
-            if size > room.sticking[j] * pressed:
-                part = room.slipping[j] * pressed / size
+            if size > workspace.sticking[j] * pressed:
+                part = workspace.slipping[j] * pressed / size
                 one, two = part * one, part * two
             moved = max(moved, abs(one - x[n + j]), abs(two - x[2 * n + j]))
             scale = max(scale, abs(one), abs(two))
-            _add_impulse(n + j, one - x[n + j], n, room)
-            _add_impulse(2 * n + j, two - x[2 * n + j], n, room)
+            _add_impulse(n + j, one - x[n + j], n, workspace)
+            _add_impulse(2 * n + j, two - x[2 * n + j], n, workspace)
         if moved <= _SETTLED * scale:
             found = True
             break
     for j in range(n):
-        room.after[j] = y[j] + restitution[j] * max(-room.before[j], 0.0)
+        workspace.after[j] = y[j] + restitution[j] * max(-workspace.before[j], 0.0)
         for a in (n + j, 2 * n + j):
-            room.after[a] = y[a] - room.weights[j] * room.before[a]
+            workspace.after[a] = y[a] - workspace.weights[j] * workspace.before[a]
     return found
 
 
 @routine
-def put_on_ground(t, Y, closed, p, room):
+def put_on_ground(t, Y, closed, p, workspace):
     """Move closed nodes, and nodes in the ground, to where they just touch it."""
-    s, middle, x = p.system, room.middle, room.impulses
+    s, middle, x = p.system, workspace.middle, workspace.impulses
     n, _, m = s.rows.shape
     moved = ground_motion(t, s)
     margin = 0.0
     for i in range(m):
         for j in range(n):
-            margin = max(margin, _MARGIN * abs(s.rows[j, 1, i]) * room.largest[i])
+            margin = max(margin, _MARGIN * abs(s.rows[j, 1, i]) * workspace.largest[i])
     middle[:] = Y[: 2 * m]
-    room.matrix[:] = 0.0
+    workspace.matrix[:] = 0.0
     for i in range(m):
-        room.matrix[i, i] = 1.0
-    factorise(room.matrix, m, room.pivots)
+        workspace.matrix[i, i] = 1.0
+    factorise(workspace.matrix, m, workspace.pivots)
     deepest = 0.0
     for j in range(n):
         contact = node_contact(j, node_motion(j, middle, s), moved, s)
-        room.touching[j] = 1 if closed[j] or contact.penetration > margin else 0
-        set_rows(j, contact, p, room)
-        room.rest[j] = margin - contact.penetration
-        if room.touching[j]:
-            deepest = max(deepest, abs(room.rest[j]))
+        workspace.touching[j] = 1 if closed[j] or contact.penetration > margin else 0
+        set_rows(j, contact, p, workspace)
+        workspace.rest[j] = margin - contact.penetration
+        if workspace.touching[j]:
+            deepest = max(deepest, abs(workspace.rest[j]))
     x[:] = 0.0
     if deepest <= margin:
         return
-    set_pushes(p, room)
+    set_pushes(p, workspace)
     for _ in range(_SWEEPS):
         furthest = 0.0
         for j in range(n):
-            if not room.touching[j] or room.coupling[j, j] <= 0.0:
+            if not workspace.touching[j] or workspace.coupling[j, j] <= 0.0:
                 continue
-            change = -room.rest[j] / room.coupling[j, j]
+            change = -workspace.rest[j] / workspace.coupling[j, j]
             if not closed[j]:
                 change = max(change, -x[j])
-            furthest = max(furthest, abs(change * room.coupling[j, j]))
+            furthest = max(furthest, abs(change * workspace.coupling[j, j]))
             x[j] += change
             for b in range(n):
-                if room.touching[b]:
-                    room.rest[b] += room.coupling[b, j] * change
+                if workspace.touching[b]:
+                    workspace.rest[b] += workspace.coupling[b, j] * change
         if furthest <= 0.1 * margin:
             break
     for j in range(n):
-        if room.touching[j]:
+        if workspace.touching[j]:
             for i in range(m):
-                Y[i] += x[j] * room.pushes[j, i]
+                Y[i] += x[j] * workspace.pushes[j, i]

@@ -78,7 +78,7 @@ class Hold(NamedTuple):
     side: Vector
 
 
-class NewtonRoom(NamedTuple):
+class NewtonWorkspace(NamedTuple):
     """Workspace of Newton's method.
 
     Rows ``active`` (n, d, m) of the nodes under force, and their ``gradients`` (n, d, m), minus
@@ -98,16 +98,16 @@ class NewtonRoom(NamedTuple):
     polynomial: Matrix
 
 
-def newton_room_for(
+def newton_workspace_for(
     nodes: int, modes: int, tangents: int = 1, combinations: int = 0
-) -> NewtonRoom:
+) -> NewtonWorkspace:
     """Workspace for so many nodes and modes, and combinations D of polynomial forces."""
     linear, whole = np.zeros((2, modes, modes))
     balance, residual = np.zeros((2, modes))
     gradients, active = np.zeros((2, nodes, 1 + tangents, modes))
     partial = np.zeros((2 + tangents, 2 * (1 + tangents)))
-    return NewtonRoom(gradients, active, partial, linear, whole, balance, residual,
-                      np.zeros((combinations, modes)))
+    return NewtonWorkspace(gradients, active, partial, linear, whole, balance, residual,
+                           np.zeros((combinations, modes)))
 
 
 @helper
@@ -187,15 +187,15 @@ def _set_friction(j, contact, pressing, g, p, hold, turning, partial, force):
 
 
 @helper
-def _linearise(stage, moved, p, hold, turning, room, force):
+def _linearise(stage, moved, p, hold, turning, workspace, force):
     """Contact of one stage: accelerations, friction forces and rows of the Jacobian.
 
-    Adds modal contact forces to ``room.balance``, fills ``force`` (n,), in space (2 n,), with R,
-    and ``active`` and ``gradients`` of the room. KEPT nodes stay on their side; HESITANT ones that
-    would turn their slip around are first tried as sticking, or the iteration would jump across
-    stick for ever. Returns the number of nodes under force and the largest creep velocity.
+    Adds modal contact forces to ``workspace.balance``, fills ``force`` (n,), in space (2 n,), with
+    R, and ``active`` and ``gradients`` of the workspace. KEPT nodes stay on their side; HESITANT
+    ones that would turn their slip around are first tried as sticking, or the iteration would jump
+    across stick for ever. Returns the number of nodes under force and the largest creep velocity.
     """
-    s, g, partial = p.system, stage.g, room.partial
+    s, g, partial = p.system, stage.g, workspace.partial
     n, d, m = s.rows.shape
     count, creep = 0, 0.0
     for j in range(n):
@@ -224,36 +224,36 @@ def _linearise(stage, moved, p, hold, turning, room, force):
                 total = 0.0
                 for other in range(d):
                     total += partial[axis, other] * s.rows[j, other, i]
-                room.balance[i] += s.rows[j, axis, i] * push
-                room.active[count, axis, i] = s.rows[j, axis, i]
-                room.gradients[count, axis, i] = sign * total
+                workspace.balance[i] += s.rows[j, axis, i] * push
+                workspace.active[count, axis, i] = s.rows[j, axis, i]
+                workspace.gradients[count, axis, i] = sign * total
         count += 1
     return count, creep
 
 
 @helper
-def _evaluate(stage, p, hold, turning, room, force):
-    """Fill ``room.residual`` and ``room.balance`` for the velocities in Y, and the places there."""
+def _evaluate(stage, p, hold, turning, workspace, force):
+    """Fill ``residual`` and ``balance`` of the workspace for the velocities Y, and the places."""
     Y, m = stage.Y, len(stage.start)
     for i in range(m):
         Y[i] = stage.start[i] + stage.g * Y[m + i]
-    moved = free_acceleration(stage.t, Y, p.system, room.balance)
-    count, creep = _linearise(stage, moved, p, hold, turning, room, force)
+    moved = free_acceleration(stage.t, Y, p.system, workspace.balance)
+    count, creep = _linearise(stage, moved, p, hold, turning, workspace, force)
     for i in range(m):
-        room.residual[i] = stage.known[i] + stage.g * room.balance[i] - Y[m + i]
+        workspace.residual[i] = stage.known[i] + stage.g * workspace.balance[i] - Y[m + i]
     return count, creep
 
 
 @helper
-def _shorten(stage, p, hold, change, downhill, room, force):
+def _shorten(stage, p, hold, change, downhill, workspace, force):
     """Shorten a Newton step to where the minimum along it lies; ``downhill`` is its slope."""
     m = len(stage.start)
     low, high, part = 0.0, 1.0, 1.0
     for _ in range(40):
-        _evaluate(stage, p, hold, FREE, room, force)
+        _evaluate(stage, p, hold, FREE, workspace, force)
         uphill = 0.0
         for i in range(m):
-            uphill -= room.residual[i] * change[i]
+            uphill -= workspace.residual[i] * change[i]
         if abs(uphill) <= 0.1 * abs(downhill) or (part == 1.0 and uphill < 0.0):
             break
         if uphill > 0.0:
@@ -267,37 +267,37 @@ def _shorten(stage, p, hold, change, downhill, room, force):
 
 
 @helper
-def solve_stage(stage, p, hold, limits, finest, room, force):
+def solve_stage(stage, p, hold, limits, finest, workspace, force):
     """Solve one stage for the velocities, Y[m : 2 m]; returns whether that succeeded.
 
     A sticking node may creep at ``finest``. With given normal forces the equations are those of a
     convex minimum: when the sticking set is not found at once, each Newton step is shortened to
     where the minimum along it lies.
     """
-    Y, m, floor, whole = stage.Y, len(stage.start), limits.floor, room.matrix
+    Y, m, floor, whole = stage.Y, len(stage.start), limits.floor, workspace.matrix
     turning = KEPT
     for iteration in range(_ITERATIONS):
-        count, _ = _evaluate(stage, p, hold, turning, room, force)
+        count, _ = _evaluate(stage, p, hold, turning, workspace, force)
         turning = HESITANT if iteration < _HASTY else FREE
-        whole[:] = room.linear
+        whole[:] = workspace.linear
         if has_polynomial(p.system):
-            set_polynomial_gradient(Y, p.system, room.polynomial)
-            add_polynomial_stiffness(stage.g * stage.g, room.polynomial, p.system, whole)
+            set_polynomial_gradient(Y, p.system, workspace.polynomial)
+            add_polynomial_stiffness(stage.g * stage.g, workspace.polynomial, p.system, whole)
         if count:
-            size = count * room.active.shape[1]
-            whole += stage.g * np.dot(room.active[:count].reshape((size, m)).T,
-                                      room.gradients[:count].reshape((size, m)))
+            size = count * workspace.active.shape[1]
+            whole += stage.g * np.dot(workspace.active[:count].reshape((size, m)).T,
+                                      workspace.gradients[:count].reshape((size, m)))
         for i in range(m):
-            if not math.isfinite(room.residual[i]):
+            if not math.isfinite(workspace.residual[i]):
                 return False
-        change = np.linalg.solve(whole, room.residual)
+        change = np.linalg.solve(whole, workspace.residual)
         moved, downhill = 0.0, 0.0
         for i in range(m):
-            downhill += room.residual[i] * change[i]
+            downhill += workspace.residual[i] * change[i]
             Y[m + i] += change[i]
             moved = max(moved, abs(change[i]) / (limits.rtol * (floor[m + i] + abs(Y[m + i]))))
         if moved <= 1e-2:
-            _, creep = _evaluate(stage, p, hold, turning, room, force)
+            _, creep = _evaluate(stage, p, hold, turning, workspace, force)
             if creep <= finest:
                 return True
             if creep < math.inf:
@@ -305,5 +305,5 @@ def solve_stage(stage, p, hold, limits, finest, room, force):
                 hold.multiplier[:] = force
                 turning = KEPT
         elif turning == FREE:
-            _shorten(stage, p, hold, change, downhill, room, force)
+            _shorten(stage, p, hold, change, downhill, workspace, force)
     return False

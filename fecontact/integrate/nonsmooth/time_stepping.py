@@ -27,23 +27,23 @@ from fecontact.integrate.nonsmooth.problem import (
     RATE,
     SLIP_OF,
     SLIP_SIZE,
+    Evaluation,
     Limits,
     NonsmoothProblem,
     Output,
     Progress,
-    Workspace,
     aim,
     pace,
     pass_break,
 )
 from fecontact.integrate.nonsmooth.stage_newton import GRIP, ROUNDING, Stage, solve_stage
-from fecontact.integrate.nonsmooth.stepping_room import (
+from fecontact.integrate.nonsmooth.stepping_workspace import (
     IN_A_ROW,
     SLOWEST,
     STAGES,
     THIRDS,
     UNSOLVED,
-    Room,
+    Workspace,
 )
 from fecontact.integrate.step_loop import (
     CUT,
@@ -84,8 +84,8 @@ class Data(NamedTuple):
     progress: Progress
     output: Output
     kept: Output
+    evaluation: Evaluation
     workspace: Workspace
-    room: Room
 
 
 @helper
@@ -101,12 +101,12 @@ def _fastest_side(moved, p):
 
 
 @helper
-def _slips_back(j, step, p, w, tolerance, room):
+def _slips_back(j, step, p, w, tolerance, workspace):
     """Part of a step at which node j slips back between ends with slip of one sense; or 1.
 
     Along the direction of the slip at the begin.
     """
-    s, b, speed, old, h = p.system, room.cubic, room.speed, room.old, step.h
+    s, b, speed, old, h = p.system, workspace.cubic, workspace.speed, workspace.old, step.h
     first, last, rise, fall = 0.0, 0.0, 0.0, 0.0
     for k in range(s.rows.shape[1] - 1):
         first = math.hypot(first, old[j, SLIP_OF[k]])
@@ -117,8 +117,8 @@ def _slips_back(j, step, p, w, tolerance, room):
         e = old[j, SLIP_OF[k]] / first
         last += e * w.nodes[j, SLIP_OF[k]]
         for i in range(s.rows.shape[2]):
-            rise += e * s.rows[j, 2 * k, i] * room.before[i]
-            fall += e * s.rows[j, 2 * k, i] * room.accelerations[STAGES - 1, i]
+            rise += e * s.rows[j, 2 * k, i] * workspace.before[i]
+            fall += e * s.rows[j, 2 * k, i] * workspace.accelerations[STAGES - 1, i]
         for third in range(4):
             moved = ground_motion(step.t + h * third / 3.0, s)
             for i in range(4):
@@ -129,48 +129,48 @@ def _slips_back(j, step, p, w, tolerance, room):
     b[1], b[2] = b[0] + h * rise / 3.0, b[3] - h * fall / 3.0
     for i in range(4):
         b[i] += tolerance - speed[i]
-    back = first_below(b, room.halves)
+    back = first_below(b, workspace.halves)
     if back == NOWHERE:
         return 1.0
     b[0], b[1], b[2], b[3] = b[3], b[2], b[1], b[0]
-    return 0.5 * (back + 1.0 - first_below(b, room.halves))
+    return 0.5 * (back + 1.0 - first_below(b, workspace.halves))
 
 
 @helper
-def _touches(j, h, p, w, limits, room):
+def _touches(j, h, p, w, limits, workspace):
     """Part of a step at which node j touches between ends that do not feel it; or 1."""
-    s, b = p.system, room.cubic
-    b[0], b[3] = room.old[j, PENETRATION], w.nodes[j, PENETRATION]
-    b[1], b[2] = b[0] + h * room.old[j, RATE] / 3.0, b[3] - h * w.nodes[j, RATE] / 3.0
+    s, b = p.system, workspace.cubic
+    b[0], b[3] = workspace.old[j, PENETRATION], w.nodes[j, PENETRATION]
+    b[1], b[2] = b[0] + h * workspace.old[j, RATE] / 3.0, b[3] - h * w.nodes[j, RATE] / 3.0
     depth = 0.0
     for i in range(s.rows.shape[2]):
         depth = max(depth, abs(s.rows[j, 1, i]) * limits.floor[i])
     above = MISSED * max(pressed(b[0], j, s), pressed(b[3], j, s))
     above += pressed(limits.rtol * depth, j, s)
     if max(pressed(b.min(), j, s), pressed(b.max(), j, s)) > above:
-        return first_pressed(b, above, ROUGHLY, j, s, room.halves)
+        return first_pressed(b, above, ROUGHLY, j, s, workspace.halves)
     return 1.0
 
 
 @helper
-def _passed_over(step, p, limits, tolerance, w, room):
+def _passed_over(step, p, limits, tolerance, w, workspace):
     """Part of a step at which a node slips back, or touches, between ends that show neither; or 1.
 
     Between the ends cubics count. Reversals below ``tolerance`` are left out.
     """
     shorter = 1.0
-    for j in range(len(room.old)):
-        shorter = min(shorter, _slips_back(j, step, p, w, tolerance, room),
-                      _touches(j, step.h, p, w, limits, room))
+    for j in range(len(workspace.old)):
+        shorter = min(shorter, _slips_back(j, step, p, w, tolerance, workspace),
+                      _touches(j, step.h, p, w, limits, workspace))
     return shorter
 
 
 @helper
-def _slip_changes(w, room):
+def _slip_changes(w, workspace):
     """True if a node begins to slip, comes to rest or slips back within the step."""
-    n, side, before = len(room.old), room.hold.side, room.sides
+    n, side, before = len(workspace.old), workspace.hold.side, workspace.sides
     for j in range(n):
-        if room.old[j, FORCE] == 0.0 and w.nodes[j, FORCE] == 0.0:
+        if workspace.old[j, FORCE] == 0.0 and w.nodes[j, FORCE] == 0.0:
             continue
         along, size, was = 0.0, 0.0, 0.0
         for k in range(j, len(side), n):
@@ -185,9 +185,9 @@ def _slip_changes(w, room):
 @routine
 def _fill(row, output, step, data):
     """State at an output time within a step, by cubics through both ends."""
-    p, progress, w, room = data.problem, data.progress, data.workspace, data.room
+    p, progress, w, workspace = data.problem, data.progress, data.evaluation, data.workspace
     m, h = p.system.rows.shape[2], step.target - step.t
-    Y, new, before, after = progress.state, room.new, room.before, room.after
+    Y, new, before, after = progress.state, workspace.new, workspace.before, workspace.after
     states, time = output.states, output.times[row]
     x = (time - step.t) / h
     early, late = (1.0 - x) * (1.0 - x), x * x
@@ -204,31 +204,31 @@ def _fill(row, output, step, data):
     output.normal[row] = w.nodes[:, FORCE]
     for j in range(len(progress.carried)):
         output.friction[row, j] = ((1.0 - x) * progress.carried[j]
-                                   + x * room.forces[STAGES - 1, j])
+                                   + x * workspace.forces[STAGES - 1, j])
 
 
 @helper
-def _set_inertia(p, limits, room):
-    """Fill ``room.inertia``; returns the largest floor of the slip velocities."""
+def _set_inertia(p, limits, workspace):
+    """Fill ``workspace.inertia``; returns the largest floor of the slip velocities."""
     s = p.system
     n, d, m = s.rows.shape
     slowest = 0.0
     for j in range(n):
-        room.inertia[j], part = 0.0, 0.0
+        workspace.inertia[j], part = 0.0, 0.0
         for axis in range(0, d, 2):
             inertia = 0.0
             for i in range(m):
                 inertia += s.rows[j, axis, i] * s.rows[j, axis, i]
                 part = max(part, abs(s.rows[j, axis, i]) * limits.floor[m + i])
-            room.inertia[j] = max(room.inertia[j], inertia)
+            workspace.inertia[j] = max(workspace.inertia[j], inertia)
         slowest = max(slowest, part)
     return slowest
 
 
 @helper
-def _prepare(step, quick, p, progress, w, room):
+def _prepare(step, quick, p, progress, w, workspace):
     """Set the linear matrix of a step, and the parameters r of the nodes in stick."""
-    s, hold, inertia, linear = p.system, room.hold, room.inertia, room.newton.linear
+    s, hold, inertia, linear = p.system, workspace.hold, workspace.inertia, workspace.newton.linear
     g = GAMMA * step.h
     n, _, m = s.rows.shape
     for i in range(m):
@@ -245,12 +245,12 @@ def _prepare(step, quick, p, progress, w, room):
 
 
 @helper
-def _solve_stages(step, finest, p, limits, progress, room):
+def _solve_stages(step, finest, p, limits, progress, workspace):
     """Solve the stages of a step; returns how many succeeded."""
     m = p.system.rows.shape[2]
     Y, h, g = progress.state, step.h, GAMMA * step.h
-    start, known, states, accelerations = (room.start, room.known, room.states,
-                                           room.accelerations)
+    start, known, states, accelerations = (workspace.start, workspace.known, workspace.states,
+                                           workspace.accelerations)
     for k in range(STAGES):
         state = states[k]
         for i in range(m):
@@ -263,19 +263,20 @@ def _solve_stages(step, finest, p, limits, progress, room):
                 known[i] += h * (B1 * accelerations[0, i] + B2 * accelerations[1, i])
             state[m + i] = Y[m + i] if k == 0 else states[k - 1, m + i]
         stage = Stage(min(step.t + NODES[k] * h, step.latest), g, start, known, state)
-        if not solve_stage(stage, p, room.hold, limits, finest, room.newton, room.forces[k]):
+        if not solve_stage(stage, p, workspace.hold, limits, finest, workspace.newton,
+                           workspace.forces[k]):
             return k
         for i in range(m):
             accelerations[k, i] = (state[m + i] - known[i]) / g
-        room.hold.multiplier[:] = room.forces[k]
+        workspace.hold.multiplier[:] = workspace.forces[k]
     return STAGES
 
 
 @helper
-def _error(step, p, limits, Y, room):
+def _error(step, p, limits, Y, workspace):
     """Error of the state in units of what is allowed, filtered by the matrix of the last stage."""
-    s, start, known, floor = p.system, room.start, room.known, limits.floor
-    states, accelerations = room.states, room.accelerations
+    s, start, known, floor = p.system, workspace.start, workspace.known, limits.floor
+    states, accelerations = workspace.states, workspace.accelerations
     m, h, g = s.rows.shape[2], step.h, GAMMA * step.h
     for i in range(m):
         start[i] = h * (ERROR_1 * states[0, m + i] + ERROR_2 * states[1, m + i]
@@ -286,8 +287,8 @@ def _error(step, p, limits, Y, room):
         for k in range(m):
             known[i] -= g * s.stiffness[i, k] * start[k]
     if has_polynomial(s):
-        add_polynomial_product(-g, room.newton.polynomial, start, s, known)
-    filtered = np.linalg.solve(room.newton.matrix, known)
+        add_polynomial_product(-g, workspace.newton.polynomial, start, s, known)
+    filtered = np.linalg.solve(workspace.newton.matrix, known)
     worst = 0.0
     for i in range(m):
         place = start[i] + g * filtered[i]
@@ -297,32 +298,32 @@ def _error(step, p, limits, Y, room):
 
 
 @helper
-def _set_rates(step, p, w, room):
-    """Fill ``room.rates`` with the powers at the stages, and w with the nodes at the end."""
+def _set_rates(step, p, w, workspace):
+    """Fill ``workspace.rates`` with the powers at the stages, and w with the nodes at the end."""
     for k in range(STAGES):
         moment = min(step.t + NODES[k] * step.h, step.latest)
         moved = ground_motion(moment, p.system)
-        observe(moved, room.states[k], p, w.nodes)
-        body_powers(moment, room.states[k], p.system, room.rates[k])
-        contact_powers(moved, p.system, w.nodes, room.forces[k], True, room.rates[k])
+        observe(moved, workspace.states[k], p, w.nodes)
+        body_powers(moment, workspace.states[k], p.system, workspace.rates[k])
+        contact_powers(moved, p.system, w.nodes, workspace.forces[k], True, workspace.rates[k])
 
 
 @helper
-def _set_end(h, m, progress, room):
-    """Fill ``room.new`` and ``room.after`` from the stages of an accepted step."""
-    Y, rates = progress.state, room.rates
-    room.new[: 2 * m] = room.states[STAGES - 1]
+def _set_end(h, m, progress, workspace):
+    """Fill ``workspace.new`` and ``workspace.after`` from the stages of an accepted step."""
+    Y, rates = progress.state, workspace.rates
+    workspace.new[: 2 * m] = workspace.states[STAGES - 1]
     for i in range(rates.shape[1]):
-        room.new[2 * m + i] = Y[2 * m + i] + h * (
+        workspace.new[2 * m + i] = Y[2 * m + i] + h * (
             B1 * rates[0, i] + B2 * rates[1, i] + GAMMA * rates[2, i])
-    room.after[:m] = room.accelerations[STAGES - 1]
-    room.after[m:] = rates[STAGES - 1]
+    workspace.after[:m] = workspace.accelerations[STAGES - 1]
+    workspace.after[m:] = rates[STAGES - 1]
 
 
 @routine
 def _begin(t, data):
     """Prepare the first step, which fills the first row."""
-    data.room.tries[SLOWEST] = _set_inertia(data.problem, data.limits, data.room)
+    data.workspace.tries[SLOWEST] = _set_inertia(data.problem, data.limits, data.workspace)
     data.progress.counts[OUTPUTS] = 0
     return RUNNING
 
@@ -330,53 +331,53 @@ def _begin(t, data):
 @routine
 def _attempt(step, last, smallest, data):
     """Try a step; its outcome, and the length of the next one."""
-    p, limits, progress, output, w, room = (data.problem, data.limits, data.progress, data.output,
-                                            data.workspace, data.room)
-    Y, counts, largest, tries = progress.state, progress.counts, progress.largest, room.tries
+    p, limits, progress, output, w, workspace = (data.problem, data.limits, data.progress,
+                                                 data.output, data.evaluation, data.workspace)
+    Y, counts, largest, tries = progress.state, progress.counts, progress.largest, workspace.tries
     n, _, m = p.system.rows.shape
     length, slowest = step.h, tries[SLOWEST]
     moved = ground_motion(step.t, p.system)
     observe(moved, Y, p, w.nodes)
-    room.old[:] = w.nodes
+    workspace.old[:] = w.nodes
     quick = largest[SLIP_SIZE] + _fastest_side(moved, p)
-    _prepare(step, quick, p, progress, w, room)
+    _prepare(step, quick, p, progress, w, workspace)
     finest = (1e-2 * limits.rtol + 1e-11) * max(slowest, quick)
     if p.system.rows.shape[1] > 2:
         # Athwart a fast belt slip velocities are small, and their errors count.
         finest *= 0.01
-    solved = _solve_stages(step, finest, p, limits, progress, room)
+    solved = _solve_stages(step, finest, p, limits, progress, workspace)
     if solved < STAGES:
         tries[UNSOLVED] += 1.0
-        finite = math.isfinite(room.states[solved, m])
+        finite = math.isfinite(workspace.states[solved, m])
         return FAILED if finite else NOT_A_NUMBER, 0.25 * length
-    worst = _error(step, p, limits, Y, room)
+    worst = _error(step, p, limits, Y, workspace)
     if worst > 1.0:
         tries[IN_A_ROW] += 1.0
         # Where a node begins to slip or to stick, the error falls with the length only.
         factor = 0.9 * worst ** (-1.0 / 3.0) if tries[IN_A_ROW] == 1.0 else 0.7 / worst
         return FAILED, length * max(factor, 0.02)
-    _set_rates(step, p, w, room)
+    _set_rates(step, p, w, workspace)
     if counts[KNOWN] == 0:
-        room.before[:m] = room.accelerations[0]
-        room.before[m:] = room.rates[0]
+        workspace.before[:m] = workspace.accelerations[0]
+        workspace.before[m:] = workspace.rates[0]
     if counts[CUTS] < MOST_CUTS:
-        part = _passed_over(step, p, limits, limits.rtol * (slowest + quick), w, room)
+        part = _passed_over(step, p, limits, limits.rtol * (slowest + quick), w, workspace)
         if part * length > smallest and part < 1.0:
             counts[CUTS] += 1
             return CUT, part * length
     row = counts[OUTPUTS]
     # Ends of steps are exact; polynomials over a step know no change of slip within it.
     part = (output.times[row] - step.t) / length
-    if _NEAR < part < 1.0 - _NEAR and _slip_changes(w, room):
+    if _NEAR < part < 1.0 - _NEAR and _slip_changes(w, workspace):
         return CUT, part * length
     for j in range(n):
         slip = 0.0
         for k in range(p.system.rows.shape[1] - 1):
             slip = math.hypot(slip, w.nodes[j, SLIP_OF[k]])
         largest[SLIP_SIZE] = max(largest[SLIP_SIZE], slip)
-    _set_end(length, m, progress, room)
+    _set_end(length, m, progress, workspace)
     if counts[STEPS] == 0:
-        progress.carried[:] = room.forces[0]
+        progress.carried[:] = workspace.forces[0]
     tries[IN_A_ROW], counts[CUTS] = 0.0, 0
     if length > _SHORT * limits.longest:
         tries[UNSOLVED] = 0.0
@@ -389,11 +390,11 @@ def _attempt(step, last, smallest, data):
 @routine
 def _go_on(step, h, data):
     """Make the end of the step the state of the run."""
-    progress, room = data.progress, data.room
-    progress.state[:] = room.new
-    room.before[:] = room.after
-    progress.carried[:] = room.forces[STAGES - 1]
-    room.sides[:] = room.hold.side
+    progress, workspace = data.progress, data.workspace
+    progress.state[:] = workspace.new
+    workspace.before[:] = workspace.after
+    progress.carried[:] = workspace.forces[STAGES - 1]
+    workspace.sides[:] = workspace.hold.side
     progress.counts[KNOWN] = 0 if step.at_break else 1
     if step.at_break:
         pass_break(step, data.problem, progress, data.output)

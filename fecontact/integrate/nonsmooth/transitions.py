@@ -164,21 +164,22 @@ def press(t, p, touched, w, Y):
 
 
 @helper
-def decide_clusters(t, p, progress, room, near, w, out):
+def decide_clusters(t, p, progress, workspace, near, w, out):
     """Set the status of all clusters at a moment at which some may change.
 
-    ``room.released`` clusters have reached the limit of stick and slip in the sense of ``status``;
-    those whose slip has ``arrived`` at its end, up to the error of the step, and others with a
-    slip velocity below ``near`` stick or slip by their forces; ``room.touched`` nodes touch down.
-    ``room.fresh`` tells clusters that begin to slip from no slip velocity. Fills ``out`` with Y'.
+    ``workspace.released`` clusters have reached the limit of stick and slip in the sense of
+    ``status``; those whose slip has ``arrived`` at its end, up to the error of the step, and others
+    with a slip velocity below ``near`` stick or slip by their forces; ``workspace.touched`` nodes
+    touch down. ``workspace.fresh`` tells clusters that begin to slip from no slip velocity. Fills
+    ``out`` with Y'.
     """
     clusters, m = p.rows.shape
     Y, status, closed = progress.state, progress.status, progress.closed
-    released, arrived, fresh = room.released, room.arrived, room.fresh
+    released, arrived, fresh = workspace.released, workspace.arrived, workspace.fresh
     derivative(t, Y, p, status, closed, w, out)
-    if room.touched.any():
-        press(t, p, room.touched, w, Y)
-        room.touched[:] = False
+    if workspace.touched.any():
+        press(t, p, workspace.touched, w, Y)
+        workspace.touched[:] = False
         derivative(t, Y, p, status, closed, w, out)
     candidate, held = np.zeros(clusters, np.bool_), np.zeros(clusters, np.bool_)
     for c in range(clusters):

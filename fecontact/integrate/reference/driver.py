@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecontact.core.types import Array, Integers
-from fecontact.integrate.kept_steps import GrowingRows, KeptSteps, room_for_rows
+from fecontact.integrate.kept_steps import GrowingRows, KeptSteps, workspace_for_rows
 from fecontact.integrate.reference.watched import Watched
 from fecontact.integrate.run_limits import (
     breaks,
@@ -88,7 +88,7 @@ def integrate(
                                   longest_step(system, times, task.max_step))
     pieces, sliders = smooth_pieces(system, times), slider_counts(system)
     result = np.empty((len(times), size + extra))
-    kept = GrowingRows(room_for_rows(task.keep_steps, size + extra))
+    kept = GrowingRows(workspace_for_rows(task.keep_steps, size + extra))
     done, y = pass_break(system, float(times[0]), pieces[0].begin, times, 0, result,
                          np.concatenate([state, np.zeros(extra)]))
     t, status = pieces[0].begin, Status.FINISHED

@@ -12,10 +12,10 @@ from fecontact.core.checks import require_state
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate import step_loop
-from fecontact.integrate.collocation.room import chosen_collocation, collocation_for
+from fecontact.integrate.collocation.workspace import chosen_collocation, collocation_for
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
-from fecontact.integrate.kept_steps import KeptSteps, room_for_rows
+from fecontact.integrate.kept_steps import KeptSteps, workspace_for_rows
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
@@ -30,7 +30,7 @@ from fecontact.integrate.rodas5p.state import (
     Progress,
     output_for,
     progress_for,
-    room_for,
+    workspace_for,
 )
 from fecontact.integrate.rodas5p.variational import Vary, variation_for
 from fecontact.integrate.run_limits import (
@@ -151,9 +151,10 @@ def start(
     return Run(
         problem,
         _progress(system, control, times, state),
-        room_for(m, n, states, basis.dimension, blocks, combinations),
+        workspace_for(m, n, states, basis.dimension, blocks, combinations),
         output_for(times, len(state), n),
-        output_for(np.zeros(room_for_rows(keep_steps, len(state) + POWER_COUNT + NODE_POWERS * n)),
+        output_for(np.zeros(workspace_for_rows(keep_steps,
+                                               len(state) + POWER_COUNT + NODE_POWERS * n)),
                    len(state), n),
         Vary(exact_arrays(above.arrays, counts), exact_arrays(below.arrays, counts), width,
              _moved_both_ways(system, above, below),
@@ -180,7 +181,7 @@ def again(run: Run, system: ContactSystem, state: Array) -> Run:
     require_state(state, np.inf)
     output = run.output
     return Run(
-        run.problem, _progress(system, control, run.times, state), run.room,
+        run.problem, _progress(system, control, run.times, state), run.workspace,
         Output(output.times, np.zeros_like(output.states), np.zeros_like(output.work)), run.kept,
         run.variation, run.watch,
         None if run.series is None else from_state(run.series, system, state),

@@ -194,7 +194,7 @@ def gather(y, s, blocks, load, forces, rate):
 def set_forces(y, s, blocks, moved, w, scratch, rate):
     """Fill w[2] (d n,) with the node forces of :func:`push`, and the z' of ``rate``.
 
-    ``w`` (3, d n) holds the nodes as :func:`project` puts them there, ``scratch`` is room.
+    ``w`` (3, d n) holds the nodes as :func:`project` puts them there, ``scratch`` is workspace.
     """
     m, n = len(blocks.position), len(s.gap)
     states = (len(y) - 2 * m) // n

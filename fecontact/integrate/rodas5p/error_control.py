@@ -16,31 +16,32 @@ from fecontact.system.powers import POWER_COUNT, add_node_powers, given_powers, 
 
 
 @routine
-def state_error(control, progress, room):
+def state_error(control, progress, workspace):
     """Error of the modes in a step, as a multiple of the allowed error."""
-    error = modal_error(room.stages[tableau.STAGES - 1], control, progress, room)
+    error = modal_error(workspace.stages[tableau.STAGES - 1], control, progress, workspace)
     # Comparisons with NaN are false: make sure that it is not lost.
-    for k in range(len(room.after)):
-        if not abs(room.after[k]) < np.inf:
+    for k in range(len(workspace.after)):
+        if not abs(workspace.after[k]) < np.inf:
             error = np.inf
     return error
 
 
 @helper
-def modal_error(difference, control, progress, room):
+def modal_error(difference, control, progress, workspace):
     """Largest entry of a difference of modal states, as a multiple of the allowed error."""
     m = len(control.largest)
     speed_scale = max(progress.numbers[SPEED_SCALE], control.speed_scale)
     error = 0.0
     for i in range(m):
-        scale = max(max(progress.extremes[i], abs(room.after[i])), control.displacement_scale[i])
+        scale = max(max(progress.extremes[i], abs(workspace.after[i])),
+                    control.displacement_scale[i])
         error = max(error, abs(difference[i]) / scale)
         error = max(error, abs(difference[m + i]) * control.largest[i] / speed_scale)
     return error / control.rtol
 
 
 @routine
-def memory_error(error, problem, progress, room):
+def memory_error(error, problem, progress, workspace):
     """The larger of the error and the errors of internal variables at nodes in contact.
 
     Forces do not depend on the internal variables of nodes that are open at the end of the step.
@@ -50,11 +51,12 @@ def memory_error(error, problem, progress, room):
     """
     control = problem.control
     m, n = len(control.largest), len(problem.system.gap)
-    states, difference = len(control.memory_scale) // max(n, 1), room.stages[tableau.STAGES - 1]
+    states = len(control.memory_scale) // max(n, 1)
+    difference = workspace.stages[tableau.STAGES - 1]
     for j in range(n):
         begins = (progress.signs[j] == 0 and control.slider_counts[j] > 0
                   and problem.system.rows.shape[1] > 2)
-        if room.nodes[2, n + j] != 0.0 and not begins:
+        if workspace.nodes[2, n + j] != 0.0 and not begins:
             for k in range(j * states, (j + 1) * states):
                 error = max(error, abs(difference[2 * m + k]) / (
                     control.memory_scale[k] * control.rtol))
@@ -84,15 +86,15 @@ def switches(places, nodes, forces, signs):
 
 
 @helper
-def set_stage_rate(problem, progress, room):
-    """Fill ``room.base`` with the rates of ``room.stage``, by ``room.given``, ``room.load``."""
-    extend_near(room.stage, problem, progress, room)
-    dynamics.set_rate(room.stage, problem.system, room.near, room.given, room.load, room.nodes,
-                      room.scratch, room.base)
+def set_stage_rate(problem, progress, workspace):
+    """Fill ``workspace.base`` with the rates of ``stage``, by ``given`` and ``load``."""
+    extend_near(workspace.stage, problem, progress, workspace)
+    dynamics.set_rate(workspace.stage, problem.system, workspace.near, workspace.given,
+                      workspace.load, workspace.nodes, workspace.scratch, workspace.base)
 
 
 @routine
-def defect_error(step, G, problem, progress, room):
+def defect_error(step, G, problem, progress, workspace):
     """Error of a step by the defect of its interpolant, as a multiple of the allowed error.
 
     The defect is v_1 - v_0 less the integral of the accelerations v' along the interpolant. A
@@ -100,46 +102,49 @@ def defect_error(step, G, problem, progress, room):
     methods. Unlike the difference of the embedded solutions, the defect holds for steps in which a
     normal force begins or ends.
 
-    ``room.nodes``, ``room.given`` and ``room.load`` are overwritten.
+    ``workspace.nodes``, ``workspace.given`` and ``workspace.load`` are overwritten.
     """
-    s, right = problem.system, room.right
+    s, right = problem.system, workspace.right
     m = len(problem.control.largest)
     for k in range(len(right)):
         right[k] = 0.0
     for point in range(len(DEFECT_POINTS)):
         part, weight = DEFECT_POINTS[point], DEFECT_WEIGHTS[point] * step.h
-        tableau.interpolated(part, progress.state, room.after, room.dense, room.stage)
-        dynamics.set_given(min(step.t + part * step.h, step.latest), s, room.given, room.load)
-        set_stage_rate(problem, progress, room)
+        tableau.interpolated(part, progress.state, workspace.after, workspace.dense,
+                             workspace.stage)
+        dynamics.set_given(min(step.t + part * step.h, step.latest), s, workspace.given,
+                           workspace.load)
+        set_stage_rate(problem, progress, workspace)
         for k in range(m, 2 * m):
-            right[k] -= weight * room.base[k]
+            right[k] -= weight * workspace.base[k]
     for k in range(m, 2 * m):
-        right[k] = G * (right[k] + room.after[k] - progress.state[k])
+        right[k] = G * (right[k] + workspace.after[k] - progress.state[k])
     progress.counts[RATES] += len(DEFECT_POINTS)
-    stage_solver.solve_stage(G, s, problem.blocks, progress.gradients, room.reduced, right,
-                             room.nodes, room.base)
-    return modal_error(room.base, problem.control, progress, room) / problem.control.switch_part
+    stage_solver.solve_stage(G, s, problem.blocks, progress.gradients, workspace.reduced, right,
+                             workspace.nodes, workspace.base)
+    return modal_error(workspace.base, problem.control, progress,
+                       workspace) / problem.control.switch_part
 
 
 @routine
-def slip_error(error, problem, progress, room):
+def slip_error(error, problem, progress, workspace):
     """The larger of the error and that of the slip velocities at the end of the step.
 
     Only where friction has no memory: there the force follows the slip velocity alone.
     """
     s, control = problem.system, problem.control
     n, m = len(s.gap), len(control.largest)
-    near, slips = room.near, room.between[0]
-    dynamics.project_one(near, room.stages[tableau.STAGES - 1, m : 2 * m], slips)
-    moved = dynamics.motion_given(room.given)
+    near, slips = workspace.near, workspace.between[0]
+    dynamics.project_one(near, workspace.stages[tableau.STAGES - 1, m : 2 * m], slips)
+    moved = dynamics.motion_given(workspace.given)
     for at in range(near.used[0]):
         j = near.nodes[at]
-        if s.memory[j] == 0 and room.nodes[2, n + j] != 0.0:
+        if s.memory[j] == 0 and workspace.nodes[2, n + j] != 0.0:
             slip, distance = 0.0, 0.0
             for tangent in range(s.rows.shape[1] - 1):
                 first = 2 * tangent * n
                 slip = math.hypot(slip, slips[first + at])
-                distance = math.hypot(distance, room.nodes[1, first + j] - ground_speed(
+                distance = math.hypot(distance, workspace.nodes[1, first + j] - ground_speed(
                     tangent, j, moved, s))
             part = slip / (control.slip_part * (control.slip_scale[j] + distance))
             if part > error:
@@ -149,12 +154,12 @@ def slip_error(error, problem, progress, room):
 
 
 @helper
-def _energy_scale(control, progress, room):
+def _energy_scale(control, progress, workspace):
     """The largest of kinetic energy, work of a power and the energy scale so far [J]."""
     m = len(control.largest)
     kinetic = 0.0
     for i in range(m):
-        kinetic += 0.5 * room.after[m + i] ** 2
+        kinetic += 0.5 * workspace.after[m + i] ** 2
     energy = max(max(progress.numbers[ENERGY], kinetic), control.energy_scale)
     for k in range(POWER_COUNT):
         energy = max(energy, abs(progress.work[k]))
@@ -173,15 +178,15 @@ def take_scales(control, progress):
 
 
 @helper
-def set_scale(control, progress, room):
-    """Fill ``room.right`` with the sizes of the state: what its errors count relative to."""
+def set_scale(control, progress, workspace):
+    """Fill ``workspace.right`` with the sizes of the state: what its errors count relative to."""
     m = len(control.largest)
     speed_scale = max(progress.numbers[SPEED_SCALE], control.speed_scale)
     for i in range(m):
-        room.right[i] = max(progress.extremes[i], control.displacement_scale[i])
-        room.right[m + i] = speed_scale / control.largest[i]
+        workspace.right[i] = max(progress.extremes[i], control.displacement_scale[i])
+        workspace.right[m + i] = speed_scale / control.largest[i]
     for k in range(len(control.memory_scale)):
-        room.right[2 * m + k] = control.memory_scale[k]
+        workspace.right[2 * m + k] = control.memory_scale[k]
 
 
 # Gauss's rule of two points on each quarter of a step.
@@ -217,52 +222,54 @@ _CLOSE, _MOST_TRIALS = 1e-9, 40
 
 
 @helper
-def _powers(point, t, y, problem, progress, room):
-    """Fill a row of ``room.power`` (4, p + 2 n): :func:`fecontact.system.powers.powers` by blocks.
+def _powers(point, t, y, problem, progress, workspace):
+    """Fill a row of ``workspace.power`` (4, p + 2 n) as :func:`fecontact.system.powers.powers`.
 
     It is that of the ``point`` of the step at the time t, where the state is y.
     """
-    s, blocks, near, out = problem.system, problem.blocks, room.near, room.power[point]
+    s, blocks, near, out = problem.system, problem.blocks, workspace.near, workspace.power[point]
     given_powers(t, y, s, out)
     for part in range(len(blocks.own)):
         matrix_powers(block_at(blocks.own, part), y, s, out)
     for j in range(POWER_COUNT, len(out)):
         out[j] = 0.0
-    dynamics.project(near, y, room.between[0], room.between[1])
+    dynamics.project(near, y, workspace.between[0], workspace.between[1])
     n, m = len(s.gap), len(blocks.position)
     states = (len(y) - 2 * m) // n
-    force, rates, node_powers = room.scratch.force[0], room.scratch.rates[0], out[POWER_COUNT:]
+    force, rates = workspace.scratch.force[0], workspace.scratch.rates[0]
+    node_powers = out[POWER_COUNT:]
     moved = ground_motion(t, s)
     for at in range(near.used[0]):
         j = near.nodes[at]
         first = 2 * m + j * states
-        add_node_powers(j, dynamics.motion_of(at, room.between, s), moved,
+        add_node_powers(j, dynamics.motion_of(at, workspace.between, s), moved,
                         y[first : first + s.memory[j]], problem.control.stick_speed[j], s,
                         force, rates, out, node_powers)
 
 
 @helper
-def _set_powers(step, problem, progress, room):
-    """Fill ``room.power`` with the powers at the points of a step."""
+def _set_powers(step, problem, progress, workspace):
+    """Fill ``workspace.power`` with the powers at the points of a step."""
     for k in range(len(progress.power)):
-        room.power[0, k] = progress.power[k]
+        workspace.power[0, k] = progress.power[k]
     for point in range(1, 4):
         if point < 3:
-            tableau.interpolated(_POINTS[point], progress.state, room.after, room.dense, room.right)
-            state = room.right
+            tableau.interpolated(_POINTS[point], progress.state, workspace.after, workspace.dense,
+                                 workspace.right)
+            state = workspace.right
         else:
-            state = room.after
-        extend_near(state, problem, progress, room)
+            state = workspace.after
+        extend_near(state, problem, progress, workspace)
         _powers(point, min(step.t + _POINTS[point] * step.h, step.latest), state, problem,
-                progress, room)
+                progress, workspace)
 
 
 @helper
-def _quadrature_error(h, room):
+def _quadrature_error(h, workspace):
     """Estimated error of a work in a step, the largest of those of the system and its nodes [J]."""
-    largest, power = 0.0, room.power
+    largest, power = 0.0, workspace.power
     # Losses in creep need no estimate: they are losses of the node in parts of the step.
-    for k in range(POWER_COUNT + len(room.creeps)):
+    for k in range(POWER_COUNT + len(workspace.creeps)):
         difference = 0.0
         for point in range(4):
             difference += _DIFFERENCE[point] * power[point, k]
@@ -271,20 +278,20 @@ def _quadrature_error(h, room):
 
 
 @routine
-def work_error(step, problem, progress, room):
-    """Error of the work in a step; fills ``room.power`` with the powers at the points of it."""
+def work_error(step, problem, progress, workspace):
+    """Error of the work in a step; fills ``workspace.power`` with the powers at its points."""
     control = problem.control
-    _set_powers(step, problem, progress, room)
-    return _quadrature_error(step.h, room) / (
-        control.rtol * _energy_scale(control, progress, room))
+    _set_powers(step, problem, progress, workspace)
+    return _quadrature_error(step.h, workspace) / (
+        control.rtol * _energy_scale(control, progress, workspace))
 
 
 @routine
-def set_creeps(step, problem, progress, room):
-    """Fill ``room.creeps`` (n, 4) after :func:`work_error`: whether a node creeps at first, and the
+def set_creeps(step, problem, progress, workspace):
+    """Fill ``workspace.creeps`` (n, 4) after :func:`work_error`: if a node creeps at first, and the
     parts of the step at which it begins or ceases to; 1 for those that there are not.
     """
-    near, power, n = room.near, room.power, len(room.creeps)
+    near, power, n = workspace.near, workspace.power, len(workspace.creeps)
     for at in range(near.used[0]):
         j = near.nodes[at]
         all_the_time, never = True, True
@@ -292,30 +299,30 @@ def set_creeps(step, problem, progress, room):
             creep = power[point, POWER_COUNT + n + j]
             all_the_time = all_the_time and creep == power[point, POWER_COUNT + j]
             never = never and creep == 0.0
-        row = room.creeps[j]
+        row = workspace.creeps[j]
         row[0] = 1.0 if all_the_time else 0.0
         row[1] = row[2] = row[3] = 1.0
         if all_the_time or never:
             continue
-        low, slow, passed = 0.0, _above_creep(0.0, j, step, problem, progress, room), 1
+        low, slow, passed = 0.0, _above_creep(0.0, j, step, problem, progress, workspace), 1
         row[0] = 1.0 if slow < 0.0 else 0.0
         for point in range(1, 4):
             high = _POINTS[point]
-            fast = _above_creep(high, j, step, problem, progress, room)
+            fast = _above_creep(high, j, step, problem, progress, workspace)
             if (slow < 0.0) != (fast < 0.0):
-                row[passed] = _passing(low, high, slow, fast, j, step, problem, progress, room)
+                row[passed] = _passing(low, high, slow, fast, j, step, problem, progress, workspace)
                 passed += 1
             low, slow = high, fast
 
 
 @helper
-def _above_creep(part, j, step, problem, progress, room):
+def _above_creep(part, j, step, problem, progress, workspace):
     """Slip speed of node j at a part of the step less that below which it creeps."""
     s, m = problem.system, len(problem.control.largest)
     moved = ground_motion(min(step.t + part * step.h, step.latest), s)
     d, along, across = s.rows.shape[1], 0.0, 0.0
     for i in range(m):
-        v = tableau.one_interpolated(part, m + i, progress.state, room.after, room.dense)
+        v = tableau.one_interpolated(part, m + i, progress.state, workspace.after, workspace.dense)
         along += s.rows[j, 0, i] * v
         if d > 2:
             across += s.rows[j, 2, i] * v
@@ -324,13 +331,13 @@ def _above_creep(part, j, step, problem, progress, room):
 
 
 @helper
-def _passing(low, high, at_low, at_high, j, step, problem, progress, room):
+def _passing(low, high, at_low, at_high, j, step, problem, progress, workspace):
     """Part of the step, between two, at which node j begins or ceases to creep."""
     near, part = _CLOSE * problem.control.stick_speed[j], high
     bracket = Bracket(low, high, at_low, at_high, 0)
     for _ in range(_MOST_TRIALS):
         part = between(bracket)
-        found = _above_creep(part, j, step, problem, progress, room)
+        found = _above_creep(part, j, step, problem, progress, workspace)
         if abs(found) <= near:
             break
         bracket = narrowed(bracket, part, found)
@@ -338,19 +345,19 @@ def _passing(low, high, at_low, at_high, j, step, problem, progress, room):
 
 
 @helper
-def work_until(part, h, before, room, out):
+def work_until(part, h, before, workspace, out):
     """Out = work ``before`` the step and in its part, by the cubic through the powers.
 
     In creep a node loses what it loses while it creeps.
     """
-    power, n = room.power, len(room.creeps)
+    power, n = workspace.power, len(workspace.creeps)
     w0, w1, w2, w3 = _weight(0, part), _weight(1, part), _weight(2, part), _weight(3, part)
     count = len(out) - n
     for k in range(count):
         out[k] = before[k] + h * (w0 * power[0, k] + w1 * power[1, k] + w2 * power[2, k]
                                   + w3 * power[3, k])
     for j in range(n):
-        row, k = room.creeps[j], POWER_COUNT + j
+        row, k = workspace.creeps[j], POWER_COUNT + j
         creeps, low, total = row[0] != 0.0, 0.0, 0.0
         for place in range(1, 5):
             high = min(part, row[place]) if place < 4 else part

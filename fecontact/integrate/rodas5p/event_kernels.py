@@ -100,13 +100,13 @@ class Watch(NamedTuple):
 
 
 NOTE = Callable[[
-    run_arrays.Step, run_arrays.Problem, run_arrays.Progress, run_arrays.Room, Watch,
+    run_arrays.Step, run_arrays.Problem, run_arrays.Progress, run_arrays.Workspace, Watch,
 ], float]
 note_events_at = function_at(NOTE)
 
 
 class _View(NamedTuple):
-    """A step that is looked into: the nodes' depths, its interpolant, and room.
+    """A step that is looked into: the nodes' depths, its interpolant, and workspace.
 
     ``before``, ``after`` (size,) and ``dense`` (3, size) are the interpolant; y (size,) is the
     state that is examined, ``force`` and ``rates`` are work arrays for laws with memory.
@@ -124,9 +124,10 @@ class _View(NamedTuple):
 
 
 @helper
-def _view(step, problem, progress, room):
-    return _View(step, problem.system, problem.control.depth, progress.state, room.after,
-                 room.dense, room.right, room.scratch.force[0], room.scratch.rates[0])
+def _view(step, problem, progress, workspace):
+    return _View(step, problem.system, problem.control.depth, progress.state, workspace.after,
+                 workspace.dense, workspace.right, workspace.scratch.force[0],
+                 workspace.scratch.rates[0])
 
 
 @helper
@@ -276,9 +277,9 @@ def begin(t, y, s, depth, watch, scratch):
 
 
 @routine
-def next_switch(step, problem, progress, room, watch):
+def next_switch(step, problem, progress, workspace, watch):
     """Part of the step until a normal force begins, ends or passes its depth; 1 if none does."""
-    view = _view(step, problem, progress, room)
+    view = _view(step, problem, progress, workspace)
     first = 1.0
     for j in range(len(watch.zones)):
         old = _normal_zone(watch.zones[j])
@@ -312,9 +313,9 @@ def _keep_between(count, row, watch):
 
 
 @helper
-def set_own_places(before, room, watch):
+def set_own_places(before, workspace, watch):
     """Fill the rows of ``watch.places`` of users' functions for a step."""
-    b, row = room.bound[0], room.bound[2]
+    b, row = workspace.bound[0], workspace.bound[2]
     for k in range(len(watch.own)):
         count = 0
         if watch.linear[k] != 0:
@@ -323,22 +324,22 @@ def set_own_places(before, room, watch):
                 b[i] = -p[0]
             for i in range(len(before)):
                 b[0] += p[1 + i] * before[i]
-                b[1] += p[1 + i] * room.inner[0, i]
-                b[2] += p[1 + i] * room.inner[1, i]
-                b[3] += p[1 + i] * room.inner[2, i]
-                b[4] += p[1 + i] * room.after[i]
-            count = bernstein.sign_changes(b, room.halves, row, watch.changed[:MOST])
+                b[1] += p[1 + i] * workspace.inner[0, i]
+                b[2] += p[1 + i] * workspace.inner[1, i]
+                b[3] += p[1 + i] * workspace.inner[2, i]
+                b[4] += p[1 + i] * workspace.after[i]
+            count = bernstein.sign_changes(b, workspace.halves, row, watch.changed[:MOST])
         _keep_between(count, len(watch.zones) + k, watch)
 
 
 @helper
-def _set_places(step, problem, before, room, watch):
+def _set_places(step, problem, before, workspace, watch):
     """Fill ``watch.places`` for a step."""
     s, control = problem.system, problem.control
-    b, row = room.bound[0], room.bound[2]
+    b, row = workspace.bound[0], workspace.bound[2]
     levels = control.levels.shape[0]
-    for place in range(room.near.used[0]):
-        j, count = room.near.nodes[place], 0
+    for place in range(workspace.near.used[0]):
+        j, count = workspace.near.nodes[place], 0
         # Gaps over the levels of the normal law, and slip velocities either way where stick ends.
         for k in range(levels + 2):
             what, shift = GAP, 0.0
@@ -351,11 +352,11 @@ def _set_places(step, problem, before, room, watch):
                     what == SLIP and (s.memory[j] > 0 or s.rows.shape[1] > 2)) or (
                     count + MOST > len(watch.changed)):
                 continue
-            polynomial = StepPolynomial(what, j, shift, step, s, control.ground, room.polynomials,
-                                        row)
-            count += changes(b, polynomial, room.halves, watch.changed[count : count + MOST])
+            polynomial = StepPolynomial(what, j, shift, step, s, control.ground,
+                                        workspace.polynomials, row)
+            count += changes(b, polynomial, workspace.halves, watch.changed[count : count + MOST])
         _keep_between(count, j, watch)
-    set_own_places(before, room, watch)
+    set_own_places(before, workspace, watch)
 
 
 @helper
@@ -416,25 +417,26 @@ def _note_node(j, left, right, view, watch):
     _look(right, view)
 
 
-def _note_events(step, problem, progress, room, watch):
+def _note_events(step, problem, progress, workspace, watch):
     """Note the events of an accepted step; the part of it after which the run ends, or 2."""
-    view = _view(step, problem, progress, room)
+    view = _view(step, problem, progress, workspace)
     begun = watch.counts[FOUND]
     looks = _MORE_LOOKS if view.system.rows.shape[1] > 2 else _LOOKS
     for k in range(len(watch.own)):
         if watch.linear[k] == 0:
             looks = _MORE_LOOKS
-    _set_places(step, problem, progress.state, room, watch)
+    _set_places(step, problem, progress.state, workspace, watch)
     for look in range(looks):
         left, right = look / looks, (look + 1) / looks
         _look(right, view)
         for k in range(len(watch.own)):
             note_own(k, left, right, view, watch)
         # The others stay open.
-        for place in range(room.near.used[0]):
-            _note_node(room.near.nodes[place], left, right, view, watch)
+        for place in range(workspace.near.used[0]):
+            _note_node(workspace.near.nodes[place], left, right, view, watch)
     return first_stop(step, begun, watch)
 
 
 # By its address, so that it is not compiled into every step of runs that watch for nothing.
-note_events = compile_law(NOTE, "note_events(step, problem, progress, room, watch)", _note_events)
+note_events = compile_law(NOTE, "note_events(step, problem, progress, workspace, watch)",
+                          _note_events)

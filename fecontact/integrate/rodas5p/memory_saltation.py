@@ -36,12 +36,12 @@ def _passes_level(j, before, after, control):
 
 
 @routine
-def _touch(j, step, acceleration, problem, progress, room, vary, row):
+def _touch(j, step, acceleration, problem, progress, workspace, vary, row):
     """Rate e' and derivative to the parameter of what begins the force of node j in a step.
 
     Fills ``row`` with the derivatives of e to the motion of the node.
     """
-    s, v, y = problem.system, vary.variation, room.after
+    s, v, y = problem.system, vary.variation, workspace.after
     force, rates = v.inside.force[j], v.inside.rates[j]
     now = min(step.target, step.latest)
     moved, z = ground_motion(now, s), memory_of(j, y, s)
@@ -49,8 +49,8 @@ def _touch(j, step, acceleration, problem, progress, room, vary, row):
                          rates).contact
     own, _, contact = node_forces(j, node_motion(j, y, s), moved, z, s, force, rates)
     for k in range(len(row)):
-        row[k] = room.gradients_after.partial[j, 1, k]
-    rate = change_by(row, j, room.rate_after, s)
+        row[k] = workspace.gradients_after.partial[j, 1, k]
+    rate = change_by(row, j, workspace.rate_after, s)
     d = s.rows.shape[1]
     for tangent in range(d - 1):
         axis = 2 * tangent
@@ -77,7 +77,7 @@ def _touch(j, step, acceleration, problem, progress, room, vary, row):
 
 
 @routine
-def switch_memory(step, acceleration, problem, progress, room, vary):
+def switch_memory(step, acceleration, problem, progress, workspace, vary):
     """Set the columns of internal variables of nodes that are open at the end of a step.
 
     So are those of nodes that touch down in it. ``acceleration`` is that of the ground's motions.
@@ -86,14 +86,14 @@ def switch_memory(step, acceleration, problem, progress, room, vary):
     n, m = len(s.gap), len(v.none)
     states, columns = v.inside.rates.shape[1], len(v.columns)
     for j in range(n):
-        opened = room.nodes[2, n + j] == 0.0
+        opened = workspace.nodes[2, n + j] == 0.0
         if s.memory[j] == 0 or problem.control.slider_counts[j] > 0 or not (
                 opened or progress.signs[j] == 0):
             continue
         first, row = 2 * m + j * states, v.inside.partial[j, 1]
         rate, varied = 1.0, 0.0
         if not opened:
-            rate, varied = _touch(j, step, acceleration, problem, progress, room, vary, row)
+            rate, varied = _touch(j, step, acceleration, problem, progress, workspace, vary, row)
         for c in range(columns):
             earlier = 0.0
             if not opened:
@@ -103,5 +103,5 @@ def switch_memory(step, acceleration, problem, progress, room, vary):
                 earlier /= rate
             last = v.stages[tableau.STAGES * c + tableau.STAGES - 1]
             for k in range(first, first + s.memory[j]):
-                v.after[c, k] = earlier * room.rate_after[k] if not opened else 0.0
+                v.after[c, k] = earlier * workspace.rate_after[k] if not opened else 0.0
                 last[k] = 0.0

@@ -83,7 +83,7 @@ class Data(NamedTuple):
 
     problem: state.Problem
     progress: state.Progress
-    room: state.Room
+    workspace: state.Workspace
     output: state.Output
     kept: state.Output
     vary: Vary
@@ -93,20 +93,21 @@ class Data(NamedTuple):
 @routine
 def _begin(t, data):
     """Prepare the first step of a run."""
-    problem, progress, room, output, watch = (data.problem, data.progress, data.room,
-                                              data.output, data.watch)
+    problem, progress, workspace, output, watch = (data.problem, data.progress, data.workspace,
+                                                   data.output, data.watch)
     s, control = problem.system, problem.control
     after = np.nextafter(t, output.times[-1])
-    dynamics.set_given(after, s, room.given, room.load)
-    dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, room.given, room.load,
-                                    room.nodes, progress.gradients, progress.rate)
+    dynamics.set_given(after, s, workspace.given, workspace.load)
+    dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, workspace.given,
+                                    workspace.load, workspace.nodes, progress.gradients,
+                                    progress.rate)
     n = len(s.gap)
-    set_signs(room.nodes[2, n : 2 * n], progress.signs)
+    set_signs(workspace.nodes[2, n : 2 * n], progress.signs)
     if control.work:
         set_powers(after, progress.state, s, control.stick_speed, progress.power[:POWER_COUNT],
                    progress.power[POWER_COUNT:])
     if _watched(watch) or watch.counts[KINKS]:
-        begin(t, progress.state, s, control.depth, watch, room.scratch)
+        begin(t, progress.state, s, control.depth, watch, workspace.scratch)
     return RUNNING
 
 
@@ -115,7 +116,7 @@ def _resume(t, data):
     """Nodes and polynomials at the start of a step."""
     problem, progress = data.problem, data.progress
     set_ends(t, progress.state, problem.system, problem.blocks, problem.control.ground,
-             data.room.ends)
+             data.workspace.ends)
     progress.numbers[MISSED] = 0.0
 
 
@@ -138,15 +139,15 @@ def _aim(t, h, last, smallest, data):
     It does not go past a break. After one that has failed it ends at a kink of the forces that
     lies ahead.
     """
-    problem, progress, room = data.problem, data.progress, data.room
+    problem, progress, workspace = data.problem, data.progress, data.workspace
     s, control, numbers = problem.system, problem.control, progress.numbers
     end = data.output.times[-1]
     after = np.nextafter(t, end)
     if last <= ANEW:
         # Rates just after t: they may jump at a break.
-        dynamics.set_given(after, s, room.given, room.load)
-        moved = dynamics.motion_given(room.given)
-        choose_near(h, problem, progress, room)
+        dynamics.set_given(after, s, workspace.given, workspace.load)
+        moved = dynamics.motion_given(workspace.given)
+        choose_near(h, problem, progress, workspace)
     else:
         moved = ground_motion(after, s)
     stop, latest, is_break = next_stop(t, control.breaks, end)
@@ -156,7 +157,7 @@ def _aim(t, h, last, smallest, data):
         reach = max(target - t, limit)
         kink = dynamics.next_kink(progress.state, progress.rate, s, problem.blocks,
                                   progress.gradients, control.depth, control.slow, moved,
-                                  room.nodes, reach)
+                                  workspace.nodes, reach)
         # Nearer kinks would shrink the steps without end. They are left to the error control,
         # and so are kinks within rounding of this time.
         if max(1e-3 * limit, 100.0 * smallest) < kink < 0.9 * reach:
@@ -168,56 +169,58 @@ def _aim(t, h, last, smallest, data):
 
 
 @routine
-def _linearise(step, after_t, problem, progress, room):
+def _linearise(step, after_t, problem, progress, workspace):
     """Compute the derivatives that a step needs at its start besides the matrices."""
     s, later = problem.system, dynamics.soon(step)
     acceleration = dynamics.ground_acceleration(step.t, later,
-                                                dynamics.motion_given(room.given), s)
-    dynamics.set_load_rate(step.t, later, after_t, s, room.pull_rate)
-    dynamics.set_time_rate(s, room.near, room.given, acceleration, progress.gradients,
-                           room.pull_rate, room.nodes, room.time_rate)
+                                                dynamics.motion_given(workspace.given), s)
+    dynamics.set_load_rate(step.t, later, after_t, s, workspace.pull_rate)
+    dynamics.set_time_rate(s, workspace.near, workspace.given, acceleration, progress.gradients,
+                           workspace.pull_rate, workspace.nodes, workspace.time_rate)
     take_scales(problem.control, progress)
 
 
 @routine
-def _stages(step, G, problem, progress, room):
-    """Compute all stages of a step, and its end ``room.after``.
+def _stages(step, G, problem, progress, workspace):
+    """Compute all stages of a step, and its end ``workspace.after``.
 
     Returns True if a normal force has another sign at a stage than at the start.
     """
     s, blocks, switched = problem.system, problem.blocks, False
     size = len(progress.state)
-    m = len(room.load)
+    m = len(workspace.load)
     last, rise = step.t, 1.0 / step.h
-    tableau.begin_stages(progress.state, room.sums)
+    tableau.begin_stages(progress.state, workspace.sums)
     for i in range(tableau.STAGES):
         if i == 0:
             for k in range(size):
-                room.right[k] = progress.rate[k]
+                workspace.right[k] = progress.rate[k]
         else:
-            tableau.next_stage(i, rise, room.stages[i - 1], room.sums, room.stage, room.right)
+            tableau.next_stage(i, rise, workspace.stages[i - 1], workspace.sums, workspace.stage,
+                               workspace.right)
             now = min(step.t + tableau.NODES[i] * step.h, step.latest)
             if now != last:
-                dynamics.set_given(now, s, room.given, room.load)
+                dynamics.set_given(now, s, workspace.given, workspace.load)
                 last = now
-            set_stage_rate(problem, progress, room)
-            switched |= switches(room.near.used[0], room.near.nodes, room.nodes[2], progress.signs)
+            set_stage_rate(problem, progress, workspace)
+            switched |= switches(workspace.near.used[0], workspace.near.nodes, workspace.nodes[2],
+                                 progress.signs)
             for k in range(size):
-                room.right[k] += room.base[k]
+                workspace.right[k] += workspace.base[k]
         factor = tableau.TIME[i] * step.h
         if factor != 0.0:
             for k in range(m, size):
-                room.right[k] += factor * room.time_rate[k]
-        stage_solver.solve_stage(G, s, blocks, progress.gradients, room.reduced, room.right,
-                                 room.nodes, room.stages[i])
+                workspace.right[k] += factor * workspace.time_rate[k]
+        stage_solver.solve_stage(G, s, blocks, progress.gradients, workspace.reduced,
+                                 workspace.right, workspace.nodes, workspace.stages[i])
     for k in range(size):
-        room.after[k] = room.stage[k] + room.stages[tableau.STAGES - 1, k]
+        workspace.after[k] = workspace.stage[k] + workspace.stages[tableau.STAGES - 1, k]
     progress.counts[RATES] += tableau.STAGES
     return switched
 
 
 @routine
-def _solve(step, G, new, end, problem, progress, room):
+def _solve(step, G, new, end, problem, progress, workspace):
     """Compute a step; ``new`` if it is the first attempt from where it begins.
 
     Returns True if a normal force has another sign at a stage than at the start.
@@ -225,61 +228,62 @@ def _solve(step, G, new, end, problem, progress, room):
     s = problem.system
     memory = len(progress.state) > 2 * len(problem.control.largest)
     if new:
-        _linearise(step, np.nextafter(step.t, end), problem, progress, room)
+        _linearise(step, np.nextafter(step.t, end), problem, progress, workspace)
     if memory:
-        stage_solver.eliminate_memory(G, s, progress.gradients, room.reduced)
+        stage_solver.eliminate_memory(G, s, progress.gradients, workspace.reduced)
     if new or memory:
-        stage_solver.assemble(s, room.near, progress.gradients, room.reduced)
-    stage_solver.factorise_step(G, problem.blocks, room.reduced)
-    return _stages(step, G, problem, progress, room)
+        stage_solver.assemble(s, workspace.near, progress.gradients, workspace.reduced)
+    stage_solver.factorise_step(G, problem.blocks, workspace.reduced)
+    return _stages(step, G, problem, progress, workspace)
 
 
 @routine
-def _error_at_end(step, end, problem, progress, room):
+def _error_at_end(step, end, problem, progress, workspace):
     """Error of the state and of the slip velocities at the end of a step.
 
     Where the state is within its tolerance, its rates and gradients are evaluated too.
     """
-    error = state_error(problem.control, progress, room)
+    error = state_error(problem.control, progress, workspace)
     if error <= 1.0:
         if step.at_break:
-            dynamics.set_given(np.nextafter(step.target, end), problem.system, room.given,
-                               room.load)
-        set_end(problem, progress, room)
-        error = memory_error(slip_error(error, problem, progress, room), problem, progress, room)
+            dynamics.set_given(np.nextafter(step.target, end), problem.system, workspace.given,
+                               workspace.load)
+        set_end(problem, progress, workspace)
+        error = memory_error(slip_error(error, problem, progress, workspace), problem, progress,
+                             workspace)
     return error
 
 
 @routine
-def _switch_error(step, G, end, problem, progress, room):
+def _switch_error(step, G, end, problem, progress, workspace):
     """Error of a step in which a normal force begins or ends; what is known of the end stays."""
-    error = defect_error(step, G, problem, progress, room)
+    error = defect_error(step, G, problem, progress, workspace)
     if error <= 1.0:
         last = np.nextafter(step.target, end) if step.at_break else min(step.target, step.latest)
-        dynamics.set_given(last, problem.system, room.given, room.load)
-        set_end(problem, progress, room)
+        dynamics.set_given(last, problem.system, workspace.given, workspace.load)
+        set_end(problem, progress, workspace)
     return error
 
 
 @routine
-def _missed_part(step, smallest, problem, progress, room):
+def _missed_part(step, smallest, problem, progress, workspace):
     """Part of the step to which it has to be shortened, as its stages missed a force; 1 if none."""
     s, blocks, control = problem.system, problem.blocks, problem.control
     again = int(progress.numbers[MISSED])
-    if may_switch(step, problem, progress, room) and again < _MOST_AGAIN:
-        set_polynomials(s, blocks, control.ground, progress.state, room.after, room)
+    if may_switch(step, problem, progress, workspace) and again < _MOST_AGAIN:
+        set_polynomials(s, blocks, control.ground, progress.state, workspace.after, workspace)
         if needs_search(step.moved, step.h, s, control.ground, control.levels, control.slip_scale,
-                    room):
-            part = first_missed_at(control.missed)(step, again, problem, progress, room)
+                    workspace):
+            part = first_missed_at(control.missed)(step, again, problem, progress, workspace)
             if part * step.h > 100.0 * smallest and part < 1.0:
                 return part
     return 1.0
 
 
 @routine
-def _switch_part(step, smallest, problem, progress, room, watch):
+def _switch_part(step, smallest, problem, progress, workspace, watch):
     """Part of the step to which it has to be shortened, to end at a kink; 1 if there is none."""
-    part = next_switch(step, problem, progress, room, watch)
+    part = next_switch(step, problem, progress, workspace, watch)
     # A switch within rounding of a step end counts as lying on that end.
     near = max(1e-6 * step.h, 100.0 * smallest)
     if part * step.h > near and (1.0 - part) * step.h > near:
@@ -288,54 +292,56 @@ def _switch_part(step, smallest, problem, progress, room, watch):
 
 
 @helper
-def _refused(step, error, progress, room):
+def _refused(step, error, progress, workspace):
     """Outcome of a step whose error is too large, and the length of the next attempt."""
     progress.numbers[REJECTED_LAST] = 1.0
     progress.numbers[CAUTIOUS] = 0.0 if step.caution > 0.0 else step.h
     if not error < np.inf:
-        room.stages[:] = 0.0
+        workspace.stages[:] = 0.0
     return FAILED if error < np.inf else NOT_A_NUMBER, step.h * growth(root_of(error))
 
 
 @routine
 def _attempt(step, last, smallest, data):
     """Try a step; its outcome, and the length of the next one."""
-    problem, progress, room, vary, watch = (data.problem, data.progress, data.room, data.vary,
-                                            data.watch)
+    problem, progress, workspace, vary, watch = (data.problem, data.progress, data.workspace,
+                                                 data.vary, data.watch)
     control, numbers, end = problem.control, progress.numbers, data.output.times[-1]
     G = 1.0 / (step.h * tableau.GAMMA)
     if last == TAKEN and control.sliders != 0:
-        attend_at(control.sliders)(BEGIN, step, problem, progress, room, vary, step.t, room.right)
-    switched = _solve(step, G, last <= ANEW, end, problem, progress, room)
-    error = _error_at_end(step, end, problem, progress, room)
+        attend_at(control.sliders)(BEGIN, step, problem, progress, workspace, vary, step.t,
+                                   workspace.right)
+    switched = _solve(step, G, last <= ANEW, end, problem, progress, workspace)
+    error = _error_at_end(step, end, problem, progress, workspace)
     if error <= 1.0:
-        tableau.dense_coefficients(room.stages, room.dense)
-        part = _missed_part(step, smallest, problem, progress, room)
+        tableau.dense_coefficients(workspace.stages, workspace.dense)
+        part = _missed_part(step, smallest, problem, progress, workspace)
         if part < 1.0:
             numbers[MISSED] += 1.0
             return CUT, step.h * part
-        if switched or switches(len(problem.system.gap), problem.blocks.nodes, room.nodes[2],
+        if switched or switches(len(problem.system.gap), problem.blocks.nodes, workspace.nodes[2],
                                 progress.signs):
-            error = max(error, _switch_error(step, G, end, problem, progress, room))
+            error = max(error, _switch_error(step, G, end, problem, progress, workspace))
         if error <= 1.0 and control.work:
-            error = max(error, work_error(step, problem, progress, room))
+            error = max(error, work_error(step, problem, progress, workspace))
     if error <= 1.0:
         part = 1.0
         if control.sliders != 0:
-            part = attend_at(control.sliders)(SWITCH, step, problem, progress, room, vary, step.t,
-                                              room.right)
+            part = attend_at(control.sliders)(SWITCH, step, problem, progress, workspace, vary,
+                                              step.t, workspace.right)
             if part == 0.0:
                 return ANEW, step.h
         if part == 1.0 and watch.counts[KINKS]:
-            part = _switch_part(step, smallest, problem, progress, room, watch)
+            part = _switch_part(step, smallest, problem, progress, workspace, watch)
         if part < 1.0:
             return CUT, step.h * part
         if len(vary.variation.columns) > 0:
-            set_scale(control, progress, room)
-            error = max(error, propagate_at(vary.propagate)(step, problem, progress, room, vary)
+            set_scale(control, progress, workspace)
+            error = max(error, propagate_at(vary.propagate)(step, problem, progress, workspace,
+                                                            vary)
                         / vary.variation.tolerance)
     if not error <= 1.0:
-        return _refused(step, error, progress, room)
+        return _refused(step, error, progress, workspace)
     h = next_length(step.h, root_of(error), control.longest, numbers)
     numbers[MISSED] = 0.0
     if step.caution > 0.0:
@@ -346,28 +352,30 @@ def _attempt(step, last, smallest, data):
 @routine
 def _find_end(step, data):
     """Note the events of a step; the part of it after which the run ends."""
-    problem, progress, room, watch = data.problem, data.progress, data.room, data.watch
+    problem, progress, workspace, watch = data.problem, data.progress, data.workspace, data.watch
     s, control = problem.system, problem.control
     if _watched(watch):
-        set_polynomials(s, problem.blocks, control.ground, progress.state, room.after, room)
-        return note_events_at(watch.note)(step, problem, progress, room, watch)
+        set_polynomials(s, problem.blocks, control.ground, progress.state, workspace.after,
+                        workspace)
+        return note_events_at(watch.note)(step, problem, progress, workspace, watch)
     if watch.counts[KINKS]:
-        begin(min(step.target, step.latest), room.after, s, control.depth, watch, room.scratch)
+        begin(min(step.target, step.latest), workspace.after, s, control.depth, watch,
+              workspace.scratch)
     return BEYOND
 
 
 @routine
 def _close(step, writes, data):
     """Keep the columns of a step, and write them if an output is in it."""
-    problem, progress, room, vary = data.problem, data.progress, data.room, data.vary
+    problem, progress, workspace, vary = data.problem, data.progress, data.workspace, data.vary
     control, variation = problem.control, vary.variation
     if len(variation.columns) > 0:
         keep(variation)
         if writes and control.sliders != 0:
-            attend_at(control.sliders)(END, step, problem, progress, room, vary, step.t,
-                                       room.right)
+            attend_at(control.sliders)(END, step, problem, progress, workspace, vary, step.t,
+                                       workspace.right)
     if control.work:
-        set_creeps(step, problem, progress, room)
+        set_creeps(step, problem, progress, workspace)
     if writes and len(variation.columns) > 0:
         write_columns(variation, vary.transitions[progress.counts[OUTPUTS]])
         restart_columns(variation)
@@ -376,26 +384,26 @@ def _close(step, writes, data):
 @routine
 def _fill(row, output, step, data):
     """Fill a row of the output."""
-    problem, progress, room, vary = data.problem, data.progress, data.room, data.vary
+    problem, progress, workspace, vary = data.problem, data.progress, data.workspace, data.vary
     time = output.times[row]
     part = (time - step.t) / step.h
-    tableau.interpolated(part, progress.state, room.after, room.dense, output.states[row])
+    tableau.interpolated(part, progress.state, workspace.after, workspace.dense, output.states[row])
     if problem.control.sliders != 0:
-        attend_at(problem.control.sliders)(OUTPUT, step, problem, progress, room, vary,
+        attend_at(problem.control.sliders)(OUTPUT, step, problem, progress, workspace, vary,
                                            min(time, step.latest), output.states[row])
     if problem.control.work:
-        work_until(part, step.h, progress.work, room, output.work[row])
+        work_until(part, step.h, progress.work, workspace, output.work[row])
 
 
 @routine
 def _stop_at(part, step, data):
     """End the run at a part of the step."""
-    progress, room = data.progress, data.room
+    progress, workspace = data.progress, data.workspace
     if data.problem.control.work:
-        work_until(part, step.h, progress.work, room, progress.work)
-    tableau.interpolated(part, progress.state, room.after, room.dense, room.right)
+        work_until(part, step.h, progress.work, workspace, progress.work)
+    tableau.interpolated(part, progress.state, workspace.after, workspace.dense, workspace.right)
     for k in range(len(progress.state)):
-        progress.state[k] = room.right[k]
+        progress.state[k] = workspace.right[k]
 
 
 @helper
@@ -412,32 +420,33 @@ def add_jump(step, state, problem, progress, output):
 @routine
 def _go_on(step, h, data):
     """Make the end of the step the state of the run."""
-    problem, progress, room, output = data.problem, data.progress, data.room, data.output
+    problem, progress, workspace, output = data.problem, data.progress, data.workspace, data.output
     if problem.control.work:
-        work_until(1.0, step.h, progress.work, room, progress.work)
+        work_until(1.0, step.h, progress.work, workspace, progress.work)
         if step.at_break:
-            set_powers(np.nextafter(step.target, output.times[-1]), room.after, problem.system,
+            set_powers(np.nextafter(step.target, output.times[-1]), workspace.after, problem.system,
                        problem.control.stick_speed, progress.power[:POWER_COUNT],
                        progress.power[POWER_COUNT:])
-            add_jump(step, room.after, problem, progress, output)
+            add_jump(step, workspace.after, problem, progress, output)
         else:
             for k in range(len(progress.power)):
-                progress.power[k] = room.power[3, k]
+                progress.power[k] = workspace.power[3, k]
     for k in range(len(progress.state)):
-        progress.state[k] = room.after[k]
-        progress.rate[k] = room.rate_after[k]
+        progress.state[k] = workspace.after[k]
+        progress.rate[k] = workspace.rate_after[k]
     n = len(problem.system.gap)
-    set_signs(room.nodes[2, n : 2 * n], progress.signs)
+    set_signs(workspace.nodes[2, n : 2 * n], progress.signs)
     # Gradients of nodes that are not near stay zero.
-    dynamics.copy_gradients(room.gradients_after, progress.gradients, room.near)
-    keep_ends(n, room)
+    dynamics.copy_gradients(workspace.gradients_after, progress.gradients, workspace.near)
+    keep_ends(n, workspace)
     return RUNNING, h
 
 
 METHOD = Method("rodas5p", Data, _aim, _attempt, _fill, _go_on, _begin, _resume, _close, _full,
                 _find_end, _stop_at, places=2)
 advance = step_loop(METHOD)
-SMALL = Sized(partial(step_loop, METHOD), (state.Problem, state.Progress, state.Room, state.Output),
+SMALL = Sized(partial(step_loop, METHOD), (state.Problem, state.Progress, state.Workspace,
+                                           state.Output),
               more=lambda modes, nodes: {Variation: {"columns": (0, None)}})
 
 

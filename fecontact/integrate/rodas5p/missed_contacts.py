@@ -26,7 +26,7 @@ from fecontact.integrate.step_polynomials import (
 from fecontact.system.node_forces import normal_force, plane_friction
 
 _MISSED = Callable[[
-    run_arrays.Step, int, run_arrays.Problem, run_arrays.Progress, run_arrays.Room,
+    run_arrays.Step, int, run_arrays.Problem, run_arrays.Progress, run_arrays.Workspace,
 ], float]
 first_missed_at = function_at(_MISSED)
 
@@ -111,7 +111,7 @@ def _normal_force(place, polynomial, height):
     return abs(_push(polynomial.node, -at(place, height, gap), 0.0, s))
 
 
-def _first_missed(step, again, problem, progress, room):
+def _first_missed(step, again, problem, progress, workspace):
     """Part of the step at which to end it because of what it did not feel; 2 if there is nothing.
 
     It is the earliest such place of all nodes: just past the begin of the stretch, or, when this
@@ -119,20 +119,20 @@ def _first_missed(step, again, problem, progress, room):
     largest.
     """
     s, blocks, control = problem.system, problem.blocks, problem.control
-    levels, places = control.levels, room.places
-    b, height, row = room.bound[0], room.bound[1], room.bound[2]
+    levels, places = control.levels, workspace.places
+    b, height, row = workspace.bound[0], workspace.bound[1], workspace.bound[2]
     n = len(s.gap)
     first = 2.0
     for column in range(2 * n):
         what, j = (SLIP, column) if column < n else (GAP, column - n)
-        if room.polynomials[SEARCH, column] == 0.0 or (
+        if workspace.polynomials[SEARCH, column] == 0.0 or (
                 what == SLIP and (s.memory[j] > 0 or s.rows.shape[1] > 2)):
             continue
         for level in range(levels.shape[0] if what == GAP else 1):
             shift = levels[level, j] if what == GAP else 0.0
-            polynomial = StepPolynomial(what, j, shift, step, s, control.ground, room.polynomials,
-                                        row)
-            found = changes(b, polynomial, room.halves, places)
+            polynomial = StepPolynomial(what, j, shift, step, s, control.ground,
+                                        workspace.polynomials, row)
+            found = changes(b, polynomial, workspace.halves, places)
             for k in range(found + 1):
                 begin = places[k - 1] if k > 0 else 0.0
                 end = places[k] if k < found else 1.0
@@ -156,5 +156,5 @@ def _first_missed(step, again, problem, progress, room):
 
 
 # By its address: few steps need it, and it need not be compiled into all.
-first_missed = compile_law(_MISSED, "first_missed(step, again, problem, progress, room)",
+first_missed = compile_law(_MISSED, "first_missed(step, again, problem, progress, workspace)",
                            _first_missed)

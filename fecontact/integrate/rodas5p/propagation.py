@@ -12,13 +12,13 @@ from fecontact.integrate.small_systems import USUAL, Sized, Values, is_small, si
 
 
 def open_nodes(modes: int, nodes: int) -> Values:
-    """Gradients of any number of nodes: of all, or in the room for those of each of them."""
+    """Gradients of any number of nodes: of all, or in a workspace for those of each of them."""
     known = shapes(sizes_of(modes, nodes), dynamics.Gradients)[dynamics.Gradients]
     return {dynamics.Gradients: {name: (None, *shape[1:]) for name, shape in known.items()
                                  if name != "polynomial"}}
 
 
-RECORDS = (state.Problem, state.Progress, state.Room, state.Output, Variation)
+RECORDS = (state.Problem, state.Progress, state.Workspace, state.Output, Variation)
 SMALL = Sized(propagate.for_values, RECORDS, USUAL, open_nodes, lambda nodes: {DIRECTIONS: 4})
 
 

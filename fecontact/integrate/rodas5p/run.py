@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.types import Array
-from fecontact.integrate.collocation.room import JACOBIANS, Collocation
+from fecontact.integrate.collocation.workspace import JACOBIANS, Collocation
 from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.integrate.rodas5p.method import Data, advance_for
-from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Room
+from fecontact.integrate.rodas5p.state import Output, Problem, Progress, Workspace
 from fecontact.integrate.rodas5p.variational import Vary
 from fecontact.integrate.series.branches import Series
 from fecontact.integrate.step_runs import StepRun
@@ -45,7 +45,7 @@ class Run(StepRun):
 
     problem: Problem
     progress: Progress
-    room: Room
+    workspace: Workspace
     output: Output
     kept: Output
     variation: Vary
@@ -100,12 +100,12 @@ class Run(StepRun):
         elif self.collocation is not None:
             from fecontact.integrate.collocation import method as by_collocation
 
-            data = by_collocation.Data(self.problem, self.progress, self.room, self.output,
+            data = by_collocation.Data(self.problem, self.progress, self.workspace, self.output,
                                        self.kept, self.collocation, self.variation)
             nodes, _, modes = self.problem.system.rows.shape
             loop = by_collocation.SMALL.of(modes, nodes)
         else:
-            data = Data(self.problem, self.progress, self.room, self.output, self.kept,
+            data = Data(self.problem, self.progress, self.workspace, self.output, self.kept,
                         self.variation, self.watch)
             loop = advance_for(self.problem, self.variation)
         return partial(loop, data)

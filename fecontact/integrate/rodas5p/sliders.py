@@ -30,7 +30,7 @@ from fecontact.system.elastic_sliders import (
     return_deflection,
     return_to_limits,
 )
-from fecontact.system.node_forces import force_room, normal_force
+from fecontact.system.node_forces import force_workspace, normal_force
 from fecontact.system.nodes import (
     change_by,
     ground_motion,
@@ -41,7 +41,7 @@ from fecontact.system.nodes import (
 )
 
 _ATTEND = Callable[[
-    int, state.Step, state.Problem, state.Progress, state.Room, Vary, float, Vector,
+    int, state.Step, state.Problem, state.Progress, state.Workspace, Vary, float, Vector,
 ], float]
 attend_at = function_at(_ATTEND)
 
@@ -75,7 +75,7 @@ class View(NamedTuple):
     step: state.Step
     problem: state.Problem
     progress: state.Progress
-    room: state.Room
+    workspace: state.Workspace
     y: Vector
     force: Vector
     rates: Matrix
@@ -84,13 +84,13 @@ class View(NamedTuple):
 @routine
 def _look(part, view):
     """Put the state at a part of the step into ``view.y``; returns the motion of the ground."""
-    step, before, room, y = view.step, view.progress.state, view.room, view.y
+    step, before, workspace, y = view.step, view.progress.state, view.workspace, view.y
     if part == 0.0:
         y[:] = before
     elif part == 1.0:
-        y[:] = room.after
+        y[:] = workspace.after
     else:
-        tableau.interpolated(part, before, room.after, room.dense, y)
+        tableau.interpolated(part, before, workspace.after, workspace.dense, y)
     return ground_motion(min(step.t + part * step.h, step.latest), view.problem.system)
 
 
@@ -220,21 +220,22 @@ def _begin_contact(
 
 
 @routine
-def _set_rates(after_t, problem, progress, room):
+def _set_rates(after_t, problem, progress, workspace):
     """Set the rates and gradients of the state after its deflections have changed."""
     s = problem.system
-    dynamics.set_given(after_t, s, room.given, room.load)
-    dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, room.given, room.load,
-                                    room.nodes, progress.gradients, progress.rate)
+    dynamics.set_given(after_t, s, workspace.given, workspace.load)
+    dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, workspace.given,
+                                    workspace.load, workspace.nodes, progress.gradients,
+                                    progress.rate)
 
 
 @routine
-def _after_touch(step, t, problem, progress, room, vary):
+def _after_touch(step, t, problem, progress, workspace, vary):
     """Set the deflections of contacts that closed at the end of the last step, at the time t."""
     s, control, changed = problem.system, problem.control, False
     near = _NEAR_VARIED if len(vary.variation.columns) > 0 else _NEAR
     earlier = _PAST * max(near * progress.numbers[LAST_STEP], _BRIEFEST * abs(t))
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     moved = ground_motion(t, s)
     acceleration = dynamics.ground_acceleration(step.t, dynamics.soon(step), moved, s)
     for j in range(len(control.slider_counts)):
@@ -247,7 +248,7 @@ def _after_touch(step, t, problem, progress, room, vary):
             changed |= _begin_contact(j, since, through, acceleration, t, problem, progress, vary,
                                       force, rates)
     if changed:
-        _set_rates(t, problem, progress, room)
+        _set_rates(t, problem, progress, workspace)
 
 
 @routine
@@ -325,13 +326,13 @@ def _return_one(j, i, within, t, y, g, problem, vary, force, rates):
 
 
 @routine
-def _switch(step, problem, progress, room, vary):
+def _switch(step, problem, progress, workspace, vary):
     s, control = problem.system, problem.control
     n, varies = len(control.slider_counts), len(vary.variation.columns) > 0
     states = s.memory.max()
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     y = np.empty(len(progress.state))
-    view = View(step, problem, progress, room, y, force, rates)
+    view = View(step, problem, progress, workspace, y, force, rates)
     found, places = np.empty((3, n, states)), np.full((n, states), 2.0)
     pushing, starts = np.zeros((3, n)), np.full((n, states), -1.0)
     at_once = np.zeros((n, states), dtype=np.bool_)
@@ -418,51 +419,53 @@ def _switch(step, problem, progress, room, vary):
                 again = True
     if not again:
         return 1.0
-    _set_rates(after_t, problem, progress, room)
+    _set_rates(after_t, problem, progress, workspace)
     return 0.0
 
 
 @routine
-def _at_end(step, problem, progress, room, vary):
+def _at_end(step, problem, progress, workspace, vary):
     """Return the state at the end of the step to its limits, with its derivatives."""
     s, control = problem.system, problem.control
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     y = np.empty(len(progress.state))
-    earlier = _look(1.0 - _NEAR_VARIED, View(step, problem, progress, room, y, force, rates))
+    earlier = _look(1.0 - _NEAR_VARIED, View(step, problem, progress, workspace, y, force, rates))
     now = ground_motion(step.latest, s)
     for j in range(len(control.slider_counts)):
         if control.slider_counts[j] == 0:
             continue
         _, before, _ = pressing_at(j, y, earlier, s, force, rates)
-        _, after, _ = pressing_at(j, room.after, now, s, force, rates)
+        _, after, _ = pressing_at(j, workspace.after, now, s, force, rates)
         # Where the force jumps, slip ends at the begin of the next step.
         if before < 0.5 * after:
             continue
         for i in range(control.slider_counts[j]):
-            _return_one(j, i, False, step.latest, room.after, room.gradients_after,
+            _return_one(j, i, False, step.latest, workspace.after, workspace.gradients_after,
                         problem, vary, force, rates)
-    dynamics.set_rate_and_gradients(room.after, s, problem.blocks, room.given, room.load,
-                                    room.nodes, room.gradients_after, room.rate_after)
+    dynamics.set_rate_and_gradients(workspace.after, s, problem.blocks, workspace.given,
+                                    workspace.load, workspace.nodes, workspace.gradients_after,
+                                    workspace.rate_after)
 
 
-def _attend(kind, step, problem, progress, room, vary, t, y):
+def _attend(kind, step, problem, progress, workspace, vary, t, y):
     """Part of the step until slip ends, 0 if it was to end at its start, 1 if it does not.
 
     Or fill in what ``kind`` asks for: ``y`` at the time t, or the end of the step, within limits,
     or its start after a touch.
     """
     if kind == SWITCH:
-        return _switch(step, problem, progress, room, vary)
+        return _switch(step, problem, progress, workspace, vary)
     if kind == END:
-        _at_end(step, problem, progress, room, vary)
+        _at_end(step, problem, progress, workspace, vary)
         return 1.0
     if kind == BEGIN:
-        _after_touch(step, np.nextafter(t, np.inf), problem, progress, room, vary)
+        _after_touch(step, np.nextafter(t, np.inf), problem, progress, workspace, vary)
         return 1.0
     s = problem.system
-    return_to_limits(t, y, s, problem.control.slider_counts, *force_room(s))
+    return_to_limits(t, y, s, problem.control.slider_counts, *force_workspace(s))
     return 1.0
 
 
 # By its address: only systems with such elements need it.
-attend = compile_law(_ATTEND, "attend(kind, step, problem, progress, room, vary, t, y)", _attend)
+attend = compile_law(_ATTEND, "attend(kind, step, problem, progress, workspace, vary, t, y)",
+                     _attend)

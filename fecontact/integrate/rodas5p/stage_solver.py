@@ -44,7 +44,7 @@ class Reduced(NamedTuple):
     pivots: Annotated[Integers, MODES]
     inverse: Annotated[Array, NODES, MEMORY, MEMORY]
     weights: Annotated[Array, NODES, (AXES - 1) * MEMORY]
-    room: Annotated[Array, MODES]
+    workspace: Annotated[Array, MODES]
     coefficients: Annotated[Array, 2 * AXES, AXES * NODES]
     answers: Annotated[Array, 2 * MODES, AXES * NODES]
     solver: Matrix
@@ -200,7 +200,7 @@ def products(a, b, out):
 def set_answers(blocks, g, w, answers):
     """Fill the answers of the node forces to the motion of each mode, (2 m, 2 n) or (2 m, 3 n).
 
-    ``g`` are the Gradients, ``w`` holds the weights and room for coefficients.
+    ``g`` are the Gradients, ``w`` holds the weights and workspace for coefficients.
     """
     shapes = blocks.shapes
     m, n, d = len(shapes), len(g.partial), g.partial.shape[2] // 2
@@ -303,7 +303,7 @@ def factorise_step(G, blocks, w):
 def set_solver(G, blocks, w, out):
     """Fill out (m, 2 m), which makes u_v of a right side: the factors' F^-1 [Jq, G I]."""
     m = len(w.pivots)
-    x = w.room
+    x = w.workspace
     for c in range(m):
         for i in range(m):
             x[i] = 0.0
@@ -326,7 +326,7 @@ def solve_stage(G, s, blocks, g, w, r, motion, out):
     shapes = blocks.shapes
     m, n, d = len(shapes), len(g.partial), g.partial.shape[2] // 2
     states = w.inverse.shape[1]
-    x = w.room
+    x = w.workspace
     if m <= _FEW and states == 0:
         part = 1.0 / G
         for i in range(m):

@@ -172,7 +172,7 @@ class Output(NamedTuple):
     work: Annotated[Array, ANY, WORKS]
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Workspace of a run.
 
     ``near`` are the blocks of the nodes that may touch, ``clearance`` (n + 1,) how far all nodes
@@ -217,16 +217,16 @@ class Room(NamedTuple):
     sums: Annotated[Array, 2, SIZE, tableau.STAGES]
 
 
-def room_for(
+def workspace_for(
     modes: int, nodes: int, states: int, dimension: int, blocks: Blocks, combinations: int = 0,
-) -> Room:
+) -> Workspace:
     """Workspace for a system of so many modes, contact nodes and internal variables per node.
 
     ``combinations`` is the number D of :mod:`fecontact.system.polynomial_forces`.
     """
     return allocate(
-        Room, {MODES: modes, NODES: nodes, MEMORY: states, AXES: dimension,
-               COMBINATIONS: combinations},
+        Workspace, {MODES: modes, NODES: nodes, MEMORY: states, AXES: dimension,
+                    COMBINATIONS: combinations},
         near=near_blocks(blocks),
         reduced=stage_solver.reduced_for(modes, nodes, states, dimension))
 

@@ -274,17 +274,17 @@ def _leave_turns(y, progress, s, counts, here, inside):
 @kernel(by_address=True)
 def propagate(
     step: run_arrays.Step, problem: run_arrays.Problem, progress: run_arrays.Progress,
-    room: run_arrays.Room, vary: Vary,
+    workspace: run_arrays.Workspace, vary: Vary,
 ) -> float:
-    """Carry the columns over the step whose stages and factors the room holds.
+    """Carry the columns over the step whose stages and factors the workspace holds.
 
     Returns the largest error of a column relative to its size, or to ``error_floor`` times its
-    largest size so far. ``room.right`` (size,) holds the units of the state. Columns of a parameter
-    that are still smaller than ``least`` count as if they had that size.
+    largest size so far. ``workspace.right`` (size,) holds the units of the state. Columns of a
+    parameter that are still smaller than ``least`` count as if they had that size.
     """
     s, blocks, v = problem.system, problem.blocks, vary.variation
-    state, gradients, reduced, stages = (progress.state, progress.gradients, room.reduced,
-                                         room.stages)
+    state, gradients, reduced, stages = (progress.state, progress.gradients, workspace.reduced,
+                                         workspace.stages)
     size = len(state)
     m = len(v.none)
     Y, forced = v.vectors[0], v.vectors[3]
@@ -295,7 +295,7 @@ def propagate(
     acceleration = dynamics.ground_acceleration(step.t, dynamics.soon(step), step.moved, s)
     columns.learn(gradients, v.usual)
     columns.set_paths(step, acceleration, s, blocks, stages, v)
-    columns.set_bends(step, acceleration, problem, progress, room, v)
+    columns.set_bends(step, acceleration, problem, progress, workspace, v)
     if varies:
         _begin_parameter(step, progress, blocks, vary)
     moved, last = step.moved, step.t
@@ -330,11 +330,11 @@ def propagate(
         else:
             columns.all_at_once(i, step.h, G, s, blocks, reduced, forced, varies, v)
     if size > 2 * m:
-        switch_memory(step, acceleration, problem, progress, room, vary)
+        switch_memory(step, acceleration, problem, progress, workspace, vary)
     if sliders:
         moved = ground_motion(min(step.target, step.latest), s)
-        widen_scales(moved, room.after, s, counts, force, rates, room.right)
-    return _largest_error(room.right, v)
+        widen_scales(moved, workspace.after, s, counts, force, rates, workspace.right)
+    return _largest_error(workspace.right, v)
 
 
 @helper
@@ -387,7 +387,7 @@ def _set_accelerations(t, Y, blocks, vary, out):
 @kernel(by_address=True)
 def propagate_in_parts(
     step: run_arrays.Step, problem: run_arrays.Problem, progress: run_arrays.Progress,
-    room: run_arrays.Room, vary: Vary,
+    workspace: run_arrays.Workspace, vary: Vary,
 ) -> float:
     """Carry the columns as :func:`propagate`, by collocation in parts of the step.
 
@@ -396,7 +396,7 @@ def propagate_in_parts(
     """
     s, blocks, v = problem.system, problem.blocks, vary.variation
     count, size = v.columns.shape
-    m, scale, varies = len(v.none), room.right, vary.width != 0.0
+    m, scale, varies = len(v.none), workspace.right, vary.width != 0.0
     Y = v.vectors[0]
     x = np.empty((size, count))
     for c in range(count):
@@ -407,7 +407,7 @@ def propagate_in_parts(
     if varies:
         dynamics.project(blocks, progress.state, v.nodes[0], v.nodes[1])
         _set_accelerations(np.nextafter(step.t, np.inf), progress.state, blocks, vary, forced[0])
-    parts, expected = _parts(step, scale, x, forced, room.reduced.J, v)
+    parts, expected = _parts(step, scale, x, forced, workspace.reduced.J, v)
     if expected > v.tolerance:
         return expected
     answers = v.answers[: 2 * m]
@@ -415,9 +415,9 @@ def propagate_in_parts(
         for i in range(collocation.STAGES):
             place = (part + collocation.NODES[i]) / parts
             now = min(step.t + place * step.h, step.latest)
-            tableau.interpolated(place, progress.state, room.after, room.dense, Y)
+            tableau.interpolated(place, progress.state, workspace.after, workspace.dense, Y)
             dynamics.set_gradients(Y, s, blocks, ground_motion(now, s), v.nodes, v.inside)
-            columns.set_derivatives(s, blocks, v.inside, room.reduced, answers, J[i])
+            columns.set_derivatives(s, blocks, v.inside, workspace.reduced, answers, J[i])
             if varies:
                 _set_accelerations(now, Y, blocks, vary, forced[i])
         collocation.collocate(step.h / parts, J, forced, x)

@@ -190,14 +190,14 @@ def _set_bend(j, row, factor, forward, here, v):
 
 
 @routine
-def set_bends(step, acceleration, problem, progress, room, v):
+def set_bends(step, acceleration, problem, progress, workspace, v):
     """Fill v.bends, whose row D_k n + j is how the gradients of node j change along direction k.
 
     Where no stage moves a node along it, or nothing depends on it, v.paths becomes zero instead.
     """
     s, blocks, control = problem.system, problem.blocks, problem.control
     n, motions = len(s.gap), v.inside.partial.shape[2]
-    w, between, z = v.nodes, room.between, v.vectors[0]
+    w, between, z = v.nodes, workspace.between, v.vectors[0]
     dynamics.project(blocks, progress.state, w[0], w[1])
     dynamics.project(blocks, progress.rate, between[0], between[1])
     even = control.ground[STEEPEST] == 0.0 and s.friction_scale == 0
@@ -289,7 +289,7 @@ def _products(a, b, out):
 def set_derivatives(s, blocks, g, reduced, answers, out):
     """Fill out (m, 2 m) with [Jq, Jv], the derivatives of the accelerations, by gradients g.
 
-    For systems without internal variables; ``answers`` (2 m, d n) is room.
+    For systems without internal variables; ``answers`` (2 m, d n) is workspace.
     """
     m = len(out)
     stage_solver.set_answers(blocks, g, reduced, answers)

@@ -65,7 +65,7 @@ class Series(NamedTuple):
         these forces.
     powers : (5, n + 1) array
         Coefficients of the powers, then of their integrals.
-    line, room : (3, l), (d, n + 1) arrays
+    line, workspace : (3, l), (d, n + 1) arrays
         Work arrays; l is n + 1, or the number of nodes where that is more.
     """
 
@@ -92,7 +92,7 @@ class Series(NamedTuple):
     pull: Annotated[Array, MODES, COEFFICIENTS]
     powers: Annotated[Array, SERIES_POWERS, COEFFICIENTS]
     line: Matrix
-    room: Matrix
+    workspace: Matrix
 
 
 def chosen_series(
@@ -139,7 +139,7 @@ def _tables(
         longest=np.inf if max_step is None else float(max_step),
         tolerance=max(_PART * rtol, _ROUNDING), states=_first_states(system, pieces, state),
         signal=np.zeros((len(parts) if work else 0, COEFFICIENTS)),
-        line=np.zeros((3, max(COEFFICIENTS, n))), room=np.zeros((DEPTH + 3, COEFFICIENTS)))
+        line=np.zeros((3, max(COEFFICIENTS, n))), workspace=np.zeros((DEPTH + 3, COEFFICIENTS)))
 
 
 def from_state(series: Series, system: ContactSystem, state: Array) -> Series:

@@ -192,7 +192,7 @@ def _first_switch(limit, h, series):
             if what == met:
                 # Zero within rounding: it has just been passed.
                 line[0] = 0.0
-            part = first_zero(line, min(first, limit), series.room)
+            part = first_zero(line, min(first, limit), series.workspace)
             if part <= limit and part < first:
                 first, node, meets = part, j, what
     return first, node, meets

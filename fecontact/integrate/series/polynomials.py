@@ -101,12 +101,12 @@ def _only_zero(c, b, low, width, size):
 
 
 @routine
-def first_zero(p, limit, room):
+def first_zero(p, limit, workspace):
     """The first zero of p from above within 0 < x <= limit, or 2 ``limit`` if there is none.
 
-    Zero at once where p begins negative. ``room`` (DEPTH + 3, n + 1) is to work in.
+    Zero at once where p begins negative. ``workspace`` (DEPTH + 3, n + 1) is to work in.
     """
-    c, b, half = room[DEPTH], room[DEPTH + 1], room[DEPTH + 2]
+    c, b, half = workspace[DEPTH], workspace[DEPTH + 1], workspace[DEPTH + 2]
     power, below, size = 1.0, 0.0, 0.0
     for k in range(COEFFICIENTS):
         c[k] = p[k] * power
@@ -132,7 +132,7 @@ def first_zero(p, limit, room):
                 least = min(least, b[i])
             if depth < _DEEPEST:
                 # The right half waits in the row of its depth.
-                _apply(_RIGHT, b, room[depth])
+                _apply(_RIGHT, b, workspace[depth])
                 _apply(_LEFT, b, half)
                 for i in range(len(b)):
                     b[i] = half[i]
@@ -151,4 +151,4 @@ def first_zero(p, limit, room):
             return 2.0 * limit
         waiting &= ~(1 << depth)
         for i in range(COEFFICIENTS):
-            b[i] = room[depth - 1, i]
+            b[i] = workspace[depth - 1, i]

@@ -127,12 +127,12 @@ class FunctionField(VectorField):
         if not (states or len(active)):
             return f, J, P, wrong
         places = kernels.Places(t, x, f, values, scales, self._sizes, active, states)
-        room = kernels.room_for(d, len(values))
+        workspace = kernels.workspace_for(d, len(values))
         if self._complex is None:
-            kernels.differences(address, places, room, J, P)
+            kernels.differences(address, places, workspace, J, P)
         else:
-            kernels.complex_steps(address, self._complex.address, places, room,
-                                  kernels.complex_room_for(d, len(values)), J, P, wrong)
+            kernels.complex_steps(address, self._complex.address, places, workspace,
+                                  kernels.complex_workspace_for(d, len(values)), J, P, wrong)
         return f, J, P, wrong
 
     def rough_derivatives(
@@ -154,7 +154,7 @@ class FunctionField(VectorField):
                                 self._jacobian is None)
         if self._complex is not None and not self._was_wrong:
             kernels.unchecked_complex_steps(self._complex.address, places,
-                                            kernels.complex_room_for(d, len(values)), J, P)
+                                            kernels.complex_workspace_for(d, len(values)), J, P)
             if np.isfinite(J.sum() + P.sum()):
                 return f, J, P
         if step is None:

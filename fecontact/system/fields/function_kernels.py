@@ -79,7 +79,7 @@ class Place(NamedTuple):
     f: Array
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Workspace for one place; ``best`` and ``error`` (d,) are results of differences."""
 
     y: Vector
@@ -93,19 +93,19 @@ class Room(NamedTuple):
 
 
 @helper
-def _extrapolated(function, place, moved, at, size, room):
-    """Fill ``room.best`` with the derivative to ``moved[at]``, an entry of y or q of the place.
+def _extrapolated(function, place, moved, at, size, workspace):
+    """Fill ``workspace.best`` with the derivative to ``moved[at]``, an entry of the place's y or q.
 
     Central differences over steps h that are halved again and again, extrapolated to order six.
     The error is the change from order four to order six, and rounding; the step with the least
-    counts, for each rate, and is kept in ``room.orders[3]``. What lies between x - h and x + h is
-    seen by f at x: a second difference that does not fall with h^2 shows a function that changes
+    counts, for each rate, and is kept in ``workspace.orders[3]``. What lies between x - h and x + h
+    is seen by f at x: a second difference that does not fall with h^2 shows a function that changes
     over less than h. Once a rate has converged, stop at the first step at which its error grows:
     over shorter ones only rounding is seen, and none at all where it keeps f from changing.
     """
     t, y, q, f = place
-    above, below, orders, best, error = (room.above, room.below, room.orders, room.best,
-                                         room.error)
+    above, below, orders, best, error = (workspace.above, workspace.below, workspace.orders,
+                                         workspace.best, workspace.error)
     value, h = moved[at], _WIDEST * size
     for i in range(len(f)):
         best[i], error[i], orders[4, i] = np.nan, np.inf, 0.0
@@ -146,8 +146,8 @@ def _extrapolated(function, place, moved, at, size, room):
 
 
 @helper
-def _roughness(function, place, moved, at, size, room):
-    """Fill ``room.orders[0]`` with how much the rates jump beside x.
+def _roughness(function, place, moved, at, size, workspace):
+    """Fill ``workspace.orders[0]`` with how much the rates jump beside x.
 
     That is their rounding, cancellation included. It shows in second differences over steps, 1e-6
     and less, over which the function is straight. Rates that hardly depend on the value, and are
@@ -156,7 +156,7 @@ def _roughness(function, place, moved, at, size, room):
     states and parameters tell what may cancel.
     """
     t, y, q = place.t, place.y, place.q
-    above, below, orders = room.above, room.below, room.orders
+    above, below, orders = workspace.above, workspace.below, workspace.orders
     value, h = moved[at], _WIDEST * size
     for i in range(len(above)):
         orders[0, i] = 0.0
@@ -198,11 +198,11 @@ def _roughness(function, place, moved, at, size, room):
 
 
 @helper
-def _correct(function, place, moved, at, size, room):
-    """Put differences into ``room.column`` where the complex step is wrong; True if it is."""
+def _correct(function, place, moved, at, size, workspace):
+    """Put differences into ``workspace.column`` where the complex step is wrong; True if it is."""
     t, y, q, f = place
-    above, below, best, error, column = (room.above, room.below, room.best, room.error,
-                                         room.column)
+    above, below, best, error, column = (workspace.above, workspace.below, workspace.best,
+                                         workspace.error, workspace.column)
     value, h = moved[at], _CHECK * size
     moved[at] = value + h
     function(t, y, q, above)
@@ -221,13 +221,13 @@ def _correct(function, place, moved, at, size, room):
         return False
     # Where the function is not smooth within the widest step, such as beside the end of a root, the
     # change from order to order may vanish by accident: differences over other steps must agree.
-    _extrapolated(function, place, moved, at, _NARROWER * size, room)
+    _extrapolated(function, place, moved, at, _NARROWER * size, workspace)
     for i in range(len(f)):
-        room.orders[5, i] = best[i]
-    _extrapolated(function, place, moved, at, size, room)
+        workspace.orders[5, i] = best[i]
+    _extrapolated(function, place, moved, at, size, workspace)
     wrong, largest = False, 0.0
     for i in range(len(f)):
-        error[i] += abs(best[i] - room.orders[5, i])
+        error[i] += abs(best[i] - workspace.orders[5, i])
         off = abs(column[i] - best[i])
         if error[i] < np.inf:
             largest = max(largest, abs(best[i]))
@@ -235,8 +235,8 @@ def _correct(function, place, moved, at, size, room):
                 wrong = True
     if not wrong:
         return False
-    _roughness(function, place, moved, at, size, room)
-    orders = room.orders
+    _roughness(function, place, moved, at, size, workspace)
+    orders = workspace.orders
     wrong = False
     for i in range(len(f)):
         off = abs(column[i] - best[i])
@@ -249,14 +249,16 @@ def _correct(function, place, moved, at, size, room):
 
 
 @helper
-def columns_by_complex_step(function, analytic, place, x, scales, room, complex_room, J, wrong):
+def columns_by_complex_step(function, analytic, place, x, scales, workspace, complex_workspace, J,
+                            wrong):
     """Fill J (d, d) at a place by the complex step; ``wrong`` counts columns put right.
 
-    Room holds the state x and the parameters of the place.
+    The workspace holds the state x and the parameters of the place.
     """
     d = len(x)
-    z, w, out = complex_room[0, :d], complex_room[1, : len(place.q)], complex_room[2, :d]
-    column = room.column
+    z, w = complex_workspace[0, :d], complex_workspace[1, : len(place.q)]
+    out = complex_workspace[2, :d]
+    column = workspace.column
     for j in range(d):
         z[j] = complex(x[j], _TINY)
         analytic(place.t, z, w, out)
@@ -264,19 +266,19 @@ def columns_by_complex_step(function, analytic, place, x, scales, room, complex_
         for i in range(d):
             column[i] = out[i].imag / _TINY
         size = max(abs(x[j]), scales[j])
-        if _correct(function, place, place.y, j, size, room):
+        if _correct(function, place, place.y, j, size, workspace):
             wrong[j] += 1
         for i in range(d):
             J[i, j] = column[i]
 
 
 @helper
-def columns_by_differences(function, place, x, scales, room, J):
-    """Fill J (d, d) at a place by differences; room holds the state x and the parameters."""
-    best = room.best
+def columns_by_differences(function, place, x, scales, workspace, J):
+    """Fill J (d, d) by differences; ``workspace`` holds the state x and the parameters."""
+    best = workspace.best
     for j in range(len(x)):
         size = max(abs(x[j]), scales[j])
-        _extrapolated(function, place, place.y, j, size, room)
+        _extrapolated(function, place, place.y, j, size, workspace)
         for i in range(len(x)):
             J[i, j] = best[i]
 
@@ -299,20 +301,20 @@ def batch_jacobians(address: int, t: Vector, x: Matrix, p: Vector, J: Block) -> 
 
 @kernel
 def complex_steps(
-    address: int, complex_address: int, places: Places, room: Room, complex_room: ComplexMatrix,
-    J: Block, P: Block, wrong: IntegerVector,
+    address: int, complex_address: int, places: Places, workspace: Workspace,
+    complex_workspace: ComplexMatrix, J: Block, P: Block, wrong: IntegerVector,
 ) -> None:
     """Fill J (N, d, d) if wanted, and P (N, d, a), by the complex step.
 
     Each column is compared with differences, which take the place of what differs from them:
     ``wrong`` (d + a,) counts the places at which that is so, by columns of J and P.
-    ``complex_room`` is that of :func:`complex_room_for`.
+    ``complex_workspace`` is that of :func:`complex_workspace_for`.
     """
     function, complex_function = rates_at(address), complex_rates_at(complex_address)
-    t, x, p, active, column = places.t, places.x, places.p, places.active, room.column
+    t, x, p, active, column = places.t, places.x, places.p, places.active, workspace.column
     d, k = x.shape[1], len(p)
-    y, q = room.y, room.q
-    z, w, out = complex_room[0, :d], complex_room[1, :k], complex_room[2, :d]
+    y, q = workspace.y, workspace.q
+    z, w, out = complex_workspace[0, :d], complex_workspace[1, :k], complex_workspace[2, :d]
     q[:] = p
     for a in range(k):
         w[a] = p[a]
@@ -322,8 +324,8 @@ def complex_steps(
         for i in range(d):
             z[i], y[i] = x[n, i], x[n, i]
         if places.states:
-            columns_by_complex_step(function, complex_function, place, x[n], places.scales, room,
-                                    complex_room, J[n], wrong)
+            columns_by_complex_step(function, complex_function, place, x[n], places.scales,
+                                    workspace, complex_workspace, J[n], wrong)
         for a in range(len(active)):
             at = active[a]
             w[at] = complex(p[at], _TINY)
@@ -332,30 +334,30 @@ def complex_steps(
             for i in range(d):
                 column[i] = out[i].imag / _TINY
             size = max(abs(p[at]), places.sizes[at])
-            if _correct(function, place, q, at, size, room):
+            if _correct(function, place, q, at, size, workspace):
                 wrong[d + a] += 1
             for i in range(d):
                 P[n, i, a] = column[i]
 
 
 @kernel
-def differences(address: int, places: Places, room: Room, J: Block, P: Block) -> None:
+def differences(address: int, places: Places, workspace: Workspace, J: Block, P: Block) -> None:
     """Fill J (N, d, d) if wanted, and P (N, d, a), by extrapolated central differences."""
     function = rates_at(address)
-    t, x, p, active, best = places.t, places.x, places.p, places.active, room.best
+    t, x, p, active, best = places.t, places.x, places.p, places.active, workspace.best
     d = x.shape[1]
-    y, q = room.y, room.q
+    y, q = workspace.y, workspace.q
     q[:] = p
     for n in range(len(t)):
         place = Place(t[n], y, q, places.f[n])
         for i in range(d):
             y[i] = x[n, i]
         if places.states:
-            columns_by_differences(function, place, x[n], places.scales, room, J[n])
+            columns_by_differences(function, place, x[n], places.scales, workspace, J[n])
         for a in range(len(active)):
             at = active[a]
             size = max(abs(p[at]), places.sizes[at])
-            _extrapolated(function, place, q, at, size, room)
+            _extrapolated(function, place, q, at, size, workspace)
             for i in range(d):
                 P[n, i, a] = best[i]
 
@@ -366,7 +368,7 @@ def central_differences(
 ) -> None:
     """Fill J (N, d, d) if wanted, and P (N, d, a), by central differences over one step in sizes.
 
-    ``q`` (k,) and ``beside`` (3, d) are room.
+    ``q`` (k,) and ``beside`` (3, d) are workspace.
     """
     function = rates_at(address)
     t, x, p, active = places.t, places.x, places.p, places.active
@@ -399,7 +401,7 @@ def central_differences(
 
 @kernel
 def unchecked_complex_steps(
-    complex_address: int, places: Places, complex_room: ComplexMatrix, J: Block, P: Block,
+    complex_address: int, places: Places, complex_workspace: ComplexMatrix, J: Block, P: Block,
 ) -> None:
     """Fill J and P as :func:`complex_steps`, without the comparison with differences.
 
@@ -408,7 +410,7 @@ def unchecked_complex_steps(
     complex_function = complex_rates_at(complex_address)
     t, x, p, active = places.t, places.x, places.p, places.active
     d, k = x.shape[1], len(p)
-    z, w, out = complex_room[0, :d], complex_room[1, :k], complex_room[2, :d]
+    z, w, out = complex_workspace[0, :d], complex_workspace[1, :k], complex_workspace[2, :d]
     for a in range(k):
         w[a] = p[a]
     for n in range(len(t)):
@@ -429,12 +431,13 @@ def unchecked_complex_steps(
                 P[n, i, a] = out[i].imag / _TINY
 
 
-def room_for(states: int, parameters: int) -> Room:
+def workspace_for(states: int, parameters: int) -> Workspace:
     """Workspace for a function of so many states and parameters."""
     y, above, below, best, error, column = np.empty((6, states))
-    return Room(y, np.empty(parameters), above, below, np.empty((6, states)), best, error, column)
+    return Workspace(y, np.empty(parameters), above, below, np.empty((6, states)), best, error,
+                     column)
 
 
-def complex_room_for(states: int, parameters: int) -> NDArray[np.complex128]:
+def complex_workspace_for(states: int, parameters: int) -> NDArray[np.complex128]:
     """Workspace (3, max(d, k)) for the complex step of such a function."""
     return np.empty((3, max(states, parameters)), dtype=complex)

@@ -15,14 +15,14 @@ from fecontact.core.records import ComplexMatrix, IntegerVector, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.system.fields.function_kernels import (
     Place,
-    Room,
+    Workspace,
     columns_by_complex_step,
     columns_by_differences,
     complex_rates_at,
-    complex_room_for,
+    complex_workspace_for,
     jacobian_at,
     rates_at,
-    room_for,
+    workspace_for,
 )
 
 
@@ -38,7 +38,7 @@ class FieldKernel(NamedTuple):
         for those that it does not have.
     p, scales : (k,), (d,) arrays
         Parameters, and typical sizes of the states.
-    room, complex_room : Room, (3, max(d, k)) array
+    workspace, complex_workspace : Workspace, (3, max(d, k)) array
         Workspace for derivatives.
     wrong : (d,) array
         Columns of Jacobians that the complex step got wrong, counted.
@@ -51,8 +51,8 @@ class FieldKernel(NamedTuple):
     analytic: int
     p: Vector
     scales: Vector
-    room: Room
-    complex_room: ComplexMatrix
+    workspace: Workspace
+    complex_workspace: ComplexMatrix
     wrong: IntegerVector
 
 
@@ -79,26 +79,27 @@ def _with_jacobian(t, x, field, f, J):
 
 
 def _with_complex_step(t, x, field, f, J):
-    function, room, complex_room = rates_at(field.function), field.room, field.complex_room
-    y, q = room.y, room.q
+    function, workspace = rates_at(field.function), field.workspace
+    complex_workspace = field.complex_workspace
+    y, q = workspace.y, workspace.q
     function(t, x, field.p, f)
     for i in range(len(x)):
-        y[i], complex_room[0, i] = x[i], x[i]
+        y[i], complex_workspace[0, i] = x[i], x[i]
     for a in range(len(q)):
-        q[a], complex_room[1, a] = field.p[a], field.p[a]
+        q[a], complex_workspace[1, a] = field.p[a], field.p[a]
     columns_by_complex_step(function, complex_rates_at(field.analytic), Place(t, y, q, f), x,
-                            field.scales, room, complex_room, J, field.wrong)
+                            field.scales, workspace, complex_workspace, J, field.wrong)
 
 
 def _with_differences(t, x, field, f, J):
-    function, room = rates_at(field.function), field.room
-    y, q = room.y, room.q
+    function, workspace = rates_at(field.function), field.workspace
+    y, q = workspace.y, workspace.q
     function(t, x, field.p, f)
     for i in range(len(x)):
         y[i] = x[i]
     for a in range(len(q)):
         q[a] = field.p[a]
-    columns_by_differences(function, Place(t, y, q, f), x, field.scales, room, J)
+    columns_by_differences(function, Place(t, y, q, f), x, field.scales, workspace, J)
 
 
 def _with_python(t, x, field, f, J):
@@ -136,5 +137,5 @@ def _field(
 ) -> FieldKernel:
     d, k = len(scales), len(values)
     return FieldKernel(evaluate, derive, *functions, np.array(values, dtype=float),
-                       np.array(scales, dtype=float), room_for(d, k), complex_room_for(d, k),
-                       np.zeros(d, dtype=np.int64))
+                       np.array(scales, dtype=float), workspace_for(d, k),
+                       complex_workspace_for(d, k), np.zeros(d, dtype=np.int64))

@@ -45,8 +45,8 @@ from fecontact.system.quasistatic.pose import (
     PLACE,
     PRESSING,
     Pose,
-    Room,
     Sliders,
+    Workspace,
 )
 
 # Out-of-balance force that counts as rounding, relative to the forces that cancel, and the most
@@ -82,7 +82,7 @@ def _motion(j, q, s):
 
 
 @helper
-def _rub(j, tangents, pressing, sliders, pose, room, total, out):
+def _rub(j, tangents, pressing, sliders, pose, workspace, total, out):
     """Fill ``total`` (d - 1,) with the forces of the sliders of node j along its tangents.
 
     Places g of the node along its tangents stand in ``pose.node``. Fills rows 0 and 2 of ``out``
@@ -99,7 +99,7 @@ def _rub(j, tangents, pressing, sliders, pose, room, total, out):
         R, size = pose.force[j, first : first + tangents], 0.0
         for k in range(tangents):
             g = pose.node[j, PLACE + PER_TANGENT * k]
-            R[k] = room.multiplier[j, first + k] + stiffness * (g - pose.left[j, first + k])
+            R[k] = workspace.multiplier[j, first + k] + stiffness * (g - pose.left[j, first + k])
             size = math.hypot(size, R[k])
         sticks = size <= limit * pressing
         turn = 0.0 if sticks or tangents == 1 else limit * pressing * stiffness / size
@@ -127,13 +127,13 @@ def _lean(F, contact, d, out):
 
 
 @helper
-def _push(away, F, along, T, rounding, room):
+def _push(away, F, along, T, rounding, workspace):
     """Add F along one row and -T along another to the out-of-balance force, and to sizes."""
     for i in range(len(away)):
-        room.residual[i] += away[i] * F - along[i] * T
+        workspace.residual[i] += away[i] * F - along[i] * T
         size = abs(away[i] * F) + abs(along[i] * T)
-        room.acting[i] += size
-        room.before[i] += size + abs(along[i]) * rounding
+        workspace.acting[i] += size
+        workspace.before[i] += size + abs(along[i]) * rounding
 
 
 @helper
@@ -150,14 +150,14 @@ def _stretched(j, tangent, sliders, pose):
 @kernel
 def evaluate(
     load: Vector, moved: GroundMotion, sliders: Sliders, s: SystemArrays,
-    pose: Pose, room: Room, derive: int,
+    pose: Pose, workspace: Workspace, derive: int,
 ) -> float:
     """Set nodes, slider forces, out-of-balance force and its matrix; size of forces that cancel.
 
     The matrix is minus the derivative of the out-of-balance force.
     """
     n, d, m = s.rows.shape
-    q, node, residual, out = pose.q, pose.node, room.residual, room.partial
+    q, node, residual, out = pose.q, pose.node, workspace.residual, workspace.partial
     terms = 0.0
     for i in range(m):
         total, size = load[i], abs(load[i])
@@ -166,15 +166,15 @@ def evaluate(
             total -= part
             size += abs(part)
         residual[i] = total
-        room.before[i] = room.acting[i] = size
-    tangents, total = d - 1, room.total
+        workspace.before[i] = workspace.acting[i] = size
+    tangents, total = d - 1, workspace.total
     gradient, force = np.empty_like(s.polynomial_rows), np.zeros(m)
     if has_polynomial(s):
         add_polynomial(q, s, gradient, force)
         for i in range(m):
             residual[i] += force[i]
-            room.before[i] += abs(force[i])
-            room.acting[i] += abs(force[i])
+            workspace.before[i] += abs(force[i])
+            workspace.acting[i] += abs(force[i])
     for j in range(n):
         motion = _motion(j, q, s)
         contact = node_contact(j, motion, moved, s)
@@ -182,7 +182,7 @@ def evaluate(
         node[j, FORCE], node[j, PRESSING], node[j, PENETRATION] = F, pressing, contact.penetration
         for k in range(tangents):
             node[j, PLACE + PER_TANGENT * k] = motion.places[2 * k] - ground_travel(k, j, moved, s)
-        _rub(j, tangents, pressing, sliders, pose, room, total, out)
+        _rub(j, tangents, pressing, sliders, pose, workspace, total, out)
         if s.follows_surface:
             _lean(F, contact, d, out)
         # Springs round off with the displacements whose difference they feel.
@@ -195,117 +195,118 @@ def evaluate(
             node[j, AGAINST + second], node[j, ALONG_SURFACE + second] = T, F * contact.slope[k]
             rounding = _SPRINGS * (springs * (abs(motion.places[2 * k]) + abs(gone))
                                    + _stretched(j, k, sliders, pose))
-            _push(s.rows[j, 1], F if k == 0 else 0.0, s.rows[j, 2 * k], T, rounding, room)
+            _push(s.rows[j, 1], F if k == 0 else 0.0, s.rows[j, 2 * k], T, rounding, workspace)
         if derive:
             for axis in range(d):
-                answer, sign = room.answers[j, axis], -1.0 if axis == 1 else 1.0
+                answer, sign = workspace.answers[j, axis], -1.0 if axis == 1 else 1.0
                 for i in range(m):
                     answer[i] = 0.0
                 for other in range(d):
                     for i in range(m):
                         answer[i] += sign * out[axis, other] * s.rows[j, other, i]
     for i in range(m):
-        terms += room.before[i] ** 2 / room.scale[i]
+        terms += workspace.before[i] ** 2 / workspace.scale[i]
     if derive:
-        room.matrix[:] = s.stiffness
+        workspace.matrix[:] = s.stiffness
         if has_polynomial(s):
-            add_polynomial_stiffness(1.0, gradient, s, room.matrix)
-        room.matrix[:] += np.dot(s.rows.reshape((n * d, m)).T, room.answers.reshape((n * d, m)))
+            add_polynomial_stiffness(1.0, gradient, s, workspace.matrix)
+        workspace.matrix[:] += np.dot(s.rows.reshape((n * d, m)).T,
+                                      workspace.answers.reshape((n * d, m)))
     return np.sqrt(terms)
 
 
 @helper
-def _size(room):
+def _size(workspace):
     """Size of the out-of-balance force."""
     total = 0.0
-    for i in range(len(room.scale)):
-        total += room.residual[i] ** 2 / room.scale[i]
+    for i in range(len(workspace.scale)):
+        total += workspace.residual[i] ** 2 / workspace.scale[i]
     return np.sqrt(total)
 
 
 @helper
-def _balanced(size, terms, part, room):
+def _balanced(size, terms, part, workspace):
     """Whether an out-of-balance force is rounding, up to a part of the forces that cancel."""
     acting = 0.0
-    for i in range(len(room.scale)):
-        acting += room.acting[i] ** 2 / room.scale[i]
+    for i in range(len(workspace.scale)):
+        acting += workspace.acting[i] ** 2 / workspace.scale[i]
     return size <= part * terms and size <= _WRONG * np.sqrt(acting)
 
 
 @helper
-def _step(q, room):
+def _step(q, workspace):
     """Take the Newton step of the matrix, in place; False where nothing resists some motion."""
     m = len(q)
-    room.step[:] = room.residual
-    factorise(room.matrix, m, room.pivots)
+    workspace.step[:] = workspace.residual
+    factorise(workspace.matrix, m, workspace.pivots)
     for i in range(m):
         # The diagonal holds the inverse pivots.
-        if not abs(room.matrix[i, i]) * _LOOSE * room.scale[i] < 1.0:
+        if not abs(workspace.matrix[i, i]) * _LOOSE * workspace.scale[i] < 1.0:
             return False
-    solve(room.matrix, room.pivots, room.step)
+    solve(workspace.matrix, workspace.pivots, workspace.step)
     for i in range(m):
-        q[i] += room.step[i]
+        q[i] += workspace.step[i]
     return True
 
 
 @helper
-def _hasty_newton(load, moved, sliders, s, pose, room):
+def _hasty_newton(load, moved, sliders, s, pose, workspace):
     """Newton's method in full steps; whether it succeeded, else the pose is as before.
 
     On its way to the set of sliders that slide, the balance may become worse for a step: at a
     reversal all of them are at their limits, and rounding decides which of them count as sliding.
     """
     q, last = pose.q, np.inf
-    room.start[:] = q
+    workspace.start[:] = q
     for _ in range(_HASTY):
-        terms = evaluate(load, moved, sliders, s, pose, room, 1)
-        size = _size(room)
-        if _balanced(size, terms, _FINE, room) or (
-                _balanced(size, terms, _ROUGH, room) and size >= 0.5 * last):
+        terms = evaluate(load, moved, sliders, s, pose, workspace, 1)
+        size = _size(workspace)
+        if _balanced(size, terms, _FINE, workspace) or (
+                _balanced(size, terms, _ROUGH, workspace) and size >= 0.5 * last):
             return True
-        if not np.isfinite(size) or not _step(q, room):
+        if not np.isfinite(size) or not _step(q, workspace):
             break
         last = size
-    q[:] = room.start
+    q[:] = workspace.start
     return False
 
 
 @helper
-def _newton(load, moved, sliders, s, pose, room):
+def _newton(load, moved, sliders, s, pose, workspace):
     """Newton's method with a shift that grows after failed steps; whether it succeeded."""
-    if _hasty_newton(load, moved, sliders, s, pose, room):
+    if _hasty_newton(load, moved, sliders, s, pose, workspace):
         return True
     m = len(pose.q)
     shift, q = 0.0, pose.q
     for _ in range(_TRIES):
-        terms = evaluate(load, moved, sliders, s, pose, room, 1)
-        size = _size(room)
+        terms = evaluate(load, moved, sliders, s, pose, workspace, 1)
+        size = _size(workspace)
         if not np.isfinite(size):
             return False
-        if _balanced(size, terms, _FINE, room):
+        if _balanced(size, terms, _FINE, workspace):
             return True
         better = False
         # The matrix is factorised in place and made again for another shift.
         for _ in range(_SHIFTS):
             for i in range(m):
-                room.matrix[i, i] += shift * room.scale[i]
-            if not _step(q, room):
+                workspace.matrix[i, i] += shift * workspace.scale[i]
+            if not _step(q, workspace):
                 shift = max(30.0 * shift, 1e-10)
-                evaluate(load, moved, sliders, s, pose, room, 1)
+                evaluate(load, moved, sliders, s, pose, workspace, 1)
                 continue
-            evaluate(load, moved, sliders, s, pose, room, 0)
-            if _size(room) < size:
+            evaluate(load, moved, sliders, s, pose, workspace, 0)
+            if _size(workspace) < size:
                 better = True
                 break
             for i in range(m):
-                q[i] -= room.step[i]
-            if shift == 0.0 and _balanced(size, terms, _ROUGH, room):
+                q[i] -= workspace.step[i]
+            if shift == 0.0 and _balanced(size, terms, _ROUGH, workspace):
                 break
             shift = max(30.0 * shift, 1e-10)
-            evaluate(load, moved, sliders, s, pose, room, 1)
+            evaluate(load, moved, sliders, s, pose, workspace, 1)
         if not better:
-            evaluate(load, moved, sliders, s, pose, room, 0)
-            return _balanced(size, terms, _ROUGH, room)
+            evaluate(load, moved, sliders, s, pose, workspace, 0)
+            return _balanced(size, terms, _ROUGH, workspace)
         shift = 0.0 if shift <= 1e-9 else 0.1 * shift
     return False
 
@@ -313,7 +314,7 @@ def _newton(load, moved, sliders, s, pose, room):
 @kernel
 def find_equilibrium(
     load: Vector, moved: GroundMotion, sliders: Sliders, s: SystemArrays,
-    pose: Pose, room: Room,
+    pose: Pose, workspace: Workspace,
 ) -> bool:
     """Bring ``pose`` into equilibrium from where it is; whether that succeeded.
 
@@ -327,10 +328,10 @@ def find_equilibrium(
         for k in range(elements * tangents):
             rigid = sliders.rigid[j, k // tangents] != 0.0
             held |= rigid
-            room.multiplier[j, k] = pose.force[j, k] if rigid else 0.0
+            workspace.multiplier[j, k] = pose.force[j, k] if rigid else 0.0
     solved = False
     for _ in range(_REPEATS if held else 1):
-        solved = _newton(load, moved, sliders, s, pose, room)
+        solved = _newton(load, moved, sliders, s, pose, workspace)
         if not solved or not held:
             break
         changed, largest, noise = 0.0, 0.0, 0.0
@@ -340,9 +341,9 @@ def find_equilibrium(
                     place = abs(pose.node[j, PLACE + PER_TANGENT * (k % tangents)])
                     noise = max(noise, sliders.stiffness[j, k // tangents] * (
                         place + abs(pose.left[j, k])))
-                    changed = max(changed, abs(pose.force[j, k] - room.multiplier[j, k]))
+                    changed = max(changed, abs(pose.force[j, k] - workspace.multiplier[j, k]))
                     largest = max(largest, abs(pose.force[j, k]))
-                    room.multiplier[j, k] = pose.force[j, k]
+                    workspace.multiplier[j, k] = pose.force[j, k]
         if changed <= _SETTLED * largest + _ROUNDING * noise:
             break
         solved = False

@@ -24,7 +24,7 @@ from fecontact.system.quasistatic.pose import (
     Pose,
     Sliders,
     pose_for,
-    room_for,
+    workspace_for,
 )
 from fecontact.system.quasistatic.rest_state import RestState
 from fecontact.system.quasistatic.sliders import components, require_sliders, sliders_of
@@ -152,7 +152,7 @@ def _marched(
     e, tangents = sliders.limit.shape[1], _tangents(pose, sliders)
     kept = kept_for(len(given), m, n, e, tangents)
     reached = march(arrays, sliders, np.ascontiguousarray(given), rtol, pose,
-                    pose_for(m, n, e, tangents), room_for(m, n, e, tangents, scale), kept)
+                    pose_for(m, n, e, tangents), workspace_for(m, n, e, tangents, scale), kept)
     return int(reached), kept
 
 

@@ -32,8 +32,8 @@ from fecontact.system.quasistatic.pose import (
     PLACE,
     PRESSING,
     Pose,
-    Room,
     Sliders,
+    Workspace,
     node_columns,
 )
 
@@ -279,14 +279,14 @@ def _keep(row, pose, total, kept):
 @kernel
 def march(
     s: SystemArrays, sliders: Sliders, given: Matrix, rtol: float, old: Pose,
-    new: Pose, room: Room, kept: Kept,
+    new: Pose, workspace: Workspace, kept: Kept,
 ) -> int:
     """Go along rows of given loads and motions: modal loads, drive in x and y, travel, (N, m + 3).
 
     In space (N, m + 5): with the drive in z, and the travel along y.
 
-    ``old`` holds the pose at the first row, whose F and places are found here; ``new`` is room.
-    Fills ``kept`` and returns the number of rows that were reached.
+    ``old`` holds the pose at the first row, whose F and places are found here; ``new`` is
+    workspace. Fills ``kept`` and returns the number of rows that were reached.
     """
     rows, columns = given.shape
     size = kept.work.shape[1]
@@ -307,7 +307,7 @@ def march(
                 given[last, i] + goal * (given[row, i] - given[last, i]))
         _copy(old, new)
         moved = _apply(ends[1], s, load)
-        solved = find_equilibrium(load, moved, sliders, s, new, room)
+        solved = find_equilibrium(load, moved, sliders, s, new, workspace)
         kept.counts[SOLVED] += 1
         excess = np.inf if row > 0 else 0.0
         turnover[TURNED], turnover[PRESSED] = 0.0, 0.0

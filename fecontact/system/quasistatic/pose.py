@@ -37,7 +37,7 @@ class Pose(NamedTuple):
     left: Matrix
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Workspace of Newton's method; ``scale`` (m,) are typical stiffnesses of the modes.
 
     ``acting`` (m,) sums the magnitudes of the forces on each mode; ``answers`` (n, d, m) are minus
@@ -71,10 +71,10 @@ def pose_for(m: int, n: int, sliders: int, tangents: int) -> Pose:
     return Pose(np.zeros(m), np.zeros((n, node_columns(tangents))), force, left)
 
 
-def room_for(m: int, n: int, sliders: int, tangents: int, scale: Array) -> Room:
+def workspace_for(m: int, n: int, sliders: int, tangents: int, scale: Array) -> Workspace:
     """Workspace for a body of m modes and n contact nodes."""
     start, acting, residual, step, before = np.zeros((5, m))
-    return Room(np.ascontiguousarray(scale, dtype=float), start, acting, residual, step, before,
-                np.zeros((n, sliders * tangents)), np.zeros((n, 1 + tangents, m)), np.zeros((m, m)),
-                np.zeros((2 + tangents, 2 * (1 + tangents))), np.zeros(tangents),
-                np.zeros(m, np.int64))
+    return Workspace(np.ascontiguousarray(scale, dtype=float), start, acting, residual, step,
+                     before, np.zeros((n, sliders * tangents)), np.zeros((n, 1 + tangents, m)),
+                     np.zeros((m, m)), np.zeros((2 + tangents, 2 * (1 + tangents))),
+                     np.zeros(tangents), np.zeros(m, np.int64))

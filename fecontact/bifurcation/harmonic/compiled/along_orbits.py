@@ -31,7 +31,7 @@ def derivatives_along(
     (K, N, c) are linear between the samples.
     """
     m, N, c = e.springs.shape[1], zs.shape[1], zs.shape[2]
-    X, linear = e.room.coefficients, e.room.linear
+    X, linear = e.workspace.coefficients, e.workspace.linear
     L = X.shape[2]
     P = len(tau)
     t, x, f, row = np.empty(P), np.empty((P, 2 * m + c)), np.empty((P, 2 * m + c)), np.empty(P)

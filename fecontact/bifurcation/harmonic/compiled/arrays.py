@@ -8,7 +8,7 @@ from fecontact.core.records import Array4, Block, IntegerVector, Matrix, Vector
 from fecontact.system.nodes import SystemArrays
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Workspace of one orbit; n unknown coefficients of m modes, N samples, d states.
 
     Modes in ``order`` (m,), of which the first ``coupled`` (1,) are solved for together, k
@@ -22,7 +22,8 @@ class Room(NamedTuple):
     node; ``widths`` (m, N) is what kinks add, see
     :func:`fecontact.bifurcation.harmonic.compiled.kinks.add_kinks`. ``friction`` (3, t n, N) is
     that of elements which are followed one by one, with what it is beside the parameter;
-    ``by_node`` (t n, N, d (2 H + 1)) are its derivatives, ``left`` (N, c) room for deflections.
+    ``by_node`` (t n, N, d (2 H + 1)) are its derivatives, ``left`` (N, c) work array for
+    deflections.
     """
 
     t: Vector
@@ -109,7 +110,7 @@ class Equations(NamedTuple):
     numbers: Vector
     nodes: int
     kept: IntegerVector
-    room: Room
+    workspace: Workspace
 
 
 (TURN, PERIOD, LOW, HIGH, STEADY, PLAIN, FIRST_BOUND, LAST_BOUND, TOLERANCE, LARGEST_STEP,
@@ -134,10 +135,10 @@ class Reached(NamedTuple):
     step: Vector
 
 
-def room_for(
+def workspace_for(
     harmonics: int, samples: int, modes: int, memory: int, nodes: int, coupled: int,
     exact: bool, axes: int,
-) -> Room:
+) -> Workspace:
     """Workspace for a system of so many modes and internal variables, on so many nodes.
 
     At most ``coupled`` modes are solved for together. Internal variables that are ``exact`` are
@@ -148,7 +149,7 @@ def room_for(
     L, N, m, c = 2 * harmonics + 1, samples, modes, memory
     n, d, k = L * m, 2 * m + c, L * coupled
     s = c // nodes if nodes else 0
-    return Room(
+    return Workspace(
         np.empty(N), np.empty((N, d)), np.empty((N, d)), np.empty((N, deflections)),
         np.empty((N, c)),
         np.empty((N, d)), np.empty((N if c else 0, d)), np.empty((N, d, d)),

@@ -64,7 +64,7 @@ class CompiledBalance:
     def equations(self, problem: Any, value: float) -> arrays.Equations | None:
         """Equations about a value of the parameter; None where its arrays are not affine in it.
 
-        There is one room for all equations of a size: what is found there has to be copied. None
+        There is one workspace for equations of a size: what is found there has to be copied. None
         also for more unknowns with internal variables, a list of harmonics, or loads that are not
         affine.
         """
@@ -107,8 +107,9 @@ class CompiledBalance:
             numbers[arrays.PERIOD] = problem.period(np.array([value]))
         numbers[arrays.LOW], numbers[arrays.HIGH] = near.low, near.high
         most = m if problem.size <= MOST_UNKNOWNS else max(1, MOST_UNKNOWNS // L)
-        room = arrays.room_for(problem.harmonics, problem.samples, m, layout.memory, layout.nodes,
-                               most, problem.kept.exact, near.arrays.rows.shape[1])
+        workspace = arrays.workspace_for(problem.harmonics, problem.samples, m, layout.memory,
+                                         layout.nodes, most, problem.kept.exact,
+                                         near.arrays.rows.shape[1])
         contact, kept = near.arrays, problem.kept
         body, given = np.zeros((4, m, m)), np.zeros((2, problem.samples, m))
         found = self._without_contact(problem, near)
@@ -128,7 +129,7 @@ class CompiledBalance:
             series.sines, body, given,
             series.projection @ given, kept.rows[marched], kept.offsets[marched],
             kept.blocks, elements, kept.offsets, contact, problem.onsets,
-            np.full(m, np.inf), numbers, layout.nodes, problem.rows_kept, room)
+            np.full(m, np.inf), numbers, layout.nodes, problem.rows_kept, workspace)
 
     def _without_contact(
         self, problem: Any, near: AffineArrays

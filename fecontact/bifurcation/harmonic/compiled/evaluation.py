@@ -28,8 +28,8 @@ def take_parameter(p, e):
         e.flat[k] = e.base[k] + p * e.slope[k]
     T = e.numbers[TURN] / p if e.numbers[TURN] != 0.0 else e.numbers[PERIOD]
     for k in range(len(e.tau)):
-        e.room.t[k] = e.tau[k] * T
-    linear = e.room.linear
+        e.workspace.t[k] = e.tau[k] * T
+    linear = e.workspace.linear
     for part in range(2):
         for i in range(linear.shape[1]):
             for j in range(linear.shape[1]):
@@ -49,7 +49,7 @@ def speed_coefficient(u, k, j, m, T):
 @helper
 def take_motion(u, T, e):
     """Fill the rows of displacements and velocities at the samples."""
-    X, motion = e.room.coefficients, e.room.motion
+    X, motion = e.workspace.coefficients, e.workspace.motion
     m, L, N = X.shape[1], X.shape[2], len(e.tau)
     for j in range(m):
         for k in range(L):
@@ -64,7 +64,7 @@ def take_motion(u, T, e):
 @helper
 def take_states(u, T, e, x):
     """Fill displacements and velocities of the states (N, d) at the samples."""
-    motion = e.room.motion
+    motion = e.workspace.motion
     take_motion(u, T, e)
     for j in range(len(motion)):
         for n in range(len(x)):
@@ -74,7 +74,7 @@ def take_states(u, T, e, x):
 @helper
 def _take_differences(T, e):
     """Fill the states in which internal variables are marched, and their targets."""
-    x, y, m = e.room.x, e.room.y, e.springs.shape[1]
+    x, y, m = e.workspace.x, e.workspace.y, e.springs.shape[1]
     N = len(x)
     rate = N / T
     for n in range(N):
@@ -85,13 +85,13 @@ def _take_differences(T, e):
             total = e.offsets[i]
             for j in range(m):
                 total += e.springs[i, j] * x[n, j]
-            e.room.target[n, i] = total
+            e.workspace.target[n, i] = total
 
 
 @helper
 def take_pushes(f, e):
     """Fill the rows of the forces from f (N, d) at the samples."""
-    pushes = e.room.pushes
+    pushes = e.workspace.pushes
     m = len(pushes)
     for j in range(m):
         for n in range(len(f)):
@@ -105,10 +105,10 @@ def balance(u, T, loads, e, out):
     ``loads`` is the factor of the loads.
     """
     m, L = e.springs.shape[1], e.values.shape[1]
-    linear, p = e.room.linear, u[len(u) - 1]
-    pushed = e.room.coefficients[0]
+    linear, p = e.workspace.linear, u[len(u) - 1]
+    pushed = e.workspace.coefficients[0]
     for j in range(m):
-        project(e.projection, e.room.pushes[j], pushed[j])
+        project(e.projection, e.workspace.pushes[j], pushed[j])
     for k in range(L * m):
         out[k] = 0.0
     for k in e.kept:
@@ -127,30 +127,30 @@ def _follow(u, T, derivatives, e, friction, z):
     """Fill friction (t n, N) of elements along their tangents; 0 if they do not repeat."""
     m, L = e.springs.shape[1], e.values.shape[1]
     return element_forces(u[: L * m].reshape((L, m)), T, e.contact, e.whole, e.elements,
-                          e.kept_offsets, e.values, derivatives, friction, z, e.room.by_node)
+                          e.kept_offsets, e.values, derivatives, friction, z, e.workspace.by_node)
 
 
 @helper
 def _add_friction(e):
     """Add the friction of elements that was found to the rows of the forces, or to the rates."""
-    room, plain = e.room, e.numbers[PLAIN] != 0.0
+    workspace, plain = e.workspace, e.numbers[PLAIN] != 0.0
     m, rows = e.springs.shape[1], e.contact.rows
     tangents = rows.shape[1] - 1
     for r in range(tangents * len(e.elements)):
-        friction = room.friction[0, r]
+        friction = workspace.friction[0, r]
         for i in range(m):
             factor = rows[r // tangents, 2 * (r % tangents), i]
             for n in range(len(friction)):
                 if plain:
-                    room.pushes[i, n] -= factor * friction[n]
+                    workspace.pushes[i, n] -= factor * friction[n]
                 else:
-                    room.f[n, m + i] -= factor * friction[n]
+                    workspace.f[n, m + i] -= factor * friction[n]
 
 
 @helper
 def _friction_at(u, T, derivatives, e):
     """Find and add the friction of elements; 0 if they do not repeat."""
-    e.numbers[TIMED] = _follow(u, T, derivatives, e, e.room.friction[0], e.room.z)
+    e.numbers[TIMED] = _follow(u, T, derivatives, e, e.workspace.friction[0], e.workspace.z)
     _add_friction(e)
     return e.numbers[TIMED]
 
@@ -161,7 +161,7 @@ def evaluate_at(u, derivatives, e):
 
     Zero where internal variables do not come to repeat.
     """
-    room = e.room
+    workspace = e.workspace
     m, c = e.springs.shape[1], len(e.offsets)
     T = take_parameter(u[len(u) - 1], e)
     if e.numbers[PLAIN] != 0.0:
@@ -169,45 +169,46 @@ def evaluate_at(u, derivatives, e):
         plain_forces(derivatives, T / len(e.tau), e)
         if len(e.elements) > 0 and _friction_at(u, T, derivatives, e) == 0.0:
             return 0.0
-        balance(u, T, 1.0, e, room.residual)
+        balance(u, T, 1.0, e, workspace.residual)
         return T
-    take_states(u, T, e, room.x)
+    take_states(u, T, e, workspace.x)
     if c > 0:
         _take_differences(T, e)
-        for n in range(len(room.t)):
+        for n in range(len(workspace.t)):
             for i in range(c):
-                room.y[n, 2 * m + i] = 0.0
-        if march(room.t, room.y, e.contact, T, e.blocks, room.target, room.z) == 0:
+                workspace.y[n, 2 * m + i] = 0.0
+        if march(workspace.t, workspace.y, e.contact, T, e.blocks, workspace.target,
+                 workspace.z) == 0:
             return 0.0
-        for n in range(len(room.t)):
+        for n in range(len(workspace.t)):
             for i in range(c):
-                room.x[n, 2 * m + i] = room.z[n, i]
-                room.y[n, 2 * m + i] = room.z[n, i]
+                workspace.x[n, 2 * m + i] = workspace.z[n, i]
+                workspace.y[n, 2 * m + i] = workspace.z[n, i]
     if derivatives:
-        batch_derivatives(room.t, room.x, e.contact, e.contact, 0.0, room.f, room.J,
-                          np.empty((0, 0)))
+        batch_derivatives(workspace.t, workspace.x, e.contact, e.contact, 0.0, workspace.f,
+                          workspace.J, np.empty((0, 0)))
     else:
-        batch_rates(room.t, room.x, e.contact, room.f)
-    add_kinks(room.t, room.x, e.contact, e.onsets, T / len(e.tau), derivatives, room.f, room.J,
-              room.widths)
+        batch_rates(workspace.t, workspace.x, e.contact, workspace.f)
+    add_kinks(workspace.t, workspace.x, e.contact, e.onsets, T / len(e.tau), derivatives,
+              workspace.f, workspace.J, workspace.widths)
     if len(e.elements) > 0 and _friction_at(u, T, derivatives, e) == 0.0:
         return 0.0
-    take_pushes(room.f, e)
-    balance(u, T, 1.0, e, room.residual)
+    take_pushes(workspace.f, e)
+    balance(u, T, 1.0, e, workspace.residual)
     return T
 
 
 @helper
 def _take_rows(s, e):
     """Fill the rows of the derivatives of the forces of s coupled modes."""
-    room = e.room
+    workspace = e.workspace
     m = e.springs.shape[1]
     for part in range(2):
         for i in range(s):
             for j in range(s):
-                row = room.rows[(part * s + i) * s + j]
+                row = workspace.rows[(part * s + i) * s + j]
                 for n in range(len(row)):
-                    row[n] = room.J[n, m + room.order[i], part * m + room.order[j]]
+                    row[n] = workspace.J[n, m + workspace.order[i], part * m + workspace.order[j]]
 
 
 @helper
@@ -216,18 +217,18 @@ def _harmonics_of_derivatives(T, s, e):
 
     The rows hold those of the forces.
     """
-    room = e.room
+    workspace = e.workspace
     L = e.values.shape[1]
-    spectra = room.spectra[: 4 * L * s * s].reshape((4, L, s * s))
-    square = room.square[: L * s * L * s].reshape((L, s, L, s))
+    spectra = workspace.spectra[: 4 * L * s * s].reshape((4, L, s * s))
+    square = workspace.square[: L * s * L * s].reshape((L, s, L, s))
     for part in range(2):
         for i in range(s):
             for j in range(s):
-                row = room.rows[(part * s + i) * s + j]
+                row = workspace.rows[(part * s + i) * s + j]
                 same = True
                 for n in range(1, len(row)):
                     same = same and row[n] == row[0]
-                cosines, sines = room.along[:L], room.beside[:L]
+                cosines, sines = workspace.along[:L], workspace.beside[:L]
                 if same:
                     for k in range(L):
                         cosines[k], sines[k] = 0.0, 0.0
@@ -243,35 +244,35 @@ def _harmonics_of_derivatives(T, s, e):
         turn = 2.0 * math.pi * ((k + 1) // 2) / T
         for i in range(s):
             for j in range(s):
-                a, b = room.order[i], room.order[j]
-                square[k, i, k, j] += room.linear[0, a, b]
+                a, b = workspace.order[i], workspace.order[j]
+                square[k, i, k, j] += workspace.linear[0, a, b]
                 if k % 2 == 1:
-                    square[k, i, k + 1, j] += turn * room.linear[1, a, b]
-                    square[k + 1, i, k, j] -= turn * room.linear[1, a, b]
+                    square[k, i, k + 1, j] += turn * workspace.linear[1, a, b]
+                    square[k + 1, i, k, j] -= turn * workspace.linear[1, a, b]
 
 
 @helper
 def _by_parameter(u, T, e):
     """Fill as :func:`_beside`, where forces depend on the parameter through speeds alone."""
-    room = e.room
+    workspace = e.workspace
     p, m, L = u[len(u) - 1], e.springs.shape[1], e.values.shape[1]
     N, c = len(e.tau), len(e.offsets)
     # Relative change of the period; that of speeds is the opposite.
     rise = -1.0 / p if e.numbers[TURN] != 0.0 else 0.0
-    plain, row, pushed = e.numbers[PLAIN] != 0.0, room.node[0], room.coefficients[0]
+    plain, row, pushed = e.numbers[PLAIN] != 0.0, workspace.node[0], workspace.coefficients[0]
     for j in range(m):
         for n in range(N):
             row[n] = 0.0
         moves = not plain
         for i in range(m):
-            by_speed = room.rows[(m + j) * m + i]
+            by_speed = workspace.rows[(m + j) * m + i]
             for n in range(N):
-                slope = by_speed[n] if plain else room.J[n, m + j, m + i]
+                slope = by_speed[n] if plain else workspace.J[n, m + j, m + i]
                 moves = moves or slope != 0.0
-                row[n] -= rise * room.motion[m + i, n] * slope
+                row[n] -= rise * workspace.motion[m + i, n] * slope
         if moves and len(e.onsets) > 0:
             for n in range(N):
-                row[n] += rise * room.widths[j, n]
+                row[n] += rise * workspace.widths[j, n]
         if moves:
             project(e.projection, row, pushed[j])
         else:
@@ -281,21 +282,21 @@ def _by_parameter(u, T, e):
         turn = 2.0 * math.pi * ((k + 1) // 2) / T
         for j in range(m):
             total = e.pulls[1, k, j] + pushed[j, k]
-            room.column[k * m + j] = 2.0 * rise * turn * turn * u[k * m + j] - total
+            workspace.column[k * m + j] = 2.0 * rise * turn * turn * u[k * m + j] - total
         for i in range(m):
             place, speed = u[k * m + i], speed_coefficient(u, k, i, m, T)
             for j in range(m):
-                room.column[k * m + j] += (e.body[2, i, j] * place + e.body[3, i, j] * speed
-                                           - rise * room.linear[1, i, j] * speed)
+                workspace.column[k * m + j] += (e.body[2, i, j] * place + e.body[3, i, j] * speed
+                                                - rise * workspace.linear[1, i, j] * speed)
     rate = N / T
     for k in range(N):
         for i in range(c):
-            total = (LEAK / T * (room.z[k, i] - room.target[k, i])
-                     + rate * (1.5 * room.z[k, i] - 2.0 * room.z[k - 1, i]
-                               + 0.5 * room.z[k - 2, i]))
+            total = (LEAK / T * (workspace.z[k, i] - workspace.target[k, i])
+                     + rate * (1.5 * workspace.z[k, i] - 2.0 * workspace.z[k - 1, i]
+                               + 0.5 * workspace.z[k - 2, i]))
             for j in range(m):
-                total -= room.J_marched[k, 2 * m + i, m + j] * room.y[k, m + j]
-            room.followed[k, i, len(u) - 1] = rise * total
+                total -= workspace.J_marched[k, 2 * m + i, m + j] * workspace.y[k, m + j]
+            workspace.followed[k, i, len(u) - 1] = rise * total
 
 
 @helper
@@ -304,40 +305,40 @@ def _beside(u, central, e, followed):
 
     z is held, and so is the friction of elements that are followed one by one.
     """
-    room = e.room
-    n, p = len(room.residual), u[len(u) - 1]
+    workspace = e.workspace
+    n, p = len(workspace.residual), u[len(u) - 1]
     m, c, N = e.springs.shape[1], len(e.offsets), len(e.tau)
     h = (_CENTRAL if central else _ONE_SIDED) * max(abs(p), 1e-3)
     # Without a second side what is marched meets its equations.
     width = 2.0 * h if central else h
     for k in range(n):
-        room.column[k] = 0.0 if central else -room.residual[k] / h
-    there = room.vectors[7]
+        workspace.column[k] = 0.0 if central else -workspace.residual[k] / h
+    there = workspace.vectors[7]
     for k in range(n):
         there[k] = u[k]
     for side in range(2 if central else 1):
         sign = 1.0 if side == 0 else -1.0
         there[n] = p + sign * h
         T = take_parameter(there[n], e)
-        take_states(there, T, e, room.x)
-        batch_rates(room.t, room.x, e.contact, room.f)
-        add_kinks(room.t, room.x, e.contact, e.onsets, T / len(e.tau), 0, room.f, room.J,
-                  room.widths)
+        take_states(there, T, e, workspace.x)
+        batch_rates(workspace.t, workspace.x, e.contact, workspace.f)
+        add_kinks(workspace.t, workspace.x, e.contact, e.onsets, T / len(e.tau), 0, workspace.f,
+                  workspace.J, workspace.widths)
         _add_friction(e)
-        take_pushes(room.f, e)
-        balance(there, T, 1.0, e, room.beside)
+        take_pushes(workspace.f, e)
+        balance(there, T, 1.0, e, workspace.beside)
         for k in range(n):
-            room.column[k] += sign * room.beside[k] / width
+            workspace.column[k] += sign * workspace.beside[k] / width
         if c > 0:
             _take_differences(T, e)
-            batch_rates(room.t, room.y, e.contact, room.f_marched)
+            batch_rates(workspace.t, workspace.y, e.contact, workspace.f_marched)
             rate = N / T
             for k in range(N):
                 for i in range(c):
-                    off = (room.f_marched[k, 2 * m + i]
-                           - LEAK / T * (room.z[k, i] - room.target[k, i])
-                           - rate * (1.5 * room.z[k, i] - 2.0 * room.z[k - 1, i]
-                                     + 0.5 * room.z[k - 2, i]))
+                    off = (workspace.f_marched[k, 2 * m + i]
+                           - LEAK / T * (workspace.z[k, i] - workspace.target[k, i])
+                           - rate * (1.5 * workspace.z[k, i] - 2.0 * workspace.z[k - 1, i]
+                                     + 0.5 * workspace.z[k - 2, i]))
                     followed[k, i, n] = (sign * off / width
                                          + (followed[k, i, n] if side > 0 else 0.0))
     take_parameter(p, e)
@@ -350,17 +351,17 @@ def _add_memory(T, e):
     ``followed`` holds its last column, ``J_marched`` the derivatives at the states in which they
     were marched.
     """
-    room = e.room
+    workspace = e.workspace
     m, L, N, c = e.springs.shape[1], e.values.shape[1], len(e.tau), len(e.offsets)
     n, rate = L * m, N / T
     s = c // e.nodes
-    followed, J = room.followed, room.J_marched
-    square = room.square.reshape((n, n))
+    followed, J = workspace.followed, workspace.J_marched
+    square = workspace.square.reshape((n, n))
     for k in range(N):
         for i in range(c):
             node = i // s
             for other in range(s):
-                room.slopes[k, node, i - node * s, other] = J[k, 2 * m + i,
+                workspace.slopes[k, node, i - node * s, other] = J[k, 2 * m + i,
                                                              2 * m + node * s + other]
             for q in range(L):
                 speed = rate * (1.5 * e.values[k, q] - 2.0 * e.values[k - 1, q]
@@ -369,15 +370,15 @@ def _add_memory(T, e):
                     followed[k, i, q * m + j] = (
                         e.values[k, q] * (J[k, 2 * m + i, j] + LEAK / T * e.springs[i, j])
                         + speed * J[k, 2 * m + i, m + j])
-    solve_around(room.slopes, T, e.blocks, followed)
-    room.forces[:, :, :] = 0.0
+    solve_around(workspace.slopes, T, e.blocks, followed)
+    workspace.forces[:, :, :] = 0.0
     for k in range(N):
         for j in range(m):
             for i in range(c):
-                by_memory = room.J[k, m + j, 2 * m + i]
+                by_memory = workspace.J[k, m + j, 2 * m + i]
                 if by_memory != 0.0:
                     for column in range(n + 1):
-                        room.forces[k, j, column] += by_memory * followed[k, i, column]
+                        workspace.forces[k, j, column] += by_memory * followed[k, i, column]
     for q in range(L):
         for j in range(m):
             row = square[q * m + j]
@@ -385,16 +386,16 @@ def _add_memory(T, e):
             for k in range(0, N - N % 4, 4):
                 p0, p1, p2, p3 = (e.projection[q, k], e.projection[q, k + 1],
                                   e.projection[q, k + 2], e.projection[q, k + 3])
-                f0, f1, f2, f3 = (room.forces[k, j], room.forces[k + 1, j], room.forces[k + 2, j],
-                                  room.forces[k + 3, j])
+                f0, f1, f2, f3 = (workspace.forces[k, j], workspace.forces[k + 1, j],
+                                  workspace.forces[k + 2, j], workspace.forces[k + 3, j])
                 for column in range(n):
                     row[column] -= (p0 * f0[column] + p1 * f1[column] + p2 * f2[column]
                                     + p3 * f3[column])
-                room.column[q * m + j] -= p0 * f0[n] + p1 * f1[n] + p2 * f2[n] + p3 * f3[n]
+                workspace.column[q * m + j] -= p0 * f0[n] + p1 * f1[n] + p2 * f2[n] + p3 * f3[n]
             for k in range(N - N % 4, N):
                 for column in range(n):
-                    row[column] -= e.projection[q, k] * room.forces[k, j, column]
-                room.column[q * m + j] -= e.projection[q, k] * room.forces[k, j, n]
+                    row[column] -= e.projection[q, k] * workspace.forces[k, j, column]
+                workspace.column[q * m + j] -= e.projection[q, k] * workspace.forces[k, j, n]
 
 
 @helper
@@ -403,9 +404,9 @@ def _add_by_elements(u, T, central, e):
 
     They give the derivatives to the parameter by differences.
     """
-    room, rows = e.room, e.contact.rows
+    workspace, rows = e.workspace, e.contact.rows
     m, L, N = e.springs.shape[1], e.values.shape[1], len(e.tau)
-    square = room.square[: L * m * L * m].reshape((L, m, L, m))
+    square = workspace.square[: L * m * L * m].reshape((L, m, L, m))
     axes = rows.shape[1]
     tangents, spectrum = axes - 1, np.empty((L, axes * L))
     for r in range(tangents * len(e.elements)):
@@ -414,92 +415,93 @@ def _add_by_elements(u, T, central, e):
         for q in range(L):
             row = spectrum[q]
             for n in range(N):
-                factor, change = e.projection[q, n], room.by_node[r, n]
+                factor, change = e.projection[q, n], workspace.by_node[r, n]
                 for k in range(axes * L):
                     row[k] += factor * change[k]
         for q in range(L):
             for i in range(m):
-                along = rows[j, tangent, room.order[i]]
+                along = rows[j, tangent, workspace.order[i]]
                 for axis in range(axes):
                     for k in range(L):
                         for o in range(m):
-                            square[q, i, k, o] += (along * rows[j, axis, room.order[o]]
+                            square[q, i, k, o] += (along * rows[j, axis, workspace.order[o]]
                                                    * spectrum[q, axis * L + k])
     if e.numbers[STEADY] != 0.0 and e.numbers[TIMED] < 2.0:
         return
     n, p = L * m, u[len(u) - 1]
     h = (_CENTRAL if central else _ONE_SIDED) * max(abs(p), 1e-3)
-    there, width = room.vectors[7], 2.0 * h if central else h
+    there, width = workspace.vectors[7], 2.0 * h if central else h
     for k in range(n):
         there[k] = u[k]
     for side in range(2 if central else 1):
         there[n] = p + h if side == 0 else p - h
-        _follow(there, take_parameter(there[n], e), False, e, room.friction[1 + side], room.left)
+        _follow(there, take_parameter(there[n], e), False, e, workspace.friction[1 + side],
+                workspace.left)
     take_parameter(p, e)
-    change, pushed = room.node[0], room.along[:L]
+    change, pushed = workspace.node[0], workspace.along[:L]
     for r in range(tangents * len(e.elements)):
         j, tangent = r // tangents, 2 * (r % tangents)
-        above, below = room.friction[1, r], room.friction[2 if central else 0, r]
+        above, below = workspace.friction[1, r], workspace.friction[2 if central else 0, r]
         for i in range(N):
             change[i] = (above[i] - below[i]) / width
         project(e.projection, change, pushed)
         for q in range(L):
             for i in range(m):
-                room.column[q * m + i] += rows[j, tangent, i] * pushed[q]
+                workspace.column[q * m + i] += rows[j, tangent, i] * pushed[q]
 
 
 @routine
 def condense(u, T, central, e):
     """Fill ``condensed`` and ``column``, the derivatives of the residual evaluated at u."""
-    room = e.room
-    c, s = len(e.offsets), room.coupled[0]
+    workspace = e.workspace
+    c, s = len(e.offsets), workspace.coupled[0]
     m, L = e.springs.shape[1], e.values.shape[1]
     k = L * s
     if e.numbers[PLAIN] == 0.0:
         _take_rows(s, e)
     _harmonics_of_derivatives(T, s, e)
     if c > 0:
-        batch_derivatives(room.t, room.y, e.contact, e.contact, 0.0, room.f_marched,
-                          room.J_marched, np.empty((0, 0)))
+        batch_derivatives(workspace.t, workspace.y, e.contact, e.contact, 0.0, workspace.f_marched,
+                          workspace.J_marched, np.empty((0, 0)))
     if e.numbers[STEADY] != 0.0:
         _by_parameter(u, T, e)
     else:
-        _beside(u, central, e, room.followed)
+        _beside(u, central, e, workspace.followed)
     if c > 0:
         _add_memory(T, e)
     elif len(e.elements) > 0:
         _add_by_elements(u, T, central, e)
-    condensed = room.condensed[: k * (k + 1)].reshape((k, k + 1))
-    square = room.square[: k * k].reshape((k, k))
+    condensed = workspace.condensed[: k * (k + 1)].reshape((k, k + 1))
+    square = workspace.square[: k * k].reshape((k, k))
     for q in range(L):
         for place in range(s):
             i = q * s + place
             for j in range(k):
                 condensed[i, j] = square[i, j]
-            condensed[i, k] = room.column[q * m + room.order[place]]
+            condensed[i, k] = workspace.column[q * m + workspace.order[place]]
 
 
 @helper
 def take_forces(p, e, forces):
     """Fill forces (N, m) with the accelerations at the samples that were evaluated last."""
-    room, linear = e.room, e.room.linear
+    workspace, linear = e.workspace, e.workspace.linear
     m, N = e.springs.shape[1], len(e.tau)
     if e.numbers[PLAIN] != 0.0:
         for j in range(m):
-            push = room.pushes[j]
+            push = workspace.pushes[j]
             for n in range(N):
                 forces[n, j] = push[n] + e.given[0, n, j] + p * e.given[1, n, j]
             for i in range(m):
-                places, speeds = room.motion[i], room.motion[m + i]
+                places, speeds = workspace.motion[i], workspace.motion[m + i]
                 stiffness, damping = linear[0, j, i], linear[1, j, i]
                 for n in range(N):
                     forces[n, j] -= stiffness * places[n] + damping * speeds[n]
     else:
         for n in range(N):
             for j in range(m):
-                forces[n, j] = room.f[n, m + j] + e.given[0, n, j] + p * e.given[1, n, j]
+                forces[n, j] = workspace.f[n, m + j] + e.given[0, n, j] + p * e.given[1, n, j]
             for i in range(m):
-                place, speed = room.x[n, i], room.x[n, m + i]
+                place, speed = workspace.x[n, i], workspace.x[n, m + i]
                 for j in range(m):
                     forces[n, j] -= linear[0, j, i] * place + linear[1, j, i] * speed
 
@@ -507,7 +509,7 @@ def take_forces(p, e, forces):
 @helper
 def take_mean(e, mean):
     """Fill the mean derivatives (m, 2 m) of the accelerations to q and q'."""
-    room = e.room
+    workspace = e.workspace
     m, N = e.springs.shape[1], len(e.tau)
     for i in range(m):
         for j in range(2 * m):
@@ -515,7 +517,7 @@ def take_mean(e, mean):
     if e.numbers[PLAIN] != 0.0:
         for i in range(m):
             for j in range(2 * m):
-                row, total = room.rows[((j // m) * m + i) * m + j % m], 0.0
+                row, total = workspace.rows[((j // m) * m + i) * m + j % m], 0.0
                 for n in range(N):
                     total += row[n]
                 mean[i, j] = total / N
@@ -523,8 +525,8 @@ def take_mean(e, mean):
         for n in range(N):
             for i in range(m):
                 for j in range(2 * m):
-                    mean[i, j] += room.J[n, m + i, j] / N
+                    mean[i, j] += workspace.J[n, m + i, j] / N
     for i in range(m):
         for j in range(m):
-            mean[i, j] -= room.linear[0, i, j]
-            mean[i, m + j] -= room.linear[1, i, j]
+            mean[i, j] -= workspace.linear[0, i, j]
+            mean[i, m + j] -= workspace.linear[1, i, j]

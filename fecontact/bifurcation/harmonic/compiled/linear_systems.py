@@ -47,10 +47,10 @@ def choose_coupled(T, e):
     Derivatives at the samples are those evaluated last. As many modes are coupled as there is room
     for; returns 0 if that leaves more than it may, else 1.
     """
-    room = e.room
-    most = int(math.sqrt(float(len(room.a)))) // e.values.shape[1]
+    workspace = e.workspace
+    most = int(math.sqrt(float(len(workspace.a)))) // e.values.shape[1]
     m, L, N = e.springs.shape[1], e.values.shape[1], len(e.tau)
-    linear, coupling, extent = room.linear, room.beside, room.extent
+    linear, coupling, extent = workspace.linear, workspace.beside, workspace.extent
     fastest = 2.0 * math.pi * (L // 2) / T
     for i in range(m):
         for j in range(2 * m):
@@ -58,7 +58,7 @@ def choose_coupled(T, e):
     for n in range(N):
         for i in range(m):
             for j in range(2 * m):
-                value = room.J[n, m + i, j]
+                value = workspace.J[n, m + i, j]
                 extent[0, i, j] = min(extent[0, i, j], value)
                 extent[1, i, j] = max(extent[1, i, j], value)
                 extent[2, i, j] += value / N
@@ -70,34 +70,35 @@ def choose_coupled(T, e):
                 spread = extent[1, i, k] - extent[0, i, k]
                 fixed = linear[part, i, j] - extent[2, i, k]
                 if j == i:
-                    room.alone[part, i] = fixed
+                    workspace.alone[part, i] = fixed
                 else:
                     spread += abs(fixed)
                 total += fastest * spread if part == 1 else spread
         own = math.inf
         for k in range(L // 2 + 1):
             turn = 2.0 * math.pi * k / T
-            a, b = room.alone[0, i] - turn * turn, turn * room.alone[1, i]
+            a, b = workspace.alone[0, i] - turn * turn, turn * workspace.alone[1, i]
             own = min(own, math.sqrt(a * a + b * b))
         coupling[i] = total / own if own > 0.0 else math.inf
-        room.order[i] = i
+        workspace.order[i] = i
+    order = workspace.order
     for i in range(m):
         for j in range(i, 0, -1):
-            if coupling[room.order[j]] > coupling[room.order[j - 1]]:
-                room.order[j], room.order[j - 1] = room.order[j - 1], room.order[j]
+            if coupling[order[j]] > coupling[order[j - 1]]:
+                order[j], order[j - 1] = order[j - 1], order[j]
     count = 0
-    while count < m and not coupling[room.order[count]] <= _COUPLED:
+    while count < m and not coupling[order[count]] <= _COUPLED:
         count += 1
-    room.coupled[0] = max(1, min(count, most))
-    left = room.coupled[0]
-    return 1 if left == m or coupling[room.order[left]] <= _LEFT else 0
+    workspace.coupled[0] = max(1, min(count, most))
+    left = workspace.coupled[0]
+    return 1 if left == m or coupling[workspace.order[left]] <= _LEFT else 0
 
 
 @helper
 def _alone(j, k, T, e, a, b):
     """Coefficients of the cosine and sine k > 0 of mode j for right sides a, b."""
     turn = 2.0 * math.pi * k / T
-    own, loss = e.room.alone[0, j] - turn * turn, turn * e.room.alone[1, j]
+    own, loss = e.workspace.alone[0, j] - turn * turn, turn * e.workspace.alone[1, j]
     size = own * own + loss * loss
     return (own * a - loss * b) / size, (loss * a + own * b) / size
 
@@ -106,9 +107,9 @@ def _alone(j, k, T, e, a, b):
 def _each_alone(T, e, x):
     """Solve in x (n,) for the modes that are left alone."""
     m, H = e.springs.shape[1], e.values.shape[1] // 2
-    for place in range(e.room.coupled[0], m):
-        j = e.room.order[place]
-        x[j] /= e.room.alone[0, j]
+    for place in range(e.workspace.coupled[0], m):
+        j = e.workspace.order[place]
+        x[j] /= e.workspace.alone[0, j]
         for k in range(1, H + 1):
             c, s = (2 * k - 1) * m + j, 2 * k * m + j
             x[c], x[s] = _alone(j, k, T, e, x[c], x[s])
@@ -117,11 +118,12 @@ def _each_alone(T, e, x):
 @helper
 def factorise_with(row, T, e):
     """Factorise ``condensed`` with a further row (n + 1,)."""
-    room = e.room
-    m, L, count, n = e.springs.shape[1], e.values.shape[1], room.coupled[0], len(room.residual)
+    workspace = e.workspace
+    m, L, count = e.springs.shape[1], e.values.shape[1], workspace.coupled[0]
+    n = len(workspace.residual)
     whole, k = L * count, len(e.kept) * count
-    condensed = room.condensed[: whole * (whole + 1)].reshape((whole, whole + 1))
-    a = room.a[: (k + 1) * (k + 1)].reshape((k + 1, k + 1))
+    condensed = workspace.condensed[: whole * (whole + 1)].reshape((whole, whole + 1))
+    a = workspace.a[: (k + 1) * (k + 1)].reshape((k + 1, k + 1))
     for r in range(len(e.kept)):
         q = e.kept[r]
         for place in range(count):
@@ -131,66 +133,67 @@ def factorise_with(row, T, e):
                 for j in range(count):
                     a[i, first + j] = found[column + j]
             a[i, k] = found[whole]
-            a[k, i] = row[q * m + room.order[place]]
+            a[k, i] = row[q * m + workspace.order[place]]
     a[k, k] = row[n]
     if count < m:
         for i in range(n):
-            room.beside[i] = room.column[i]
-        _each_alone(T, e, room.beside)
+            workspace.beside[i] = workspace.column[i]
+        _each_alone(T, e, workspace.beside)
         for place in range(count, m):
             for q in range(L):
-                i = q * m + room.order[place]
-                a[k, k] -= row[i] * room.beside[i]
-    factorise(a, k + 1, room.pivots[: k + 1])
+                i = q * m + workspace.order[place]
+                a[k, k] -= row[i] * workspace.beside[i]
+    factorise(a, k + 1, workspace.pivots[: k + 1])
 
 
 @helper
 def _once(row, T, e, x):
     """Replace x (n + 1,) by the solution, modes that are left alone being so."""
-    room, parts = e.room, e.room.vectors[7]
-    m, L, count, n = e.springs.shape[1], e.values.shape[1], room.coupled[0], len(room.residual)
+    workspace, parts = e.workspace, e.workspace.vectors[7]
+    m, L, count = e.springs.shape[1], e.values.shape[1], workspace.coupled[0]
+    n = len(workspace.residual)
     k = len(e.kept) * count
-    a = room.a[: (k + 1) * (k + 1)].reshape((k + 1, k + 1))
+    a = workspace.a[: (k + 1) * (k + 1)].reshape((k + 1, k + 1))
     if count < m:
         _each_alone(T, e, x)
         for place in range(count, m):
             for q in range(L):
-                i = q * m + room.order[place]
+                i = q * m + workspace.order[place]
                 x[n] -= row[i] * x[i]
     known = parts[: k + 1]
     for r in range(len(e.kept)):
         for place in range(count):
-            known[r * count + place] = x[e.kept[r] * m + room.order[place]]
+            known[r * count + place] = x[e.kept[r] * m + workspace.order[place]]
     known[k] = x[n]
-    solve(a, room.pivots[: k + 1], known)
+    solve(a, workspace.pivots[: k + 1], known)
     for r in range(len(e.kept)):
         for place in range(count):
-            x[e.kept[r] * m + room.order[place]] = known[r * count + place]
+            x[e.kept[r] * m + workspace.order[place]] = known[r * count + place]
     x[n] = known[k]
     for place in range(count, m):
         for q in range(L):
-            i = q * m + room.order[place]
-            x[i] -= room.beside[i] * x[n]
+            i = q * m + workspace.order[place]
+            x[i] -= workspace.beside[i] * x[n]
 
 
 @helper
 def _applied(row, x, T, e, out):
     """Fill out (n + 1,) with the derivatives at the samples, and the row, times x (n + 1,)."""
-    room, forces = e.room, e.room.vectors[7]
-    m, N, n = e.springs.shape[1], len(e.tau), len(room.residual)
-    take_states(x, T, e, room.y)
+    workspace, forces = e.workspace, e.workspace.vectors[7]
+    m, N, n = e.springs.shape[1], len(e.tau), len(workspace.residual)
+    take_states(x, T, e, workspace.y)
     for k in range(N):
         for i in range(m):
             total = 0.0
             for j in range(2 * m):
-                total += room.J[k, m + i, j] * room.y[k, j]
+                total += workspace.J[k, m + i, j] * workspace.y[k, j]
             forces[i] = total
         for i in range(m):
-            room.y[k, m + i] = forces[i]
-    take_pushes(room.y, e)
+            workspace.y[k, m + i] = forces[i]
+    take_pushes(workspace.y, e)
     balance(x, T, 0.0, e, out)
     for i in range(n):
-        out[i] += room.column[i] * x[n]
+        out[i] += workspace.column[i] * x[n]
     out[n] = inner(row, x)
 
 
@@ -200,12 +203,12 @@ def solve_with(row, weights, T, tolerance, e, x):
 
     Returns 0 if the iteration does not converge, else 1.
     """
-    room = e.room
-    if room.coupled[0] == e.springs.shape[1]:
+    workspace = e.workspace
+    if workspace.coupled[0] == e.springs.shape[1]:
         _once(row, T, e, x)
         return 1
-    wanted, change, seen = room.vectors[6], room.vectors[8], room.vectors[9]
-    n = len(room.residual)
+    wanted, change, seen = workspace.vectors[6], workspace.vectors[8], workspace.vectors[9]
+    n = len(workspace.residual)
     for i in range(n + 1):
         wanted[i] = x[i]
     _once(row, T, e, x)

@@ -7,7 +7,7 @@ import numpy as np
 from fecontact.core.compiled import kernel
 from fecontact.core.records import Block, Vector
 from fecontact.system.kernels import given_at
-from fecontact.system.node_forces import axis_force, force_room, node_forces
+from fecontact.system.node_forces import axis_force, force_workspace, node_forces
 from fecontact.system.nodes import SystemArrays, memory_of, node_motion
 
 
@@ -26,7 +26,7 @@ def forces_at_rest(
     """
     n, d, m = s.rows.shape
     P, N, states = len(places), len(tau), s.memory.max()
-    force, rates = force_room(s)
+    force, rates = force_workspace(s)
     load, still = np.empty(m), np.zeros(2 * m + n * states)
     loads, rest, matrices = np.empty((P, N, m)), np.empty((N, m)), np.empty((P, 2, m, m))
     for place in range(P):

@@ -45,9 +45,9 @@ _SMALL = 1e-3
 @helper
 def _right_side(u, guess, row, e, change):
     """Fill change (n + 1,) with the negative residual and the distance from the guess."""
-    n = len(e.room.residual)
+    n = len(e.workspace.residual)
     for k in range(n):
-        change[k] = -e.room.residual[k]
+        change[k] = -e.workspace.residual[k]
     off = 0.0
     for k in range(n + 1):
         off += row[k] * (u[k] - guess[k])
@@ -57,7 +57,7 @@ def _right_side(u, guess, row, e, change):
 @helper
 def _take_along(row, weights, T, tolerance, e):
     """Fill ``along`` with the factors that were made last; 0 if that fails."""
-    along = e.room.along
+    along = e.workspace.along
     for k in range(len(along)):
         along[k] = 0.0
     along[len(along) - 1] = 1.0
@@ -85,10 +85,10 @@ def corrected(u, guess, row, weights, e):
 
     Returns how often factors were made; zero where it fails, -1 where modes cannot be separated.
     """
-    room = e.room
-    n = len(room.residual)
+    workspace = e.workspace
+    n = len(workspace.residual)
     tolerance = e.numbers[TOLERANCE]
-    change = room.vectors[0]
+    change = workspace.vectors[0]
     scale = 1.0 + length(weights, guess)
     before, made, fresh, made_at = np.inf, 0, True, 0.0
     for count in range(1, _STEPS + 1):
@@ -97,7 +97,7 @@ def corrected(u, guess, row, weights, e):
             return 0
         _right_side(u, guess, row, e, change)
         if fresh:
-            if len(room.condensed) < n * (n + 1) and choose_coupled(T, e) == 0:
+            if len(workspace.condensed) < n * (n + 1) and choose_coupled(T, e) == 0:
                 return -1
             condense(u, T, False, e)
             factorise_with(row, T, e)
@@ -130,10 +130,10 @@ def corrected(u, guess, row, weights, e):
 @routine
 def linearised(u, row, weights, e):
     """Fill ``along`` with the derivatives at u; 0 if that fails, else 1."""
-    room = e.room
-    n = len(room.residual)
+    workspace = e.workspace
+    n = len(workspace.residual)
     T = evaluate_at(u, True, e)
-    if not T > 0.0 or (len(room.condensed) < n * (n + 1) and choose_coupled(T, e) == 0):
+    if not T > 0.0 or (len(workspace.condensed) < n * (n + 1) and choose_coupled(T, e) == 0):
         return 0
     condense(u, T, True, e)
     factorise_with(row, T, e)
@@ -146,14 +146,14 @@ def solved(u, guess, row, weights, e):
 
     Each step has its own derivatives.
     """
-    room = e.room
-    n = len(room.residual)
-    change, scale, before = room.vectors[0], 1.0 + length(weights, guess), np.inf
+    workspace = e.workspace
+    n = len(workspace.residual)
+    change, scale, before = workspace.vectors[0], 1.0 + length(weights, guess), np.inf
     for _ in range(_EXACT_STEPS):
         if linearised(u, row, weights, e) == 0:
             return 0
         _right_side(u, guess, row, e, change)
-        T = e.room.t[1] * len(e.tau)
+        T = e.workspace.t[1] * len(e.tau)
         if solve_with(row, weights, T, PRECISE, e, change) == 0:
             return 0
         size = length(weights, change)
@@ -175,17 +175,17 @@ def settled(u, row, weights, tolerance, e):
 
     Steps are shortened until the residual falls. u is overwritten.
     """
-    room = e.room
-    n = len(room.residual)
-    change, guess, trial = room.vectors[0], room.vectors[3], room.vectors[4]
+    workspace = e.workspace
+    n = len(workspace.residual)
+    change, guess, trial = workspace.vectors[0], workspace.vectors[3], workspace.vectors[4]
     for k in range(n + 1):
         guess[k] = u[k]
     for _ in range(_CORRECTIONS):
         if linearised(u, row, weights, e) == 0:
             return 0
-        norm = math.sqrt(inner(room.residual, room.residual))
+        norm = math.sqrt(inner(workspace.residual, workspace.residual))
         _right_side(u, guess, row, e, change)
-        if solve_with(row, weights, e.room.t[1] * len(e.tau), PRECISE, e, change) == 0:
+        if solve_with(row, weights, e.workspace.t[1] * len(e.tau), PRECISE, e, change) == 0:
             return 0
         size = length(weights, change)
         if not size < np.inf:
@@ -197,7 +197,7 @@ def settled(u, row, weights, tolerance, e):
                 trial[k] = u[k] + factor * change[k]
             found = np.inf
             if evaluate_at(trial, False, e) > 0.0:
-                found = math.sqrt(inner(room.residual, room.residual))
+                found = math.sqrt(inner(workspace.residual, workspace.residual))
             if found < (1.0 - 0.1 * factor) * norm or (small and found < np.inf):
                 break
             factor *= 0.5
@@ -227,7 +227,7 @@ def fold_between(u, tangent, there, leaving, row, weights, e, found):
 
     The row is that of the tangent at u. Returns 0 where no fold is found, else 1.
     """
-    guess, n = e.room.vectors[11], len(u) - 1
+    guess, n = e.workspace.vectors[11], len(u) - 1
     way = 0.0
     for k in range(n + 1):
         way += row[k] * (there[k] - u[k])
@@ -245,7 +245,7 @@ def fold_between(u, tangent, there, leaving, row, weights, e, found):
         if solved(found, guess, row, weights, e) == 0:
             return 0
         x, f, at = at, value, new
-        value = e.room.along[n] / length(weights, e.room.along)
+        value = e.workspace.along[n] / length(weights, e.workspace.along)
         if value * f_low > 0.0:
             low = at
         else:
@@ -264,7 +264,7 @@ def bound_between(u, tangent, there, leaving, row, weights, bound, e, found):
 
     ``along`` becomes its direction, with one as the last number. Returns 0 where there is none.
     """
-    guess, unit, n = e.room.vectors[11], e.room.vectors[12], len(u) - 1
+    guess, unit, n = e.workspace.vectors[11], e.workspace.vectors[12], len(u) - 1
     way, along = 0.0, 0.0
     for k in range(n + 1):
         way += row[k] * (there[k] - u[k])

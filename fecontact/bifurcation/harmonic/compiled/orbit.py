@@ -26,7 +26,7 @@ def evaluate(
     u: Vector, wanted: int, e: Equations, forces: Matrix, mean: Matrix, row: Vector,
     weights: Vector, x: Vector,
 ) -> int:
-    """Fill forces (N, m) and leave ``residual`` and ``z`` at u (n + 1,) in the room of e.
+    """Fill forces (N, m) and leave ``residual`` and ``z`` at u (n + 1,) in the workspace of e.
 
     With derivatives, ``wanted`` = DERIVATIVES, also ``condensed``, and the mean derivatives
     (m, 2 m) of the forces to q and q'. With SOLUTION the right side x (n + 1,) becomes the solution
@@ -39,7 +39,7 @@ def evaluate(
         if settled(u, row, weights, e.numbers[TOLERANCE], e) == 0:
             return 0
         for k in range(len(x)):
-            x[k] = e.room.along[k]
+            x[k] = e.workspace.along[k]
         take_mean(e, mean)
         if e.numbers[STEADY] == 0.0:
             evaluate_at(u, False, e)

@@ -61,7 +61,7 @@ def project(table, row, out):
 @helper
 def _node_motion(j, e):
     """Fill the rows of the height of node j, its rate and its slip velocity."""
-    s, motion, node = e.contact, e.room.motion, e.room.node
+    s, motion, node = e.contact, e.workspace.motion, e.workspace.node
     m, N = e.springs.shape[1], len(e.tau)
     for n in range(N):
         node[0, n], node[1, n], node[2, n] = 0.0, 0.0, 0.0
@@ -83,7 +83,7 @@ def _near_kinks(j, level, h, e):
     Row 1, of the rate, becomes 1, or -1 where the force changes its sign thereby; row 8 is the part
     of velocities times derivatives that is due to the width of kinks.
     """
-    s, node = e.contact, e.room.node
+    s, node = e.contact, e.workspace.node
     for n in range(len(e.tau)):
         u, v, far, found = level - node[0, n], -node[1, n], 0.0, False
         node[8, n] = 0.0
@@ -101,13 +101,13 @@ def _near_kinks(j, level, h, e):
 @routine
 def _add_polynomial(derivatives, e):
     """Add polynomial forces to ``pushes`` (m, N), and their derivatives to ``rows``."""
-    room, s = e.room, e.contact
+    workspace, s = e.workspace, e.contact
     m, N = e.springs.shape[1], len(e.tau)
     x, force = np.empty(m), np.empty(m)
     gradient, stiffness = np.empty_like(s.polynomial_rows), np.empty((m, m))
     for n in range(N):
         for i in range(m):
-            x[i], force[i] = room.motion[i, n], 0.0
+            x[i], force[i] = workspace.motion[i, n], 0.0
         if not derivatives:
             add_polynomial_forces(x, s, force)
         else:
@@ -116,9 +116,9 @@ def _add_polynomial(derivatives, e):
             add_polynomial_stiffness(-1.0, gradient, s, stiffness)
             for i in range(m):
                 for k in range(m):
-                    room.rows[i * m + k, n] += stiffness[i, k]
+                    workspace.rows[i * m + k, n] += stiffness[i, k]
         for i in range(m):
-            room.pushes[i, n] += force[i]
+            workspace.pushes[i, n] += force[i]
 
 
 @routine
@@ -128,16 +128,16 @@ def plain_forces(derivatives, h, e):
     Row (part m + i) m + k of these is that of force i to displacement (part 0) or velocity k.
     h [s] is the distance of samples.
     """
-    room, s = e.room, e.contact
+    workspace, s = e.workspace, e.contact
     m, N = e.springs.shape[1], len(e.tau)
-    pushes, rows, node = room.pushes, room.rows, room.node
+    pushes, rows, node = workspace.pushes, workspace.rows, workspace.node
     for i in range(m):
         for n in range(N):
             pushes[i, n] = 0.0
     if derivatives:
         for i in range(m):
             for n in range(N):
-                room.widths[i, n] = 0.0
+                workspace.widths[i, n] = 0.0
         for p in range(2 * m * m):
             for n in range(N):
                 rows[p, n] = 0.0
@@ -178,7 +178,7 @@ def plain_forces(derivatives, h, e):
                 continue
             if len(e.onsets) > 0:
                 for n in range(N):
-                    room.widths[i, n] += (ty - tx * (node[7, n] if rubs else 0.0)) * node[8, n]
+                    workspace.widths[i, n] += (ty - tx * (node[7, n] if rubs else 0.0)) * node[8, n]
             for k in range(m):
                 by, sx = s.rows[j, 1, k], tx * s.rows[j, 0, k]
                 q, v = rows[i * m + k], rows[(m + i) * m + k]

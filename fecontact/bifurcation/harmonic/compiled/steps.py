@@ -87,7 +87,7 @@ def _keep(count, u, along, weights, sign, scales, way, e, out):
         out.u[count, k], out.tangent[count, k] = u[k], along[k] / size
     for n in range(len(e.tau)):
         for i in range(len(e.kept_offsets)):
-            out.z[count, n, i] = e.room.z[n, i]
+            out.z[count, n, i] = e.workspace.z[n, i]
     take_forces(u[len(u) - 1], e, out.forces[count])
     take_mean(e, out.mean[count])
     for k in range(len(scales)):
@@ -112,7 +112,7 @@ def _predict(u, tangent, bend, third, step, weights, guess):
 def _exact(count, row, weights, e, out):
     """Make the last tangent that of the equations at its point; 0 if its slope changes sign."""
     u, tangent = out.u[count], out.tangent[count]
-    along, n = e.room.along, len(u) - 1
+    along, n = e.workspace.along, len(u) - 1
     for k in range(n + 1):
         row[k] = weights[k] * tangent[k]
     if linearised(u, row, weights, e) == 0:
@@ -136,11 +136,12 @@ def steps(
     overwritten; ``out.step`` holds the length of the first step, and then of the next one. why (1,)
     says why the call ended. Returns the number of points.
     """
-    room = e.room
+    workspace = e.workspace
     n, H = len(u) - 1, e.values.shape[1] // 2
-    row, weights, guess, there, chord = (room.vectors[1], room.vectors[2], room.vectors[3],
-                                         room.vectors[4], room.vectors[5])
-    found, third = room.vectors[10], room.vectors[13]
+    row, weights, guess, there, chord = (workspace.vectors[1], workspace.vectors[2],
+                                         workspace.vectors[3], workspace.vectors[4],
+                                         workspace.vectors[5])
+    found, third = workspace.vectors[10], workspace.vectors[13]
     _set_weights(scales, H, weights)
     for k in range(n + 1):
         bend[k], third[k] = 0.5 * bend[k], 0.0
@@ -166,14 +167,14 @@ def steps(
         if made < 0:
             why[0] = COUPLED
             break
-        size = length(weights, room.along)
+        size = length(weights, workspace.along)
         failed = made == 0 or not 0.0 < size < np.inf
         turned = False
         if not failed:
             for k in range(n + 1):
                 chord[k] = there[k] - u[k]
             far = length(weights, chord)
-            aligned = inner(row, room.along) / size
+            aligned = inner(row, workspace.along) / size
             ahead = inner(row, chord) / far
             cosine = math.cos(e.numbers[LARGEST_TURN])
             if min(aligned, ahead) < cosine:
@@ -189,7 +190,7 @@ def steps(
                 why[0] = FAILED
                 break
             continue
-        turns = room.along[n] * slope <= 0.0
+        turns = workspace.along[n] * slope <= 0.0
         leaves = there[n] <= e.numbers[FIRST_BOUND] or there[n] >= e.numbers[LAST_BOUND]
         if turns and (leaves or e.numbers[FOLDS] == 0.0 or last_turn != 0.0):
             why[0] = EVENT
@@ -198,23 +199,23 @@ def steps(
             break
         if leaves:
             why[0] = EVENT
-            leaving = room.vectors[14]
+            leaving = workspace.vectors[14]
             for k in range(n + 1):
-                leaving[k] = room.along[k] / size
+                leaving[k] = workspace.along[k] / size
             if last_turn == 0.0 and bound_between(
                     u, tangent, there, leaving, row, weights, bound, e, found) == 1:
-                _keep(count, found, room.along, weights, 1.0 if slope > 0.0 else -1.0, scales,
+                _keep(count, found, workspace.along, weights, 1.0 if slope > 0.0 else -1.0, scales,
                       far, e, out)
                 why[0] = BOUND
                 count += 1
             break
         last = count + 1 if turns else count
-        _keep(last, there, room.along, weights, 1.0, scales, far, e, out)
+        _keep(last, there, workspace.along, weights, 1.0, scales, far, e, out)
         if turns:
             if fold_between(u, tangent, there, out.tangent[last], row, weights, e, found) == 0:
                 why[0] = EVENT
                 break
-            _keep(count, found, room.along, weights, 1.0, scales, far, e, out)
+            _keep(count, found, workspace.along, weights, 1.0, scales, far, e, out)
             out.folds[count] = 1
         way, bent = inner(row, chord), 1.0 if last_turn == 0.0 else 0.0
         cubic = smooth * bent / (way * way * way)

@@ -18,8 +18,8 @@ from fecontact.integrate.nonsmooth.dop853 import DENSE, PARTS, SLOPES, STAGES, B
 from fecontact.integrate.nonsmooth.equations import force_size, place_size
 from fecontact.integrate.nonsmooth.problem import PENETRATION, RATE, RATE_SIZE
 
-# Columns of ``room.flights``: whether a flight has just begun, its height and the rate of that, and
-# how far places were from the stop where it began.
+# Columns of ``workspace.flights``: whether a flight has just begun, its height and the rate of
+# that, and how far places were from the stop where it began.
 YOUNG, HEIGHT, CLIMB, SUNK, FLIGHT_FIELDS = 0, 1, 2, 3, 4
 # Rounding of an acceleration relative to its terms, and heights that places tell from zero,
 # relative to the places.
@@ -33,45 +33,46 @@ _TICK = 1e-4
 
 
 @helper
-def begin_flight(j, noise, p, w, room):
+def begin_flight(j, noise, p, w, workspace):
     """Begin a flight at a stop that has just opened, as w sees it; rates below ``noise`` are none.
 
     Its height is counted from where it is, up to rounding and the errors of the steps at rest.
     """
     level, rate = p.relief[2] == np.inf or not p.system.on_ground[j], w.nodes[j, RATE]
-    room.flights[j, YOUNG] = 1.0 if level else 0.0
-    room.flights[j, HEIGHT] = 0.0
-    room.flights[j, CLIMB] = -rate if -rate > noise else 0.0
-    room.flights[j, SUNK] = abs(w.nodes[j, PENETRATION])
+    workspace.flights[j, YOUNG] = 1.0 if level else 0.0
+    workspace.flights[j, HEIGHT] = 0.0
+    workspace.flights[j, CLIMB] = -rate if -rate > noise else 0.0
+    workspace.flights[j, SUNK] = abs(w.nodes[j, PENETRATION])
 
 
 @helper
-def _acceleration_size(j, p, progress, room):
+def _acceleration_size(j, p, progress, workspace):
     """Size of the terms of the acceleration of the height of stop j."""
     s, Y = p.system, progress.state
     m, total = s.rows.shape[2], 0.0
     for i in range(m):
-        size = force_size(i, Y, room.pushes, s) + abs(room.slopes[0, m + i])
+        size = force_size(i, Y, workspace.pushes, s) + abs(workspace.slopes[0, m + i])
         total += abs(s.rows[j, 1, i]) * size
     return total
 
 
 @routine
-def _rise(j, step, p, progress, room):
-    """Put the height of a young flight over the step into ``room.heights``, Bernstein coefficients.
+def _rise(j, step, p, progress, workspace):
+    """Fill ``workspace.heights`` with Bernstein coefficients of a young flight over the step.
 
-    Coefficients of its rate go into ``room.along``. Returns the rounding of the height at the end.
+    Coefficients of its rate go into ``workspace.along``. Returns the rounding of the height at the
+    end.
     """
-    row, pull, c, h = p.system.rows[j, 1], room.pull, room.nested, step.h
-    rate, heights, m = room.along, room.heights, p.rows.shape[1]
+    row, pull, c, h = p.system.rows[j, 1], workspace.pull, workspace.nested, step.h
+    rate, heights, m = workspace.along, workspace.heights, p.rows.shape[1]
     for k in range(SLOPES):
         pull[k] = 0.0
         for i in range(m):
-            pull[k] += row[i] * room.slopes[k, m + i]
+            pull[k] += row[i] * workspace.slopes[k, m + i]
     change = 0.0
     for k in range(STAGES):
         change += h * B[k] * pull[k]
-    c[0], c[1] = room.flights[j, CLIMB], change
+    c[0], c[1] = workspace.flights[j, CLIMB], change
     c[2] = h * pull[0] - change
     c[3] = 2.0 * change - h * (pull[STAGES] + pull[0])
     for q in range(len(DENSE)):
@@ -79,25 +80,26 @@ def _rise(j, step, p, progress, room):
         for k in range(SLOPES):
             c[4 + q] += h * DENSE[q, k] * pull[k]
     from_nested(c, rate)
-    heights[0] = room.flights[j, HEIGHT]
+    heights[0] = workspace.flights[j, HEIGHT]
     for k in range(PARTS + 1):
         heights[k + 1] = heights[k] + h / (PARTS + 1) * rate[k]
     # Prescribed values have the rounding of the time, a speed that of the largest so far.
     return (_ROUNDING * (1.0 + _TICK * abs(step.t) / p.tick)
-            * _acceleration_size(j, p, progress, room) * h * h
+            * _acceleration_size(j, p, progress, workspace) * h * h
             + _ROUNDING * progress.largest[RATE_SIZE] * h)
 
 
 @routine
-def first_landing(j, step, p, progress, room):
+def first_landing(j, step, p, progress, workspace):
     """First part of the step at which a young flight is at its end; NOWHERE if it is not.
 
     A fall below the rounding of the height tells that it has ended, its height when.
     """
-    rounding, heights, scratch = _rise(j, step, p, progress, room), room.heights, room.halves[0]
+    rounding = _rise(j, step, p, progress, workspace)
+    heights, scratch = workspace.heights, workspace.halves[0]
     for i in range(len(heights)):
         heights[i] += rounding
-    high = first_below(heights, room.halves)
+    high = first_below(heights, workspace.halves)
     if high > 1.0:
         return NOWHERE
     for look in range(_LOOKS):
@@ -115,17 +117,17 @@ def first_landing(j, step, p, progress, room):
 
 
 @routine
-def advance(part, step, p, progress, room):
-    """Take young flights up to a part of the step, of which ``room`` knows."""
+def advance(part, step, p, progress, workspace):
+    """Take young flights up to a part of the step, of which ``workspace`` knows."""
     s, Y = p.system, progress.state
-    for j in range(len(room.flights)):
-        if room.flights[j, YOUNG] == 0.0:
+    for j in range(len(workspace.flights)):
+        if workspace.flights[j, YOUNG] == 0.0:
             continue
-        _rise(j, step, p, progress, room)
+        _rise(j, step, p, progress, workspace)
         size = place_size(j, Y, p)
         for i in range(p.rows.shape[1]):
-            size += abs(s.rows[j, 1, i] * room.parts[0, i])
-        room.flights[j, HEIGHT] = max(value(room.heights, part, room.halves[0]), 0.0)
-        room.flights[j, CLIMB] = value(room.along, part, room.halves[0])
-        if room.flights[j, HEIGHT] > _CLEAR * size + _ABOVE * room.flights[j, SUNK]:
-            room.flights[j, YOUNG] = 0.0
+            size += abs(s.rows[j, 1, i] * workspace.parts[0, i])
+        workspace.flights[j, HEIGHT] = max(value(workspace.heights, part, workspace.halves[0]), 0.0)
+        workspace.flights[j, CLIMB] = value(workspace.along, part, workspace.halves[0])
+        if workspace.flights[j, HEIGHT] > _CLEAR * size + _ABOVE * workspace.flights[j, SUNK]:
+            workspace.flights[j, YOUNG] = 0.0

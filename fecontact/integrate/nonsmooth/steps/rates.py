@@ -31,23 +31,23 @@ def nothing_given() -> np.ndarray:
 
 
 @helper
-def set_prescribed(t, s, room):
-    """Fill ``room.given``, and ``loads`` and ``pushes`` (m,) with modal forces of loads, of all."""
-    given = room.given
+def set_prescribed(t, s, workspace):
+    """Fill ``workspace.given``, and ``loads``, ``pushes`` (m,): modal forces of loads, of all."""
+    given = workspace.given
     if given[WHEN] == t:
         return
     moved = ground_motion(t, s)
     given[WHEN], given[TRAVEL], given[SPEED] = t, moved.travel, moved.speed
-    set_constant_load(s, room.loads)
-    add_loads(t, s, room.loads)
-    for i in range(len(room.loads)):
-        room.pushes[i] = room.loads[i]
+    set_constant_load(s, workspace.loads)
+    add_loads(t, s, workspace.loads)
+    for i in range(len(workspace.loads)):
+        workspace.pushes[i] = workspace.loads[i]
     for axis in range(len(s.drive)):
         stiffness, damping = s.drive_stiffness[axis], s.drive_damping[axis]
         if stiffness != 0.0 or damping != 0.0:
             value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
             given[MOTION + 2 * axis], given[MOTION + 2 * axis + 1] = value, rate
-            add_pull(stiffness * value + damping * rate, axis, s, room.pushes)
+            add_pull(stiffness * value + damping * rate, axis, s, workspace.pushes)
 
 
 @helper
@@ -57,16 +57,16 @@ def _moved(given):
 
 
 @routine
-def set_rates(t, Y, p, progress, w, room, out):
+def set_rates(t, Y, p, progress, w, workspace, out):
     """Fill out (2 m,) with q' and q'' at Y, and w with what acts, except for limits of stick."""
     s = p.system
     m = s.rows.shape[2]
-    set_prescribed(t, s, room)
+    set_prescribed(t, s, workspace)
     acceleration = out[m : 2 * m]
     for i in range(m):
         out[i] = Y[m + i]
-    body_acceleration(room.pushes, Y, s, acceleration)
-    add_contact_forces(t, Y, _moved(room.given), p, progress.status, progress.closed, w,
+    body_acceleration(workspace.pushes, Y, s, acceleration)
+    add_contact_forces(t, Y, _moved(workspace.given), p, progress.status, progress.closed, w,
                        acceleration)
 
 
@@ -107,15 +107,15 @@ def _drive_powers(given, Y, s, out):
 
 
 @routine
-def set_powers(Y, p, progress, w, room, out):
+def set_powers(Y, p, progress, w, workspace, out):
     """Fill out (p + n,) with the powers at Y, where :func:`set_rates` has been last."""
     s = p.system
     m = s.rows.shape[2]
     share(p, progress.status, w)
     for k in range(POWER_COUNT):
         out[k] = 0.0
-    _drive_powers(room.given, Y, s, out)
+    _drive_powers(workspace.given, Y, s, out)
     for i in range(m):
-        out[LOAD] += room.loads[i] * Y[m + i]
+        out[LOAD] += workspace.loads[i] * Y[m + i]
     matrix_powers((0, m, 0, m), Y, s, out)
-    contact_powers(_moved(room.given), s, w.nodes, w.friction, p.rigid == 0, out)
+    contact_powers(_moved(workspace.given), s, w.nodes, w.friction, p.rigid == 0, out)

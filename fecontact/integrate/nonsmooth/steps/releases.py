@@ -59,11 +59,11 @@ def set_left(p, progress, w, out):
 
 
 @routine
-def _forces(part, step, p, progress, w, room, out):
+def _forces(part, step, p, progress, w, workspace, out):
     """Fill out (2 k + n,) with the margins at a part of the step."""
-    interpolate(part, progress.state, room.parts, room.state[: 2 * p.rows.shape[1]])
-    set_rates(min(step.t + part * step.h, step.latest), room.state, p, progress, w, room,
-              room.rate)
+    interpolate(part, progress.state, workspace.parts, workspace.state[: 2 * p.rows.shape[1]])
+    set_rates(min(step.t + part * step.h, step.latest), workspace.state, p, progress, w, workspace,
+              workspace.rate)
     set_left(p, progress, w, out)
 
 
@@ -76,22 +76,22 @@ def _past(out, size):
 
 
 @helper
-def _narrow(low, high, step, p, progress, w, room):
+def _narrow(low, high, step, p, progress, w, workspace):
     """Note the contacts that let go first between two parts of the step."""
-    clusters, left, size = len(p.rows), room.left, room.scale
+    clusters, left, size = len(p.rows), workspace.left, workspace.scale
     for _ in range(60):
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
             break
-        _forces(middle, step, p, progress, w, room, left[0])
+        _forces(middle, step, p, progress, w, workspace, left[0])
         if _past(left[0], size):
             high = middle
         else:
             low = middle
-    _forces(high, step, p, progress, w, room, left[0])
+    _forces(high, step, p, progress, w, workspace, left[0])
     for r in range(len(size)):
         if left[0, r] < -_FORCE_ROUNDING * size[r]:
-            room.place[r if r < clusters else r - clusters] = high
+            workspace.place[r if r < clusters else r - clusters] = high
 
 
 @helper
@@ -118,12 +118,12 @@ def _clear(left, size):
 
 
 @helper
-def _lowest(begin, width, step, p, progress, w, room):
+def _lowest(begin, width, step, p, progress, w, workspace):
     """Place in a part of the step where a contact lets go for a moment between the quarters.
 
     NOWHERE if none does. The vertices of parabolas lead to the smallest remaining margins.
     """
-    left, size, scratch = room.left, room.scale, room.left[QUARTERS + 1]
+    left, size, scratch = workspace.left, workspace.scale, workspace.left[QUARTERS + 1]
     for r in range(len(size)):
         if _bound(r, left) >= -_FORCE_ROUNDING * size[r]:
             continue
@@ -133,16 +133,16 @@ def _lowest(begin, width, step, p, progress, w, room):
         middle = begin + apart * least
         for _ in range(_PARABOLAS):
             middle = min(max(middle, begin + apart), begin + width - apart)
-            _forces(middle - apart, step, p, progress, w, room, scratch)
+            _forces(middle - apart, step, p, progress, w, workspace, scratch)
             before = scratch[r]
-            _forces(middle + apart, step, p, progress, w, room, scratch)
+            _forces(middle + apart, step, p, progress, w, workspace, scratch)
             after = scratch[r]
-            _forces(middle, step, p, progress, w, room, scratch)
+            _forces(middle, step, p, progress, w, workspace, scratch)
             curved = before - 2.0 * scratch[r] + after
             if curved > 0.0:
                 middle += 0.5 * apart * (before - after) / curved
             middle = min(max(middle, begin), begin + width)
-            _forces(middle, step, p, progress, w, room, scratch)
+            _forces(middle, step, p, progress, w, workspace, scratch)
             if _past(scratch, size):
                 return middle
             apart *= _CLOSER
@@ -150,36 +150,36 @@ def _lowest(begin, width, step, p, progress, w, room):
 
 
 @helper
-def first_let_go(end, step, p, progress, w, room):
+def first_let_go(end, step, p, progress, w, workspace):
     """Note where sticking clusters and closed stops first let go, up to the part ``end``."""
-    left, size, known = room.left, room.scale, holding(progress)
+    left, size, known = workspace.left, workspace.scale, holding(progress)
     size[:] = 0.0
-    room.waiting[0, 0], room.waiting[0, 1], waiting = 0.0, end, 1
+    workspace.waiting[0, 0], workspace.waiting[0, 1], waiting = 0.0, end, 1
     while waiting > 0:
-        begin, width = room.waiting[waiting - 1, 0], room.waiting[waiting - 1, 1]
+        begin, width = workspace.waiting[waiting - 1, 0], workspace.waiting[waiting - 1, 1]
         low, high = 0.0, NOWHERE
         for i in range(QUARTERS + 1):
             here = begin + width * i / QUARTERS
             if known and (here == 0.0 or here == 1.0):
-                left[i, :] = room.ends[int(here)]
+                left[i, :] = workspace.ends[int(here)]
             else:
-                _forces(here, step, p, progress, w, room, left[i])
+                _forces(here, step, p, progress, w, workspace, left[i])
             for r in range(len(size)):
                 size[r] = max(size[r], abs(left[i, r]))
             if i > 0 and _past(left[i], size):
                 low, high = begin + width * (i - 1) / QUARTERS, here
                 break
         if high <= 1.0:
-            _narrow(low, high, step, p, progress, w, room)
+            _narrow(low, high, step, p, progress, w, workspace)
             return
         clear = _clear(left, size)
         if not clear and width > _SHORTEST * end:
-            room.waiting[waiting, 0], room.waiting[waiting - 1, 0] = begin, begin + 0.5 * width
-            room.waiting[waiting, 1] = room.waiting[waiting - 1, 1] = 0.5 * width
+            workspace.waiting[waiting] = begin, 0.5 * width
+            workspace.waiting[waiting - 1] = begin + 0.5 * width, 0.5 * width
             waiting += 1
             continue
-        high = NOWHERE if clear else _lowest(begin, width, step, p, progress, w, room)
+        high = NOWHERE if clear else _lowest(begin, width, step, p, progress, w, workspace)
         if high <= 1.0:
-            _narrow(begin, high, step, p, progress, w, room)
+            _narrow(begin, high, step, p, progress, w, workspace)
             return
         waiting -= 1

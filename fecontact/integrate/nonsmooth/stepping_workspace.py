@@ -7,19 +7,19 @@ import numpy as np
 from fecontact.core.records import Matrix, Vector
 from fecontact.integrate.bernstein import DEPTH, fit
 from fecontact.integrate.nonsmooth.problem import NonsmoothProblem, node_columns, tangents
-from fecontact.integrate.nonsmooth.stage_newton import Hold, NewtonRoom, newton_room_for
+from fecontact.integrate.nonsmooth.stage_newton import Hold, NewtonWorkspace, newton_workspace_for
 from fecontact.system.powers import POWER_COUNT
 
 STAGES = 3
-# Entries of `Room.tries`: the largest floor of the slip velocities, attempts in a row whose error
-# was too large, and attempts at short steps whose stages could not be solved.
+# Entries of `Workspace.tries`: the largest floor of the slip velocities, attempts in a row whose
+# error was too large, and attempts at short steps whose stages could not be solved.
 TRIES = 3
 SLOWEST, IN_A_ROW, UNSOLVED = range(TRIES)
 # From values at the thirds of a step to the coefficients of a cubic.
 THIRDS = fit(np.arange(4) / 3.0)
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Workspace of implicit steps.
 
     Attributes
@@ -44,7 +44,7 @@ class Room(NamedTuple):
         Polynomials over the step, and parts of it.
     """
 
-    newton: NewtonRoom
+    newton: NewtonWorkspace
     hold: Hold
     states: Matrix
     accelerations: Matrix
@@ -64,15 +64,15 @@ class Room(NamedTuple):
     halves: Matrix
 
 
-def room_for(problem: NonsmoothProblem) -> Room:
+def workspace_for(problem: NonsmoothProblem) -> Workspace:
     """Workspace for a problem."""
     n, _, m = problem.system.rows.shape
     size, k = m + POWER_COUNT + n, tangents(problem)
     start, known = np.zeros((2, m))
     before, after = np.zeros((2, size))
-    return Room(newton_room_for(n, m, k, len(problem.system.polynomial_rows)),
-                Hold(np.zeros(n), np.zeros(k * n), np.zeros(k * n)),
-                np.zeros((STAGES, 2 * m)), np.zeros((STAGES, m)), np.zeros((STAGES, k * n)),
-                np.zeros((STAGES, size - m)), start, known, np.zeros(m + size), before, after,
-                np.zeros((n, node_columns(problem))), np.zeros(k * n),
-                np.zeros(n), np.zeros(TRIES), np.zeros(4), np.zeros(4), np.zeros((DEPTH, 5)))
+    return Workspace(newton_workspace_for(n, m, k, len(problem.system.polynomial_rows)),
+                     Hold(np.zeros(n), np.zeros(k * n), np.zeros(k * n)),
+                     np.zeros((STAGES, 2 * m)), np.zeros((STAGES, m)), np.zeros((STAGES, k * n)),
+                     np.zeros((STAGES, size - m)), start, known, np.zeros(m + size), before, after,
+                     np.zeros((n, node_columns(problem))), np.zeros(k * n),
+                     np.zeros(n), np.zeros(TRIES), np.zeros(4), np.zeros(4), np.zeros((DEPTH, 5)))
