@@ -86,10 +86,10 @@ def reduced(held, tolerance, eigensolver="direct"):
 
 @pytest.mark.parametrize(("room", "layers"), [(3e9, (2, 4, 6)), (0.0, (2, 4, 6)), (3e9, ())])
 @pytest.mark.parametrize("held", ["", "top"])
-def test_no_row_lacks_more_than_the_tolerance(workspace, layers, held, monkeypatch):
+def test_no_row_lacks_more_than_the_tolerance(room, layers, held, monkeypatch):
     """Compliance against that by factors, with few vectors more; with few displacements or all."""
     monkeypatch.setattr(residual_vectors, "_LARGE", 0)
-    monkeypatch.setattr(iterated, "_ROOM", workspace)
+    monkeypatch.setattr(iterated, "_ROOM", room)
     monkeypatch.setattr(iterated, "_LAYERS", layers)
     monkeypatch.setattr(iterated, "_WORTH", 0.9)
     body = high_column(held)
