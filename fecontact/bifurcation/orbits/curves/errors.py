@@ -88,7 +88,10 @@ def _form(point: BranchPoint, finer: BranchPoint | None) -> dict[str, Array]:
     if not ("normal_form" in one and "normal_form" in other):
         return dict.fromkeys(_FORM, np.zeros(0)) if "normal_form" in one else {}
     value = np.asarray(other["normal_form"])
-    change = np.abs(value - np.asarray(one["normal_form"]))
+    before = np.asarray(one["normal_form"])
+    # Rounding decides which of two critical pairs comes first.
+    orders = (before, before[::-1]) if point.kind == "double Neimark-Sacker" else (before,)
+    change = np.abs(value - min(orders, key=lambda form: float(np.abs(value - form).max())))
     return dict(zip(_FORM, (value, change + np.asarray(other["normal_form_error"])), strict=True))
 
 
