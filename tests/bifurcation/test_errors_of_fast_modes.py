@@ -118,7 +118,9 @@ def beam_branch():
 def test_errors_of_a_beam():
     """With and without stick; elastic modes turn once to some five or ten times in an interval."""
     field, frequencies, branch = beam_branch()
-    assert branch.message == ""
+    # States are accurate, but multipliers of the fastest modes are not; see test_fast_modes.py.
+    assert branch.message.startswith("Multipliers of fast modes are not resolved")
+    assert branch.message.count(". ") == 1
     assert branch.column("state_error").max() <= 1e-5
     alone = []
     for point in branch.points[4::5]:

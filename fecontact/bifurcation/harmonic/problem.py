@@ -16,6 +16,7 @@ from fecontact.bifurcation.continuation.problem import (
     Problem,
     enlarged,
 )
+from fecontact.bifurcation.fields.fast_modes import unresolved_modes
 from fecontact.bifurcation.fields.jumps import missed_jumps
 from fecontact.bifurcation.harmonic import estimates
 from fecontact.bifurcation.harmonic.balance import (
@@ -35,7 +36,7 @@ from fecontact.bifurcation.harmonic.compiled.orbit import (
 )
 from fecontact.bifurcation.harmonic.compiled.step_batches import StepBatches
 from fecontact.bifurcation.harmonic.series import differentiated, shifted
-from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions
+from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions, stability_grid
 from fecontact.bifurcation.harmonic.stored import StoredOrbits, StoredValues
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests
 from fecontact.bifurcation.orbits.same_orbit import (
@@ -318,10 +319,18 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         return found
 
     def note(self, points: Sequence[BranchPoint]) -> str:
-        """Note on multipliers that are lost or miss jumps of forces; empty without stability."""
+        """Note on multipliers that are lost, miss jumps of forces, or are of modes too fast.
+
+        Empty without stability.
+        """
         if self.stability is None:
             return ""
-        return " ".join(filter(None, (super().note(points), missed_jumps(self.field, points))))
+        missed, fast = missed_jumps(self.field, points), ""
+        if self.stability == "transitions" and not self.layout.memory:
+            grid = stability_grid(self)
+            fast = unresolved_modes(self.field, points, lambda point: grid,
+                                    f"take more than {self.samples} samples")
+        return " ".join(filter(None, (super().note(points), missed, fast)))
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
         """At orbits that are homoclinic to a saddle, as far as numbers tell."""

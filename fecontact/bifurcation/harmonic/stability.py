@@ -114,6 +114,12 @@ def _intervals(problem: Balance) -> tuple[int, bool]:
     return max(_LEAST, _INTERVALS * problem.harmonics, problem.samples // per_sample), False
 
 
+def stability_grid(problem: Balance) -> tuple[Array, Array]:
+    """Widths (N,) of the intervals of the linearised equations, in periods, and points in each."""
+    N, radau = _intervals(problem)
+    return np.full(N, 1.0 / N), _collocation(radau)[0]
+
+
 def _floquet(problem: Balance, T: float, J: Array) -> Floquet:
     """Multipliers from derivatives (P, d, d) at the collocation points."""
     layout = problem.layout

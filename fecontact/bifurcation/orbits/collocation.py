@@ -10,10 +10,11 @@ from fecontact.bifurcation.continuation import predictor
 from fecontact.bifurcation.continuation.newton import Solution, weighted_norm, weighted_product
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
+from fecontact.bifurcation.fields.fast_modes import unresolved_modes
 from fecontact.bifurcation.fields.jumps import missed_jumps
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 from fecontact.bifurcation.orbits.floquet import FloquetTests
-from fecontact.bifurcation.orbits.mesh import carry_over, equidistributed, extremes
+from fecontact.bifurcation.orbits.mesh import carry_over, equidistributed, extremes, rule
 from fecontact.bifurcation.orbits.normal_forms import examined
 from fecontact.bifurcation.orbits.same_orbit import (
     HALVING,
@@ -192,9 +193,15 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
                 "maximum": high, "state_error": error}
 
     def note(self, points: Sequence[BranchPoint]) -> str:
-        """Note on multipliers that are lost, or miss jumps of forces."""
-        missed = missed_jumps(self.field, points) if self.second is None else ""
-        return " ".join(filter(None, (super().note(points), missed)))
+        """Note on multipliers that are lost, miss jumps of forces, or are of modes too fast."""
+        if self.second is not None:
+            return super().note(points)
+        gauss = rule(self.degree).points
+        fast = unresolved_modes(
+            self.field, points, lambda point: (np.diff(np.asarray(point.values["mesh"])), gauss),
+            "take more intervals")
+        missed = missed_jumps(self.field, points)
+        return " ".join(filter(None, (super().note(points), missed, fast)))
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Range of the number of unstable multipliers, given their errors."""
