@@ -2,7 +2,14 @@
 
 import numpy as np
 import pytest
-from bifurcation.torus_fields import SECOND, forced_van_der_pol, two_tone_duffing
+from bifurcation.torus_fields import (
+    SECOND,
+    duffing,
+    forced_van_der_pol,
+    period_of_w,
+    two_tone_duffing,
+)
+from numba import njit
 
 import fecontact as fc
 from fecontact.bifurcation import (
@@ -33,7 +40,7 @@ def settled(field, initial, begin, end, outputs=8001):
 
 def without_second(field):
     """The orbit that the first excitation alone gives, as a guess for both."""
-    found = periodic_motion(field.with_(second=0.0), initial=[0.0, 0.0])
+    found = periodic_motion(field.with_(second=0.0), initial=np.zeros(field.dimension))
     return PeriodicMotion(found.times, found.states, found.period)
 
 
@@ -180,6 +187,27 @@ def test_two_tones_of_a_duffing_oscillator_meet_a_long_run():
     # The mean divergence of the field is that of the multipliers.
     assert np.log(point.values["multipliers"]).sum() == pytest.approx(
         -0.1 * CIRCLE / 1.7, rel=1e-6)
+
+
+on_duffing = njit(duffing)
+
+
+def duffing_and_fast_state(t, x, p, out):
+    on_duffing(t, x, p, out)
+    out[2] = x[0] - 3000.0 * x[2]
+
+
+def test_modes_too_fast_for_the_multipliers_are_noted():
+    slow = two_tone_duffing()
+    field = vector_field(duffing_and_fast_state, dict(zip(slow.parameters, slow.values,
+                                                          strict=True)), ["x", "v", "y"],
+                         period=period_of_w)
+    for tried, noted in ((slow, False), (field, True)):
+        branch = torus_branch(tried, without_second(tried), "second", second=SECOND,
+                              method=TorusBalance((5, 5)), options=ContinuationOptions(points=1))
+        # 3000 / 1.7 times the frequency of the first excitation.
+        assert ("up to 1.76e+03 times" in branch.message) is noted
+
 
 def test_the_second_excitation_grows_from_nothing():
     field = two_tone_duffing(second=0.0)

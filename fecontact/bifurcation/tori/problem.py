@@ -21,7 +21,12 @@ from fecontact.bifurcation.tori.series import (
     projected,
     turned,
 )
-from fecontact.bifurcation.tori.stability import TorusStability, stability_of
+from fecontact.bifurcation.tori.stability import (
+    RESOLVED,
+    TorusStability,
+    fastest_change,
+    stability_of,
+)
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
@@ -234,6 +239,12 @@ class TorusProblem(Problem):
                                     for point in points):
             notes.append("Multipliers that should be one are off by more than 0.05 at some points: "
                          "their stability is uncertain.")
+        if self.multipliers and points:
+            fastest = self.linearise(points[-1].u).fastest_change
+            if fastest > RESOLVED:
+                notes.append(f"Modes of up to {fastest / (2.0 * np.pi):.3g} times the first "
+                             f"frequency are too fast for the multipliers, which tell nothing of "
+                             f"their growth: check the stability by fecontact.simulate.")
         return " ".join(notes)
 
 
@@ -431,12 +442,17 @@ class TorusLinearisation:
     @cached_property
     def stability(self) -> TorusStability:
         """Multipliers of the torus, from motions along it."""
-        problem, values = self.problem, self.problem.parameters(self.u)
-        first, second = self.frequencies
+        problem = self.problem
+        return stability_of(self._jacobians, self.frequencies, problem.orders,
+                            problem.samples[1] | 1, len(problem.unknown))
 
-        def jacobians(taus: Array, count: int) -> Array:
-            x = problem.states(self.u, taus, count, second / first)
-            return problem.excitation.on_lines(taus, x, values, first)[1]
+    @property
+    def fastest_change(self) -> float:
+        """See :func:`fecontact.bifurcation.tori.stability.fastest_change`."""
+        return fastest_change(self._jacobians, self.frequencies[0], self.problem.orders)
 
-        return stability_of(jacobians, self.frequencies, problem.orders, problem.samples[1] | 1,
-                            len(problem.unknown))
+    def _jacobians(self, taus: Array, count: int) -> Array:
+        """Derivatives of the rates on lines along the torus."""
+        problem, (first, second) = self.problem, self.frequencies
+        x = problem.states(self.u, taus, count, second / first)
+        return problem.excitation.on_lines(taus, x, problem.parameters(self.u), first)[1]

@@ -20,9 +20,12 @@ from fecontact.core.types import Array, Integers
 
 Jacobians: TypeAlias = Callable[[Array, int], Array]
 
+# Change over a period of modes beyond which they are not resolved.
+RESOLVED = 600.0
 # Collocation of the linearised equations by Radau's points, which damps what is stiff: degree,
 # intervals per harmonic and at least, and changes of the fastest mode on an interval up to a most.
-_DEGREE, _INTERVALS, _LEAST, _CHANGES, _MOST = 4, 4, 24, 1.5, 400
+_DEGREE, _INTERVALS, _LEAST, _CHANGES = 4, 4, 24, 1.5
+_MOST = int(RESOLVED / _CHANGES)
 # Periods over which the growth is averaged, and before.
 _PERIODS, _BEFORE = 2000, 200
 # Distance from one within which a multiplier counts as one, at least.
@@ -69,6 +72,12 @@ def stability_of(
     return TorusStability(growth, near[:unknown])
 
 
+def fastest_change(jacobians: Jacobians, frequency: float, orders: tuple[int, int]) -> float:
+    """Largest modulus of the eigenvalues along the torus times the period 1 / f1."""
+    few = jacobians(np.arange(2 * orders[0]) / (2.0 * orders[0]), 2 * orders[1] + 1)
+    return float(np.abs(np.linalg.eigvals(few)).max()) / frequency
+
+
 def transition_matrices(
     jacobians: Jacobians, frequency: float, orders: tuple[int, int], lines: int
 ) -> Array:
@@ -85,9 +94,8 @@ def transition_matrices(
     lines : int
         Q.
     """
-    few = jacobians(np.arange(2 * orders[0]) / (2.0 * orders[0]), 2 * orders[1] + 1)
-    fastest = float(np.abs(np.linalg.eigvals(few)).max()) / frequency
-    N = max(_LEAST, _INTERVALS * orders[0], min(int(fastest / _CHANGES), _MOST))
+    wanted = int(fastest_change(jacobians, frequency, orders) / _CHANGES)
+    N = max(_LEAST, _INTERVALS * orders[0], min(wanted, _MOST))
     points, basis, slopes = radau_rule(_DEGREE)
     J = jacobians(((np.arange(N)[:, None] + points) / N).reshape(-1), lines)
     d = J.shape[-1]
