@@ -21,7 +21,8 @@ from typing import Any, NamedTuple
 
 import llvmlite
 import numba
-from llvmlite.binding import get_host_cpu_features
+from llvmlite import ir
+from llvmlite.binding import get_host_cpu_features, parse_assembly, parse_bitcode
 from numba.core.caching import IndexDataCacheFile
 
 from fecontact.core.errors import ModelWarning
@@ -155,9 +156,28 @@ class _StoredCode(IndexDataCacheFile):
             raise FileNotFoundError(path) from error
 
     def save(self, key: Any, data: Any) -> None:
-        """Store code under a key, if that is possible."""
+        """Store code under a key, if that is possible: machine code, and the names in it.
+
+        Numba would store what other functions could be linked with. Nothing is linked with what
+        is loaded, and reading it takes ten times the memory of machine code.
+        """
+        (name, kind, (machine_code, source)), *others = data
         with suppress(OSError):
-            super().save(key, data)
+            super().save(key, ((name, kind, (machine_code, _names_alone(source))), *others))
+
+
+def _names_alone(bitcode: bytes) -> bytes:
+    """Bitcode with what is defined in some bitcode, and nothing in it."""
+    module, byte = ir.Module(), ir.IntType(8)
+    defined = parse_bitcode(bitcode)
+    for each in defined.functions:
+        if not each.is_declaration:
+            made = ir.Function(module, ir.FunctionType(ir.VoidType(), ()), each.name)
+            ir.IRBuilder(made.append_basic_block()).ret_void()
+    for each in defined.global_variables:
+        if not each.is_declaration:
+            ir.GlobalVariable(module, byte, each.name).initializer = byte(0)
+    return bytes(parse_assembly(str(module)).as_bitcode())
 
 
 def _remove(path: str) -> None:

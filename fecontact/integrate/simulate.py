@@ -22,6 +22,7 @@ from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.integrate.solvers import AUTO, CompiledSolver, Solver, require_solver
 from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Solution, Status, Trajectory
+from fecontact.laws.normal.linear import PrescribedForce
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import in_time
 from fecontact.system.fields.vector_field import VectorField
@@ -245,23 +246,28 @@ def _warn_of_depth(system: ContactSystem, state: Array, time: float) -> None:
 
     Faces that loads and bolts press together may be far beyond the scale of its law.
     """
-    depth, scale = _depth(system, state, time), system.penetration_scale
-    if depth > _DEEP * scale and depth > 10.0 * _depth_at_rest(system, time):
-        where = "the ground" if system.basis.ground_nodes.all() else "the other side"
-        warnings.warn(f"The initial state is {depth:.3g} m deep in {where}, {depth / scale:.2g} "
-                      f"times the {scale:.3g} m over which the normal law rises: the body will be "
-                      f"thrown off.", stacklevel=3)
+    depth = _depths(system, state, time)
+    for nodes, _, law in system.law_groups("normal"):
+        deepest, scale = depth[nodes].max(initial=-np.inf), law.penetration_scale
+        if law.bilateral or isinstance(law, PrescribedForce) or not deepest > _DEEP * scale:
+            continue
+        if deepest > 10.0 * _depths_at_rest(system, time)[nodes].max():
+            where = "the ground" if system.basis.ground_nodes.all() else "the other side"
+            warnings.warn(f"The initial state is {deepest:.3g} m deep in {where}, "
+                          f"{deepest / scale:.2g} times the {scale:.3g} m over which the normal "
+                          f"law rises: the body will be thrown off.", stacklevel=3)
+            return
 
 
-def _depth(system: ContactSystem, state: Array, time: float) -> float:
-    return float(system.at(state, time=time).penetration.max(initial=-np.inf))
+def _depths(system: ContactSystem, state: Array, time: float) -> Array:
+    return system.at(state, time=time).penetration
 
 
-def _depth_at_rest(system: ContactSystem, time: float) -> float:
+def _depths_at_rest(system: ContactSystem, time: float) -> Array:
     try:
-        return _depth(system, initial_state(system, "rest", time), time)
+        return _depths(system, initial_state(system, "rest", time), time)
     except AnalysisError:
-        return 0.0
+        return np.zeros(system.basis.contact_nodes)
 
 
 def require_runs(solver: Solver, system: ContactSystem | VectorField, what: str) -> None:

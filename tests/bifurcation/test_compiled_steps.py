@@ -1,5 +1,7 @@
 """Compiled steps of frequency responses beside plain ones; preloads; corners of responses."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from oscillators import duffing, jenkins_amplitude, jenkins_system, one_mode
@@ -13,9 +15,10 @@ from fecontact.bifurcation import (
     frequency_response,
     orbit_branch,
 )
+from fecontact.bifurcation.harmonic.compiled import arrays
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.core.errors import InputError
-from fecontact.laws import BilateralPolynomial, JenkinsFriction, PrescribedForce
+from fecontact.laws import BilateralPolynomial, Frictionless, JenkinsFriction, PrescribedForce
 
 BOUNDS = (0.6 / TURN, 1.8 / TURN)
 
@@ -101,11 +104,40 @@ def frequency_values(field, point):
     return problem.point(u, problem.linearise(u), tangent)
 
 
-def test_derivatives_of_several_modes_with_memory_are_those_of_the_residual():
+def mixed_row():
+    """Four masses: a Jenkins element, a smooth contact, a cubic spring and none."""
+    rows = np.zeros((3, 3, 4))
+    for node, (axis, mass) in enumerate(((0, 0), (0, 1), (1, 2))):
+        rows[node, axis, mass] = 1.0
+    B = np.zeros((3, 4))
+    B[0, 1] = 1.0
+    K = 3.0 * np.eye(4) - np.diag([1.0] * 3, 1) - np.diag([1.0] * 3, -1)
+    faces = {"base": rows[:1], "rail": rows[1:2], "spring": rows[2:]}
+    basis = basis_from_matrices(np.eye(4), K, {"contact": faces, "B": B, "C": B}, damping=0.04 * K)
+    return ContactSystem(
+        basis, normal={"base": PrescribedForce(1.0), "rail": PrescribedForce(1.0),
+                       "spring": BilateralPolynomial(0.0, 1.0)},
+        friction={"base": JenkinsFriction(0.5, 0.5), "rail": Frictionless(),
+                  "spring": Frictionless()},
+        drive=Drive(stiffness_x=1.0, amplitude_x=0.8, frequency_hz=0.9 / TURN))
+
+
+@pytest.fixture
+def garbage(monkeypatch):
+    """Arrays of compiled harmonic balance come filled with what is no number."""
+    def filled(shape, dtype=float):
+        return np.full(shape, np.nan) if dtype is float else np.full(shape, -1000, dtype=dtype)
+
+    monkeypatch.setattr(arrays, "np", SimpleNamespace(**{**vars(np), "empty": filled}))
+
+
+@pytest.mark.usefixtures("garbage")
+@pytest.mark.parametrize("system", [row_of_masses, mixed_row, cubic_system])
+def test_derivatives_of_several_modes_with_memory_are_those_of_the_residual(system):
     from fecontact.bifurcation.harmonic.problem import CompiledLinearisation
     from fecontact.bifurcation.harmonic.starts import problem_for
 
-    field = contact_field(row_of_masses(), ["drive.frequency_hz"])
+    field = contact_field(system(), ["drive.frequency_hz"])
     problem = problem_for(field, field.values, 0, HarmonicBalance(3, 48),
                           np.ones(field.dimension + 2))
     u = np.append(np.random.default_rng(2).normal(size=problem.size), 0.9 / TURN)
@@ -117,6 +149,15 @@ def test_derivatives_of_several_modes_with_memory_are_those_of_the_residual():
         differences[:, k] = (problem.linearise(u + h).residual
                              - problem.linearise(u - h).residual) / 2e-6
     assert here.condensed == pytest.approx(differences, abs=2e-7 * np.abs(differences).max())
+
+
+@pytest.mark.usefixtures("garbage")
+@pytest.mark.parametrize("system", [row_of_masses, mixed_row, cubic_system])
+def test_responses_do_not_depend_on_what_was_in_memory(system):
+    branch = frequency_response(system(), BOUNDS, observe=("B", "x"),
+                                method=HarmonicBalance(5, 128, stability=None)).branches[0]
+    assert len(branch) > 10
+    assert np.isfinite(branch.column("observed_amplitude")).all()
 
 
 def test_folds_are_found_without_stability(tmp_path):

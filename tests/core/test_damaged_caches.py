@@ -1,6 +1,7 @@
 """Compiled code on disk that is cut short, empty or garbage: compiled again, never a crash."""
 
 import os
+import pickle
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from unittest import mock
 
 import numba
 import pytest
+from llvmlite.binding import parse_bitcode
 
 from fecontact.core import compiled
 from fecontact.core.lanes import vectors
@@ -102,6 +104,18 @@ def test_whole_code_is_found_and_damaged_code_stored_anew(tmp_path, stored):
         path.write_bytes(b"")
     assert hits(folder) == ["0", "0"]
     assert hits(folder) == ["1", "1"]
+
+
+def test_machine_code_is_stored_with_names_alone(stored, monkeypatch):
+    """What numba could link other functions with takes ten times the memory when it is read."""
+    monkeypatch.syspath_prepend(stored)
+    for path in (stored / "__pycache__").glob("*.nbc"):
+        (_, _, (_, source)), described, *_ = pickle.loads(path.read_bytes())
+        functions = list(parse_bitcode(source).functions)
+        assert described.llvm_cfunc_wrapper_name in {each.name for each in functions}
+        assert {len(list(each.blocks)) for each in functions} == {1}
+        assert {sum(1 for block in each.blocks for _ in block.instructions)
+                for each in functions} == {1}
 
 
 @pytest.fixture(scope="module")

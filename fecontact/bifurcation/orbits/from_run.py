@@ -86,7 +86,7 @@ def periodic_motion(
     checks = largest + max(2 * largest, 8)
     instants: Array = excitation * np.arange(first, first + checks + 1, dtype=float)
     run = _run(moving, initial, float(instants[-1]), instants, solver, rtol)
-    fine = _run(moving, run.states[-1], float(instants[-1] + excitation * largest),
+    fine = _run(moving, run, float(instants[-1] + excitation * largest),
                 float(instants[-1]) + excitation * np.linspace(0.0, largest,
                                                                largest * _SAMPLES + 1),
                 solver, rtol, float(instants[-1]))

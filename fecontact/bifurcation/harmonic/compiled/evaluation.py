@@ -411,6 +411,8 @@ def _add_by_elements(u, T, central, e):
     tangents, spectrum = axes - 1, np.empty((L, axes * L))
     for r in range(tangents * len(e.elements)):
         j, tangent = r // tangents, 2 * (r % tangents)
+        if e.elements[j] == 0:
+            continue
         spectrum[:, :] = 0.0
         for q in range(L):
             row = spectrum[q]
