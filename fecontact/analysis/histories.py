@@ -14,7 +14,7 @@ from fecontact.system.contact_system import ContactSystem
 
 Point = str | int | tuple[float, ...]
 
-_OF_POINTS = {"displacement": "m", "velocity": "m/s"}
+_OF_POINTS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 _OF_NODES = {"normal_force": "N", "friction_force": "N", "penetration": "m",
              "penetration_rate": "m/s", "slip_velocity": "m/s", "line_load": "N/m",
              "pressure": "Pa", "friction_work": "J"}
@@ -47,14 +47,14 @@ def history(
     trajectory : Trajectory
         The run.
     quantity : str
-        'displacement' or 'velocity' of any point; 'normal_force', 'friction_force',
+        'displacement', 'velocity' or 'acceleration' of any point; 'normal_force', 'friction_force',
         'penetration', 'penetration_rate', 'slip_velocity', 'line_load', 'pressure' or
         'friction_work' of a contact node; 'total_normal_force', 'total_friction_force' or
         'total_friction_work' of the whole face.
     point : str, int, (x, y) or (x, y, z)
         See :meth:`Trajectory.displacement`.
     component : 'x', 'y' or 'phi', of solids also 'z', 'phi_x', 'phi_y', 'phi_z'
-        Component of displacements and velocities: tangential, normal, or rotation. Contact nodes
+        Component of motions of points: tangential, normal, or rotation. Contact nodes
         of several bodies move relative to the other side, along their tangents and normals.
 
     Raises

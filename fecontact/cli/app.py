@@ -55,6 +55,7 @@ COMMANDS: tuple[Callable[..., int | None], ...] = (
     response.response,
     compare.compare,
     data.data,
+    data.measure,
     fit.fit,
     run.report,
     run.render,

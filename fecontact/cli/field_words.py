@@ -19,6 +19,7 @@ _WORDS: Mapping[str, tuple[str, ...]] = {
     "sweep": ("brute-force", "monte-carlo", "parameter-study", "sensitivity", "sobol", "doe"),
     "fit": ("identify", "identification", "calibrate", "calibration", "update", "inverse"),
     "data": ("measurement", "measurements", "uff", "ring-down"),
+    "measure": ("sensors", "accelerometer", "accelerometers", "virtual"),
     "branch": ("bifurcation", "bifurcations", "continuation", "continue", "limit-cycles",
                "periodic-orbits", "matcont", "auto"),
     "response": ("frf", "hbm", "harmonic-balance", "frequency-response", "forced-response",

@@ -315,13 +315,16 @@ def _same_values(
     differ.
     """
     from fecontact.laws.registry import law_files
+    from fecontact.study.measurement_section import masses_of_sensors
     from fecontact.study.study import NOT_OF_THE_RUN, stored_study
 
     try:
         earlier = stored_study(stored, trust or law_files(study.tables()), study.path)
     except FecontactError:
         return False
-    kept = (*NOT_OF_THE_RUN, *sections)
+    kept = [*NOT_OF_THE_RUN, *sections]
+    if masses_of_sensors(study.measurement) == masses_of_sensors(earlier.measurement):
+        kept.append("measurement")
     return study == replace(earlier, **{name: getattr(study, name) for name in kept},
                             response=replace(earlier.response, **{
                                 name: getattr(study.response, name) for name in free}))

@@ -10,8 +10,10 @@ from itertools import chain, repeat
 UNITS = {
     "m": ((1e-9, "nm"), (1e-6, "µm"), (1e-3, "mm"), (1.0, "m")),
     "m/s": ((1e-9, "nm/s"), (1e-6, "µm/s"), (1e-3, "mm/s"), (1.0, "m/s")),
+    "m/s^2": ((1e-6, "µm/s²"), (1e-3, "mm/s²"), (1.0, "m/s²")),
     "rad": ((1e-6, "µrad"), (1e-3, "mrad"), (1.0, "rad")),
     "rad/s": ((1e-3, "mrad/s"), (1.0, "rad/s")),
+    "rad/s^2": ((1e-3, "mrad/s²"), (1.0, "rad/s²")),
     "s": ((1e-6, "µs"), (1e-3, "ms"), (1.0, "s")),
     "N": ((1e-3, "mN"), (1.0, "N"), (1e3, "kN")),
     "N m": ((1e-6, "µN m"), (1e-3, "mN m"), (1.0, "N m"), (1e3, "kN m")),
@@ -45,7 +47,7 @@ def suitable_unit(size: float, unit: str) -> tuple[float, str]:
     size : float
         Largest magnitude to show, in ``unit``; zero gives ``unit`` itself.
     unit : str
-        SI unit: m, m/s, rad, rad/s, s, Hz, N, N m, N/m, Pa, W, J, J/m or J/m^2.
+        SI unit: m, m/s, m/s^2, rad, rad/s, rad/s^2, s, Hz, N, N m, N/m, Pa, W, J, J/m or J/m^2.
 
     Returns
     -------

@@ -192,7 +192,7 @@ class DecayData(CurveData):
         count = max(64, int(np.ceil(self.t_end * highest * _SAMPLES)) + 1)
         run = _run(system, self.initial, np.linspace(0.0, self.t_end, count), self.rtol)
         values = history(run, self.quantity, self.point, self.component)
-        order = {"displacement": 0, "velocity": 1}.get(self.quantity, 0)
+        order = {"velocity": 1, "acceleration": 2}.get(self.quantity, 0)
         # Windows of the same length, close together, between which the curve is interpolated.
         found = ring_down(run.time, values.values, derivative=order, **{
             "frequency_hz": float(np.median(self.curve.frequency_hz)), **self.options,

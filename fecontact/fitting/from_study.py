@@ -134,6 +134,8 @@ def _curve(study: Study, one: FitDataSettings) -> tuple[Any, dict[str, Any]]:
     options: dict[str, Any] = {"window": one.window}
     if one.frequency_hz is not None:
         options["frequency_hz"] = one.frequency_hz
+    if one.t_start is not None:
+        options["t_start"] = one.t_start
     test = _measurement(study, one, "time")
     return ring_down(test, channel=test.index(one.channel), **options), options
 

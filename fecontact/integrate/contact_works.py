@@ -39,6 +39,20 @@ class ContactWorks(ContactQuantities):
             history[:, :, columns] = held.reshape(*held.shape[:2], len(columns))
         return history
 
+    @cached_property
+    def modal_accelerations(self) -> Array:
+        """Rates q'' (N, m) of the modal velocities under all forces.
+
+        InputError for set-valued contact, whose forces do not follow from the state.
+        """
+        if self.held_normal_force is not None or self.held_friction_force is not None:
+            raise InputError("The accelerations of a run with set-valued contact are not known, as "
+                             "its forces and impulses do not follow from the state; take the "
+                             "velocity, or a normal and a friction law.")
+        rates = [self.system.rhs(t, y) for t, y in zip(self.time, self.states, strict=True)]
+        m = self.system.basis.modes
+        return np.stack(rates)[:, m : 2 * m]
+
     @property
     def friction_work(self) -> Array:
         """Energy (N, n) lost by friction at each node since the first time [J].

@@ -1,3 +1,4 @@
+from .acquisition import Acquisition, measure
 from .amplitude_curve import AmplitudeCurve, backbone_curve, modal_mass_at, mode_curve
 from .assurance import (
     ModePairs,
@@ -8,14 +9,22 @@ from .assurance import (
 )
 from .measurement import Channel, Measurement
 from .ring_down import ring_down
+from .sensors import Accelerometer, ForceGauge, Sensor, with_sensors
+from .shaker import Shaker
 from .swept_response import swept_curve
 
 __all__ = [
+    "Accelerometer",
+    "Acquisition",
     "AmplitudeCurve",
     "Channel",
+    "ForceGauge",
     "Measurement",
     "ModePairs",
+    "Sensor",
+    "Shaker",
     "backbone_curve",
+    "measure",
     "modal_assurance",
     "modal_mass_at",
     "mode_curve",
@@ -24,4 +33,5 @@ __all__ = [
     "ring_down",
     "scale_question",
     "swept_curve",
+    "with_sensors",
 ]

@@ -16,6 +16,8 @@ from fecontact.measured.measurement import Axis, Channel, Measurement
 from fecontact.reduction.matrix_files.uff import data_sets, units
 
 _DIRECTIONS = {1: "x", 2: "y", 3: "z", 4: "phi_x", 5: "phi_y", 6: "phi_z"}
+# Second line of the description of functions whose first line is the name of a channel.
+_NAMED = "name of the channel above"
 _CODES = {name: code for code, name in _DIRECTIONS.items()}
 # Kinds of functions.
 _TIME, _SPECTRUM, _RESPONSE, _COHERENCE, _GENERAL = 1, 12, 4, 6, 0
@@ -101,12 +103,13 @@ def _place(channel: Channel) -> tuple[int | None, str, int | None, str]:
 
 def _channel(one: Mapping[str, Any]) -> Channel:
     node, way = int(one["rsp_node"]), _direction(int(one["rsp_dir"]))
-    name = f"{node}{way}"
+    place = f"{node}{way}"
+    name = str(one["id1"]).strip() if str(one["id2"]).strip() == _NAMED else ""
     response = one["func_type"] in (_RESPONSE, _COHERENCE)
     other, along = int(one["ref_node"]), _direction(int(one["ref_dir"]))
     if response:
-        return Channel(f"{name} / {other}{along}", "", node, way, other, along)
-    return Channel(name, "", node, way)
+        return Channel(name or f"{place} / {other}{along}", "", node, way, other, along)
+    return Channel(name or place, "", node, way)
 
 
 def _direction(code: int) -> str:
@@ -213,7 +216,7 @@ def _function(
     kind = (_COHERENCE if coherence else _RESPONSE if response
             else _TIME if measurement.axis == "time" else _GENERAL)
     return {
-        "type": 58, "binary": 0, "func_type": kind, "id1": one.name,
+        "type": 58, "binary": 0, "func_type": kind, "id1": one.name, "id2": _NAMED,
         "rsp_node": one.node if one.node is not None else k + 1,
         "rsp_dir": _code(one.direction), "ref_node": one.reference_node or 0,
         "ref_dir": _code(one.reference_direction), "data": np.array(values), "x": np.array(x),

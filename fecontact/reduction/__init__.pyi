@@ -1,5 +1,6 @@
 from .assembly.assembled_basis import assembled_basis
 from .assembly.bodies_convergence import BodiesConvergence, bodies_convergence
+from .assembly.changed_modes import with_masses
 from .assembly.face_weld import FaceWeld
 from .assembly.interface_compliance import InterfaceCompliance, interface_compliance
 from .assembly.links import Bushing, Hinge, NonlinearSpring, Spring, Weld, linked
@@ -79,4 +80,5 @@ __all__ = [
     "sector_modes",
     "tightened",
     "with_half_space",
+    "with_masses",
 ]

@@ -4,6 +4,7 @@ from .fit_section import FitDataSettings, FitParameter, FitSettings
 from .geometry_section import MeshFile
 from .links_section import FaceWeldSettings
 from .materials_section import MaterialSettings
+from .measurement_section import MeasurementSettings
 from .preload_section import PreloadSettings
 from .sections import (
     BasisSettings,
@@ -28,6 +29,7 @@ __all__ = [
     "FitSettings",
     "InterfaceSettings",
     "MaterialSettings",
+    "MeasurementSettings",
     "MeshFile",
     "MistuningSettings",
     "OutputSettings",

@@ -134,7 +134,7 @@ class FitDataSettings:
     component : str
         Direction there, 'x', 'y', of solids also 'z', or a rotation.
     quantity : str
-        Quantity measured over time: 'displacement', 'velocity', 'friction_force', ...
+        Quantity measured over time: 'displacement', 'velocity', 'acceleration', ...
     t_start, t_end : float, optional
         Part of the record [s]; of a ring-down t_end is also the end of the run of the model.
     initial : 'rest', 'sliding', 'preload' or list

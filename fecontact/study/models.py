@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from copy import copy
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -33,6 +34,7 @@ from fecontact.study.bodies_section import (
 )
 from fecontact.study.geometry_section import Geometry, geometry_mesh
 from fecontact.study.links_section import LinkSettings
+from fecontact.study.measurement_section import MeasurementSettings, masses_of_sensors
 from fecontact.study.sections import BasisSettings, BodySettings
 from fecontact.study.sector_section import (
     MistuningSettings,
@@ -58,7 +60,8 @@ _MADE_FROM: Mapping[str, Callable[["StudyModels"], Any]] = {
     "_reduced": lambda study: (study.geometry, study.body, study.basis,
                                study.load if study.basis.prestress else None,
                                _MADE_FROM["_bases"](study),
-                               None if study.symmetry is None else _MADE_FROM["_wheel"](study)),
+                               None if study.symmetry is None else _MADE_FROM["_wheel"](study),
+                               masses_of_sensors(study.measurement)),
 }
 
 
@@ -76,6 +79,7 @@ class StudyModels:
     response: ResponseSettings
     symmetry: CyclicSymmetry | None
     mistuning: MistuningSettings | None
+    measurement: MeasurementSettings | None
     path: Path | None
 
     @property
@@ -288,6 +292,15 @@ class StudyModels:
 
     @cached_property
     def _reduced(self) -> Reduced:
+        bare = self._bare
+        if self.measurement is None:
+            return bare
+        with located(f"{self.title}: [measurement]:", "with_sensors", "with_masses"):
+            return replace(bare, basis=self.measurement.loaded(bare.basis, self.links))
+
+    @property
+    def _bare(self) -> Reduced:
+        """The modal basis without sensors."""
         if self.symmetry is not None:
             self._require_bodies_of_sector()
             return Reduced(self._wheel.basis, np.asarray(self._wheel.gaps))

@@ -42,6 +42,7 @@ from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.height_map import HeightMap
 from fecontact.laws.registry import PART_CLASSES, foreign_keys, trusting, with_folder
+from fecontact.measured.measurement import Measurement
 from fecontact.study.assembly import LAWS, contact_system
 from fecontact.study.bodies_section import (
     BodySections,
@@ -58,6 +59,7 @@ from fecontact.study.geometry_section import (
     geometry_table,
 )
 from fecontact.study.links_section import LinkSettings, link_table, links_from_tables
+from fecontact.study.measurement_section import MeasurementSettings
 from fecontact.study.models import StudyModels
 from fecontact.study.preload_section import PreloadSettings
 from fecontact.study.sections import (
@@ -92,6 +94,7 @@ _OPTIONAL: Mapping[str, tuple[type, Callable[[Any], Any]]] = {
     "symmetry": (CyclicSymmetry, lambda table: table),
     "preload": (PreloadSettings, lambda table: table), "sweep": (SweepSettings, flat_axes),
     "fit": (FitSettings, flat_parameters), "mistuning": (MistuningSettings, lambda table: table),
+    "measurement": (MeasurementSettings, lambda table: table),
 }
 
 
@@ -147,6 +150,8 @@ class Study(Summarised, StudyModels):
         ``[symmetry]``: the body, or the bodies together, are one sector of a wheel.
     mistuning : MistuningSettings or None
         ``[mistuning]``: deviations of its blades.
+    measurement : MeasurementSettings or None
+        ``[measurement]``: virtual sensors; see :meth:`measure`.
     path : Path or None
         The study file; paths of other files are relative to it.
     content_hashes : mapping of name to str
@@ -176,6 +181,7 @@ class Study(Summarised, StudyModels):
     links: Mapping[str, LinkSettings] = field(default_factory=dict)
     symmetry: CyclicSymmetry | None = None
     mistuning: MistuningSettings | None = None
+    measurement: MeasurementSettings | None = None
     path: Path | None = field(default=None, compare=False)
     _keys: Mapping[str, Any] = field(default_factory=dict, compare=False)  # those of the file
     content_hashes: Mapping[str, str] = field(default_factory=dict, compare=False)
@@ -445,6 +451,28 @@ class Study(Summarised, StudyModels):
                                 settings.keep_steps if keep_steps is None else keep_steps),
                             events=(ContactEvents(settings.stop)
                                     if settings.events or settings.stop else None))
+
+    def measure(self, run: Trajectory | None = None) -> Measurement:
+        """Measure a run of the study, by default a new one, by the sensors of ``[measurement]``.
+
+        See :func:`fecontact.measured.measure`.
+
+        Raises
+        ------
+        InputError
+            Without this section or sensors in it, and as that function.
+        """
+        title, settings = _title(self.path), self.require_sensors()
+        with located(f"{title}: [measurement]:", "measure"):
+            return settings.of(self.run() if run is None else run, self.links, title)
+
+    def require_sensors(self) -> MeasurementSettings:
+        """Section ``[measurement]``; InputError without it, or without sensors in it."""
+        if self.measurement is None or not self.measurement.sensors:
+            raise InputError(f"{_title(self.path)} has no sensors; add the section [measurement] "
+                             f"with its rate_hz, and [[measurement.sensors]] with point and "
+                             f"direction.")
+        return self.measurement
 
     def wear_history(self, progress: bool = False) -> WearHistory:
         """Wear of the contact face over the blocks of ``[wear]``, with ``[simulation]``'s solver.

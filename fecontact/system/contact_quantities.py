@@ -50,6 +50,19 @@ class ContactQuantities:
         """Velocity [m/s] and angular velocity [rad/s] (..., 3) of a point; see displacement."""
         return self.modal_velocities @ self._rows(point).T
 
+    def acceleration(self, point: str | int | tuple[float, ...]) -> Array:
+        """Acceleration [m/s^2] and angular acceleration (..., 3) of a point; see displacement.
+
+        It follows from the forces by the equations of motion. With base acceleration it is that
+        relative to the base.
+        """
+        return self.modal_accelerations @ self._rows(point).T
+
+    @property
+    def modal_accelerations(self) -> Array:
+        """Rates q'' (..., m) of the modal velocities under all forces."""
+        raise NotImplementedError
+
     def _rows(self, point: str | int | tuple[float, ...]) -> Array:
         basis = self.system.basis
         if isinstance(point, str | int | np.integer):

@@ -1,4 +1,4 @@
-"""The command ``data``: what a file of measurements holds."""
+"""The commands ``data`` and ``measure``: measurements in files, and those of virtual sensors."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from fecontact.cli.console import echo_written, show
+from fecontact.cli.options import Changes, StudyFile, Trust
 from fecontact.core.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from fecontact.measured.measurement import Channel
+    from fecontact.measured.measurement import Channel, Measurement
 
 
 def data(
@@ -27,7 +28,6 @@ def data(
         help="A .uff file to which the measurements are written.")] = None,
 ) -> None:
     """Print what a file of measurements holds: channels, units, places, and what looks wrong."""
-    from fecontact.cli.tables import table
     from fecontact.measured.read_measurements import read_measurements
     from fecontact.measured.uff_functions import write_uff
 
@@ -42,12 +42,47 @@ def data(
         raise InputError(f"{file} holds {len(found)} measurements; a file of one is written by "
                          f"write_uff in Python.")
     for one in found:
-        show(table("", "", rows=[row for row in one.summary() if row[0] != "channels"], left=2))
-        show(table("channel", "unit", "place", "smallest", "largest", rows=[
-            (channel.name, channel.unit or "unknown", _place(channel),
-             *_range(one.values[:, k])) for k, channel in enumerate(one.channels)], left=3))
+        show_measurement(one)
     if output is not None:
         echo_written(write_uff(found[0], output))
+
+
+def measure(
+    study: StudyFile,
+    /,
+    *,
+    set_: Changes = None,
+    output: Annotated[Path | None, Parameter(
+        name=["--output", "-o"], help="A .uff file, by default NAME-measured.uff among the results "
+                                      "of the study.")] = None,
+    trust: Trust = False,
+) -> None:
+    """Measure the run of a study by the virtual sensors of [measurement]; write a universal file.
+
+    The stored run is taken if it has the values of the study, else the study is run.
+    """
+    from fecontact.cli.run_files import read_study, stored_or_computed_run
+    from fecontact.core.files.atomic_write import output_folder
+    from fecontact.measured.uff_functions import write_uff
+
+    described = read_study(study, set_)
+    described.require_sensors()
+    run = stored_or_computed_run(study, set_, trust).trajectory
+    found = described.measure(run)
+    show_measurement(found)
+    target = output or described.results / f"{described.name}-measured.uff"
+    with output_folder(target.parent):
+        echo_written(write_uff(found, target))
+
+
+def show_measurement(one: "Measurement") -> None:
+    """Print summary and channels of a measurement."""
+    from fecontact.cli.tables import table
+
+    show(table("", "", rows=[row for row in one.summary() if row[0] != "channels"], left=2))
+    show(table("channel", "unit", "place", "smallest", "largest", rows=[
+        (channel.name, channel.unit or "unknown", _place(channel), *_range(one.values[:, k]))
+        for k, channel in enumerate(one.channels)], left=3))
 
 
 def _place(channel: "Channel") -> str:

@@ -6,7 +6,7 @@ left have the eigenmodes P, by which all rows are multiplied.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -22,6 +22,7 @@ from fecontact.core.errors import (
 from fecontact.core.types import Array, Coordinates
 from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw
+from fecontact.reduction.assembly.changed_modes import in_modes
 from fecontact.reduction.assembly.face_weld import FaceWeld, welded_rows
 from fecontact.reduction.eigenmodes import fixed_signs
 from fecontact.reduction.modal_basis import ModalBasis
@@ -265,28 +266,7 @@ def linked(basis: ModalBasis, links: Sequence[Link]) -> ModalBasis:
     if not len(w):
         raise InputError("The links leave no motion of the bodies; leave some of them out, or keep "
                          "more modes.")
-    skew = None if basis.stiffness is None else basis.stiffness - np.diag(
-        basis.angular_frequencies**2)
-    shapes = basis.mode_shapes
-    return replace(
-        basis,
-        angular_frequencies=w,
-        damping=modes.T @ damping @ modes,
-        T=basis.T @ modes,
-        mode_shapes=None if shapes is None else replace(
-            shapes, shapes=shapes.shapes @ modes, stress=shapes.stress @ modes,
-            nonlinear_stress=None if shapes.nonlinear_stress is None else replace(
-                shapes.nonlinear_stress,
-                coordinates=shapes.nonlinear_stress.coordinates @ modes)),
-        quality=None,
-        inertia_rows=None if basis.inertia_rows is None else basis.inertia_rows @ modes,
-        boundary_rows=basis.boundary_rows @ modes,
-        stiffness=None if skew is None else np.diag(w**2) + modes.T @ skew @ modes,
-        parts=tuple(replace(part, modes=(0, 0)) for part in basis.parts),
-        rotation=None if basis.rotation is None else basis.rotation.in_modes(modes),
-        constant_load=load @ modes if load.any() else None,
-        large_deflections=tuple(one.in_modes(modes) for one in basis.large_deflections),
-    )
+    return in_modes(basis, w, modes, damping, load)
 
 
 def _linked_modes(
