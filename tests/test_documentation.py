@@ -389,6 +389,8 @@ def check_measurements(names, printed, folder):
         ["1", "2"], ["2", "1"], ["3", "3"]]
     assert "in a unit that is 1000 times" in printed
     assert names["pairs"].errors == pytest.approx(np.full(3, 1.0 / 1.02 - 1.0))
+    virtual = names["virtual"]
+    assert fc.io.read_measurement(folder / "virtual.uff").values == pytest.approx(virtual.values)
     for name in ("curve", "assurance"):
         assert (folder / f"{name}.png").stat().st_size > 10000
 

@@ -103,6 +103,9 @@ EXAMPLES = {
     # Of a clamped strip: 22.373 h / (2 pi L^2) (E / (12 rho))^(1/2) = 59.073 Hz.
     "bolted_panel": ([(r"^held: (\S+) Hz", 59.1, 0.4), (r"^400 N: .* at 2 mm (\S+) Hz", 61.45, 0.5),
                       (r"^400 N: .* ratio of (\S+)%", 4.23, 0.2)], {"bolted_panel.png"}),
+    # The 2nd mode of the receptance of the beam with the masses of gauge and accelerometer.
+    "shaken_beam": ([(r"^highest peak at (\S+) Hz", 560.4, 0.6), (r"off by (\S+) %", 0.0, 1.0)],
+                    {"shaken_beam.png"}),
     "sweep": ([(r"^(\d+) cases, 0 failed", 60.0, 0.0), (r"0.600: .* to +(\S+) mm/s", 4.0, 0.0)],
               {"sweep_map.png"}),
 }

@@ -21,7 +21,7 @@ ORDER = (
     "beating_friction", "sliding_beam", "sliding_borders",
     "impact_oscillator", "impact_map", "impact_orbits", "million_starts", "colliding_bars",
     "line_contact", "two_bodies", "pressed_sphere", "half_space",
-    "lap_joint", "clamped_layers", "bolted_panel", "brake_reuss_beam",
+    "lap_joint", "clamped_layers", "bolted_panel", "brake_reuss_beam", "shaken_beam",
     "frequency_response", "friction_damper", "nonlinear_modes", "platform_damper", "bladed_wheel",
     "tipping_pad", "thrown_block",
     "own_law", "from_other_programs", "sweep")

@@ -113,7 +113,8 @@ def measure(
     Parameters
     ----------
     run : Trajectory
-        The run. Masses of sensors act in it only if its basis has them; see :func:`with_sensors`.
+        The run. Masses of sensors act in it only if its basis has them; see
+        :func:`fecontact.measured.with_sensors`.
     sensors : Accelerometer, ForceGauge, or sequence of them
         One for each channel.
     acquisition : Acquisition
