@@ -31,7 +31,7 @@ _AXES = "xyz"
 
 @dataclass(frozen=True, kw_only=True)
 class Sensor:
-    """What all sensors have: name, sensitivity, mass, noise, resonance.
+    """Base class of virtual sensors: name, sensitivity, mass, noise and resonance.
 
     The reading is ``sensitivity`` times the true value, filtered by the sensor's own resonance
     (:meth:`filtered`), plus white noise.
