@@ -237,7 +237,7 @@ def preload(
     modes: Annotated[bool, Parameter(negative=(), help=(
         "Print frequency and damping of the modes at the end of the path too."))] = False,
 ) -> int:
-    """Load a study along the path of [preload]; write a table and plots of shear and force loop."""
+    """Load a study along the path of [preload]; write a table and plots of shear and loop."""
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study, write_preload
     from fecontact.cli.tables import preload_table, table

@@ -1,4 +1,4 @@
-"""Plots of quasi-static loading: shear and slip over the face, force loops."""
+"""Plots of quasi-static loading: shear and slip over the face, hysteresis loops."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any

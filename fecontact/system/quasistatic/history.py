@@ -1,4 +1,4 @@
-"""Result of quasi-static loading: equilibria along a path, work and loss, force loops."""
+"""Result of quasi-static loading: equilibria along a path, work and loss, hysteresis loops."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
