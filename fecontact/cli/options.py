@@ -12,16 +12,19 @@ Trust = Annotated[bool, Parameter(
     negative=(), help="Execute user-defined laws in Python files that the run names.")]
 Changes = Annotated[list[str] | None, Parameter(
     name="--set", negative=(), show_default=False,
-    help="Override a key of the study, ground.speed=0.1; may be repeated.")]
+    help="Override a key of the study, as in ground.speed=0.1. May be repeated.")]
 Folder = Annotated[Path | None, Parameter(
-    name=["--output", "-o"], help="Folder of the results; by default that of the study.")]
+    name=["--output", "-o"],
+    help="Folder of the results; by default the folder in [output] of the study.")]
 Branches = Annotated[str | None, Parameter(
-    name="--branch", help="Of a file of branches: name of one, or its number from 0; of a level.")]
+    name="--branch",
+    help="Name or number (from 0) of a branch in a file of branches, or of a level of a response.")]
 At = Annotated[float | None, Parameter(
-    help="Of a file of branches: the orbit at this value of the parameter, a frequency in Hz; of a "
-    "nonlinear mode that of this amplitude [m]; by default that of the largest observed "
-    "amplitude.")]
+    help="Value at which an orbit is taken from a file of branches: the parameter (a frequency in "
+    "Hz), or the amplitude [m] of a nonlinear mode. By default the orbit with the largest observed "
+    "amplitude is taken.")]
 Which = Annotated[int, Parameter(
-    help="Which of several orbits at this value, counted along the branch from 0.")]
+    help="Number of the orbit if several have the value of --at, counted along the branch from 0.")]
 All = Annotated[bool, Parameter(
-    name="--all", negative=(), help="Beyond the frequency up to which the basis is usable, too.")]
+    name="--all", negative=(),
+    help="Show also modes above the highest frequency at which the basis is accurate.")]

@@ -69,14 +69,15 @@ def compile_(
     everything: Annotated[bool, Parameter(name="--all", help=(
         "All kernels, also those of branches, responses and set-valued friction."))] = False,
     wheel: Annotated[Path | None, Parameter(help=(
-        "Folder for a package of all kernels instead, which other machines install."))] = None,
+        "Write a wheel of all kernels for other machines to this folder instead."))] = None,
     cpu: Annotated[list[str] | None, Parameter(negative=(), help=(
-        "Processors of that package: x86-64-v3, x86-64-v2, arm64; all of this kind, by default."
+        "Processors of the wheel: x86-64-v3, x86-64-v2, arm64; by default all of the kind of "
+        "this machine."
     ))] = None,
 ) -> int:
-    """Compile ahead what runs need, once on this machine; a first run then begins at once.
+    """Compile the kernels of runs in advance, once on a machine; the first run then starts at once.
 
-    pip install 'fecontact[kernels]' brings compiled kernels, with which this is not needed.
+    Not needed after pip install 'fecontact[kernels]', which installs compiled kernels.
     """
     from fecontact.cli.kernels import build_package, compile_kernels
 

@@ -30,11 +30,11 @@ def branch(
     """Follow steady sliding or periodic orbits over a parameter: a bifurcation diagram.
 
     The section [branch] of the study selects the solutions; without it, steady sliding is
-    followed. Writes all branches (NAME-branch.h5, NAME-branch.csv), a page whose diagram shows
-    the orbit of a point that is clicked (NAME-branch.html), and plots: the diagram, and
-    frequencies and growth rates of the modes in steady sliding, up to the frequency up to which the
-    basis is usable; special points beyond are marked. Ctrl-C stops it; the points
-    computed so far are written.
+    followed. Writes all branches (NAME-branch.h5, NAME-branch.csv), a page with a diagram, in which
+    a click on a point plays its orbit (NAME-branch.html), and plots: the diagram, and frequencies
+    and growth rates of the modes in steady sliding. Modes above the highest frequency at which the
+    basis is accurate are left out; special points there are marked. Ctrl-C stops the command; the
+    points computed so far are written.
     """
     import numpy as np
 

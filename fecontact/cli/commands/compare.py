@@ -20,7 +20,7 @@ def compare(
         negative=(), show_default=False,
         help="Name of a point or number of a contact node; B by default. May be repeated.")] = None,
     component: Annotated[str | None, Parameter(
-        help="Direction of the motion, x, y or z; that of the drive by default.")] = None,
+        help="Direction of the motion, x, y or z; by default that of the drive.")] = None,
     quantity: Annotated[str, Parameter(
         help="Quantity of the picture: velocity, displacement, normal_force, ...")] = "velocity",
     highest_hz: Annotated[float | None, Parameter(help="Highest frequency to plot [Hz].")] = None,
@@ -31,8 +31,8 @@ def compare(
     """Compare runs: parameters that differ, key numbers, histories and spectra over each other.
 
     Numbers are taken over the second half of each run; changes are relative to the first run.
-    Writes a page (NAME-compare.html) and a picture of histories and spectra (NAME-compare.png). Of
-    files of branches, their diagrams over each other and the parameters that differ.
+    Writes a page (NAME-compare.html) and a picture of histories and spectra (NAME-compare.png). For
+    files of branches it draws the diagrams over each other and prints the parameters that differ.
     """
     from fecontact.cli.orbit_files import holds_branches
     from fecontact.core.files.atomic_write import require_possible

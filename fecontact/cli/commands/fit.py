@@ -26,7 +26,7 @@ def fit(
     """Fit the parameters of [fit] of a study to its measurements; write intervals (fit.json)
     and a picture (fit.png).
 
-    Ctrl-C stops it; the same command goes on where it was.
+    Ctrl-C stops the fit; the same command continues it.
     """
     from fecontact.cli.run_files import read_study
     from fecontact.cli.tables import table

@@ -19,28 +19,29 @@ if TYPE_CHECKING:
 def response(
     study: StudyFile,
     parameter: Annotated[str | None, Parameter(
-        help="What changes along a response; overrides [response]. By default "
-        "drive.frequency_hz.")] = None,
+        help="Parameter that varies along a response, by default drive.frequency_hz; "
+        "overrides [response].")] = None,
     /,
     *,
     bounds: Annotated[tuple[float, float] | None, Parameter(
-        help="Lowest and highest frequency [Hz], or value of another parameter; overrides "
+        help="Lowest and highest frequency [Hz], or values of another parameter; override "
         "[response].")] = None,
     levels: Annotated[str | None, Parameter(
-        help="Another parameter and its values, drive.amplitude_x=1e-5,2e-5; a response for "
-        "each.")] = None,
+        help="A second parameter and its values, such as drive.amplitude_x=1e-5,2e-5; one "
+        "response for each value.")] = None,
     amplitudes: Annotated[str | None, Parameter(
-        help="Amplitudes that are held, 1e-5,2e-5 [m], while the level of the force is free; "
-        "override [response] and its levels.")] = None,
+        help="Amplitudes of vibration [m] to hold, such as 1e-5,2e-5, by a varying force; override "
+        "[response] and its levels.")] = None,
     force: Annotated[str | None, Parameter(
-        help="The level that is free then; by default the amplitude of the drive.")] = None,
+        help="Parameter that varies to hold --amplitudes; by default the amplitude of the "
+        "drive.")] = None,
     method: Annotated[Literal["harmonic balance", "collocation", "shooting"] | None, Parameter(
-        help="How orbits are found; overrides [response].")] = None,
+        help="Method for the periodic orbits; overrides [response].")] = None,
     harmonics: Annotated[str | None, Parameter(
-        help="All harmonics up to a number, 7, or those of a list, 1,3,5; overrides "
+        help="A number, 7, for all harmonics up to it, or a list, 1,3,5; overrides "
         "[response].")] = None,
     samples: Annotated[int | None, Parameter(
-        help="Samples a period; overrides [response].")] = None,
+        help="Number of samples per period; overrides [response].")] = None,
     tolerance: Annotated[float | None, Parameter(
         help="Largest truncation error; overrides [response].")] = None,
     set_: Changes = None,
@@ -48,16 +49,17 @@ def response(
     movie: Annotated[bool, Parameter(negative=(), help=(
         "Draw the whole wheel at the peak of the last response, NAME-wheel.mp4."))] = False,
     resume: Annotated[bool, Parameter(
-        negative=(), help="Go on with an interrupted response.")] = False,
+        negative=(), help="Continue an interrupted response.")] = False,
 ) -> int:
     """Nonlinear frequency response: steady vibration over the frequency of the excitation.
 
     The section [response] of the study gives range, levels and harmonics. Writes the responses
-    (NAME-response.h5, NAME-response.csv), a picture of amplitude and phase, and a page whose
-    diagram plays the orbit of a point that is clicked (NAME-response.html). Each level is stored
-    when it is done. Ctrl-C stops it; --resume goes on where it was.
+    (NAME-response.h5, NAME-response.csv), a picture of amplitude and phase, and a page with a
+    diagram, in which a click on a point plays its orbit (NAME-response.html). Each level is stored
+    when it is done. Ctrl-C stops the command; --resume continues it.
 
-    With [symmetry] and an engine_order it is that of a whole wheel, from one sector, without page.
+    With [symmetry] and an engine_order the response is that of a whole wheel, from one sector, and
+    no page is written.
     """
     from fecontact.cli.run_files import read_study
     from fecontact.core.files.atomic_write import output_folder

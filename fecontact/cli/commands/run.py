@@ -27,9 +27,9 @@ def report(
 ) -> int:
     """Write a run as one HTML page that plays it in any browser, without a network.
 
-    Of a study its stored run is taken if it has the same values; otherwise it is run first, without
-    storing anything but the page. Of a file of branches or responses the page is a diagram whose
-    points play their orbit.
+    For a study, the stored run is taken if the values of the study are those of the run. Otherwise
+    the study is run first, and only the page is stored. For a file of branches or responses, the
+    page is a diagram, in which a click on a point plays its orbit.
     """
     from fecontact.analysis.run_facts import notes
     from fecontact.cli.orbit_files import holds_branches, write_orbit_page
@@ -74,8 +74,8 @@ def open(
 ) -> None:
     """Show a result file in ParaView or in the browser.
 
-    A run, branches or a response are shown in the browser as the page that fecontact report
-    writes. Without --trust no code is run that the file contains or names.
+    The browser shows a run, branches or a response as the page that fecontact report writes.
+    Without --trust, no code that the file contains or names is run.
     """
     from fecontact.cli import viewers
     from fecontact.cli.orbit_files import holds_branches, write_orbit_page
@@ -132,7 +132,7 @@ def render(
     scale: Annotated[float | None, Parameter(
         help="Magnification of displacements.")] = None,
     view: Annotated[Literal["above", "below"] | None, Parameter(
-        help="Where solids are seen from; from below their contact faces show.")] = None,
+        help="Viewpoint of solids; below shows the contact faces on the ground.")] = None,
     t_start: Annotated[float | None, Parameter(help="Start of the interval to draw [s].")] = None,
     t_end: Annotated[float | None, Parameter(help="End of the interval to draw [s].")] = None,
     branch: Branches = None,
@@ -142,7 +142,7 @@ def render(
 ) -> None:
     """Render a run as a movie or as numbered pictures; defaults come from [render] of the study.
 
-    Of a file of branches or responses, one period of an orbit.
+    For a file of branches or responses, one period of an orbit is rendered.
     """
     from dataclasses import replace
 
@@ -171,7 +171,7 @@ def plot(
     file: RunFile,
     kind: Annotated[str | None, Parameter(show_default=False, help=(
         "history, phase, contact_map, energies, modes, spectrum, density, spectrogram, "
-        "poincare, friction_work or receptance; of files NAME.h5 also branches, response or "
+        "poincare, friction_work or receptance; for files NAME.h5 also branches, response or "
         "mode."))] = None,
     /,
     *,
@@ -181,14 +181,14 @@ def plot(
         help="Name of a point, number of a contact node, or place x,y or x,y,z; B by default. "
         "A history takes several.")] = None,
     component: Annotated[Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"] | None, Parameter(
-        help="Component of the motion, of solids x, y, z, phi_x, phi_y or phi_z, else x, y or phi; "
-        "that of the drive by default.")] = None,
+        help="Component of the motion: x, y or phi of plane bodies, x, y, z, phi_x, phi_y or phi_z "
+        "of solids. By default that of the drive.")] = None,
     quantity: Annotated[str, Parameter(
         help="Quantity for spectra: velocity, displacement, normal_force, ...")] = "velocity",
     highest_hz: Annotated[float | None, Parameter(help="Highest frequency to plot [Hz].")] = None,
     period: Annotated[float | None, Parameter(help=(
-        "Time between the points of a Poincare section [s]; by default the period of the drive, "
-        "without one the section is at the maxima of the displacement."))] = None,
+        "Time between the points of a Poincare section [s]. By default the period of the drive; "
+        "without a drive, points are maxima of the displacement."))] = None,
     t_start: Annotated[float | None, Parameter(help="Start of the interval to draw [s].")] = None,
     t_end: Annotated[float | None, Parameter(help="End of the interval to draw [s].")] = None,
     style: Annotated[str | None, Parameter(
@@ -201,7 +201,7 @@ def plot(
     all_: All = False,
     trust: Trust = False,
 ) -> None:
-    """Plot a stored run, branches or a response, or an orbit of these as a run."""
+    """Plot a stored run, branches or a response, or one orbit of these like a run."""
     from fecontact.cli.orbit_files import (
         DIAGRAMS,
         OrbitChoice,

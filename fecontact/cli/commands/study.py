@@ -18,10 +18,10 @@ def init(
     shape: Annotated[Literal["beam", "pendulum", "block", "pad", "solid", "mesh", "sweep",
                               "response"],
                      Parameter(
-        help="Beam on wavy ground, pendulum on a stop, block on a moving belt, a pad on a block, "
-        "which are two bodies, a solid pad on a belt in space, a part from a mesh file of your "
-        "own, a sweep over the speed of a belt, or frequency responses of a block held by "
-        "friction.")] = "beam",
+        help="beam: on wavy ground. pendulum: strikes a stop. block: on a moving belt. pad: two "
+        "bodies, a pad on a block. solid: three-dimensional pad on a belt. mesh: your own mesh "
+        "file. sweep: block on a belt over two parameters. response: frequency responses of a "
+        "block held by friction.")] = "beam",
     force: Annotated[bool, Parameter(negative=(), help="Overwrite an existing file.")]
     = False,
 ) -> None:
@@ -57,16 +57,16 @@ def import_(
     /,
     *,
     output: Annotated[Path | None, Parameter(name=["--output", "-o"], help=(
-        "Study file to write; none by default."))] = None,
+        "Study file to write; by default no study is written."))] = None,
     scale: Annotated[float, Parameter(help="Metres per unit of the file: 0.001 for mm.")] = 1.0,
     force: Annotated[bool, Parameter(negative=(), help="Overwrite an existing study file.")]
     = False,
 ) -> None:
-    """Show what a mesh file holds, and write a study with the interfaces that it suggests.
+    """List the contents of a mesh file; write a study with bodies, interfaces, loads and supports.
 
-    Bodies, materials, surfaces, ties, couplings and equations are read; loads, supports, contact
-    and other keywords of a deck are listed. Surfaces of different bodies that face each other
-    become interfaces with laws to be replaced.
+    Reads bodies, materials, surfaces, ties, couplings, equations, and simple loads and supports.
+    Lists what it leaves out. Contact pairs of the deck, and surfaces of different bodies that are
+    close to each other, become interfaces. Replace their laws, which are placeholders.
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.tables import table
@@ -88,7 +88,7 @@ def import_(
 
 
 def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> None:
-    """Generate or read the mesh of a study, or those of its bodies; print size and groups."""
+    """Generate or read the mesh of each body of a study; print size and groups."""
     from fecontact.cli.run_files import read_study
     from fecontact.cli.tables import mesh_table, table
     from fecontact.core.files.atomic_write import name_parts, output_folder
@@ -128,29 +128,31 @@ def modes(
         "Show convergence with mesh refinement and number of modes, as a table and a plot."))]
     = False,
     complex_: Annotated[bool, Parameter(name="--complex", negative=(), help=(
-        "Show the complex modes of steady sliding, too: those of negative damping squeal."))]
+        "Show also the complex modes of steady sliding; modes with negative damping are unstable "
+        "(squeal)."))]
     = False,
     movie: Annotated[int | None, Parameter(help=(
-        "Draw the mode of this number as a movie; with --complex, the complex mode."))] = None,
+        "Number of a mode to draw as a movie; with --complex, of a complex mode."))] = None,
     nonlinear: Annotated[int | None, Parameter(help=(
-        "Follow the nonlinear mode of this number, from 1 for the lowest that oscillates, over its "
-        "amplitude."))] = None,
+        "Number of a nonlinear mode to follow over its amplitude; 1 is the lowest that "
+        "oscillates."))] = None,
     amplitudes: Annotated[tuple[float, float] | None, Parameter(help=(
         "Smallest and largest amplitude of a nonlinear mode [m]."))] = None,
     resume: Annotated[bool, Parameter(negative=(), help=(
-        "Go on with an interrupted nonlinear mode."))] = False,
+        "Continue an interrupted nonlinear mode."))] = False,
     all_: All = False,
 ) -> int:
     """Print frequency, damping, kind and effective mass of the modes; plot their shapes.
 
-    Of several bodies those of each, and how much of the compliance of their interfaces they
-    resolve; --complex (complex eigenvalue analysis), --movie and --nonlinear are for all bodies
-    together, with modes that are counted through. With --nonlinear, the backbone, frequency and
-    damping over the amplitude, is written (NAME-mode-N.h5, .csv), drawn (.png), and shown by a page
-    whose points play the motion (.html); harmonics, the observed displacement and preload are those
-    of [response]. It is stored as it grows; Ctrl-C stops it, --resume goes on where it was. With a
-    tolerance it is stored at the end only, and followed anew. With [symmetry] and an engine_order
-    the nonlinear mode is that of a travelling wave, without page.
+    With several bodies, the modes of each body are printed, and how much of the compliance of each
+    interface they resolve. --complex (complex eigenvalue analysis), --movie and --nonlinear take
+    all bodies together and number their modes through.
+
+    --nonlinear follows the backbone: frequency and damping of a nonlinear mode over its amplitude.
+    It writes a table (NAME-mode-N.h5, .csv), a picture (.png) and a page whose points play the
+    motion (.html). Harmonics, observed displacement and preload are those of [response]. Ctrl-C
+    stops the mode, --resume continues it; with a tolerance in [response] it starts again. With
+    [symmetry] and an engine_order the mode is a travelling wave, and no page is written.
     """
     import numpy as np
 
@@ -284,7 +286,7 @@ def run(
     steady: at rest, or periodic to within 1 % over the last quarter of the run.
 
     Ctrl-C, SIGTERM and SIGHUP stop the run; the part computed so far is written, and --resume
-    continues it. --overwrite begins anew.
+    continues it. --overwrite starts again.
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study, write_results_of_run

@@ -42,13 +42,13 @@ def sweep(
         help="Address of a running Dask scheduler, such as tcp://node1:8786.")]
     = None,
     cases: Annotated[str | None, Parameter(
-        help="Run nothing, but print cases of a stored sweep with the command that runs each "
-        "alone: failed, missing, or numbers like 3,17.")] = None,
+        help="Print cases of a stored sweep (failed, missing, or numbers such as 3,17), each with "
+        "the command that runs this case alone; nothing is run.")] = None,
 ) -> int:
     """Run many cases of a study on all cores or a cluster; write a table (index.csv), a page
     (index.html) and plots.
 
-    Ctrl-C stops it; finished cases are kept, and --resume continues the sweep.
+    Ctrl-C stops the sweep and keeps finished cases; --resume continues it.
     """
     from fecontact.cli.console import waiting
     from fecontact.cli.run_files import read_study

@@ -19,8 +19,7 @@ def buckling(
 ) -> None:
     """Print the load factors at which the body of a study buckles under [load]; plot the shapes.
 
-    The body is held by the supports of [body] alone, not by contact. Shapes are drawn to
-    NAME-buckling.png.
+    Only the supports of [body] hold the body, not contact. Shapes are drawn to NAME-buckling.png.
     """
     from fecontact.analysis.buckling import buckling_loads
     from fecontact.cli.console import waiting
@@ -64,8 +63,8 @@ def campbell(
 ) -> None:
     """Frequencies and damping of a rotating body over its speed: NAME-campbell.png and .csv.
 
-    The body is that of a study with [body.rotation], without contact; frequencies are those in the
-    frame of the rotation.
+    The study has a section [body.rotation]; contact is left out. Frequencies are those in the
+    frame of [body.rotation].
     """
     import numpy as np
 
@@ -172,7 +171,7 @@ def mistuning(
     set_: Changes = None,
     output: Folder = None,
     resume: Annotated[bool, Parameter(
-        negative=(), help="Go on with random wheels; finished ones are not repeated.")] = False,
+        negative=(), help="Continue with random wheels; finished ones are not repeated.")] = False,
     overwrite: Annotated[bool, Parameter(
         negative=(), help="Remove finished wheels and start again.")] = False,
     workers: Annotated[int | None, Parameter(
