@@ -183,7 +183,7 @@ def test_end_of_existence_keeps_the_branch():
     assert branch.status is BranchStatus.STALLED
     assert branch.message == "There is nothing beyond 0.5."
     assert 0.4999 < branch.parameter[-1] <= 0.5
-    assert "what was computed until then is kept" in branch.status.value
+    assert "the points computed so far are kept" in branch.status.value
 
 
 @pytest.mark.parametrize("step", [0.03, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7])

@@ -21,24 +21,24 @@ class BranchStatus(Enum):
 
     POINTS = "The branch has as many points as were asked for."
     BOUND = "The branch reached a bound of its parameter."
-    HOPF = ("The orbits shrink to an equilibrium: the branch ends at a Hopf point, a curve of "
-            "folds at a Bautin point, one of homoclinic orbits at a Bogdanov-Takens point.")
+    HOPF = ("The orbits shrink to an equilibrium: to a Hopf point on a branch, a Bautin point on a "
+            "curve of folds, a Bogdanov-Takens point on a curve of homoclinic orbits.")
     HOMOCLINIC = ("The orbits approach a homoclinic orbit: their period grows without bound while "
                   "they stay ever longer near a saddle.")
-    DISCONTINUITY = ("The orbit meets a border of its contact states; on a branch the last point "
-                     "names it. Beyond it no orbit of this kind goes on.")
-    SADDLE_NODE = ("The saddle of the homoclinic orbits meets another equilibrium in a fold: there "
-                   "the curve ends.")
+    DISCONTINUITY = ("The orbit meets a border of its contact states, which the last point of a "
+                     "branch names. The orbits do not continue beyond it.")
+    SADDLE_NODE = ("The curve ends where the saddle of the homoclinic orbits meets another "
+                   "equilibrium in a fold.")
     SINGLE_FREQUENCY = ("The tori shrink to a periodic orbit: the branch ends at a Neimark-Sacker "
                         "point.")
-    UNRESOLVED_TORUS = ("The harmonics no longer resolve the torus: take more of them, or look "
-                        "whether it breaks up here, as where its frequencies lock.")
+    UNRESOLVED_TORUS = ("The harmonics no longer resolve the torus: take more harmonics, or check "
+                        "by a run whether the torus breaks up here (frequency locking, chaos).")
     STOPPED = "The branch reached a point at which it was to stop."
-    CLOSED = ("The branch came back to its start, or to where it would run through the same orbits "
-              "again.")
-    STALLED = ("The steps became too small to go on; what was computed until then is kept. Look "
+    CLOSED = ("The branch returned to its start, or to a point from which it would repeat the same "
+              "orbits.")
+    STALLED = ("The steps became too small to continue; the points computed so far are kept. Check "
                "whether the solution changes abruptly here, or start with smaller steps.")
-    INTERRUPTED = "The continuation was interrupted; what was computed until then is kept."
+    INTERRUPTED = "The continuation was interrupted; the points computed so far are kept."
 
 
 @dataclass(frozen=True, eq=False)
