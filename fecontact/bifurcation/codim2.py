@@ -6,11 +6,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fecontact.bifurcation.codim2_beside import begun
+from fecontact.bifurcation.codim2_nearby import begun
 from fecontact.bifurcation.codim2_switch import other_curve, tangent_at, widths_of
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
-from fecontact.bifurcation.continuation.newton import corrected
+from fecontact.bifurcation.continuation.newton import newton
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import (
     DiscontinuityPoint,
@@ -252,7 +252,7 @@ def _towards_growth(
     row = problem.weights() * tangent
     for part in _SIDES:
         try:
-            behind, ahead = (corrected(problem, u + side * part * options.step * tangent, row,
+            behind, ahead = (newton(problem, u + side * part * options.step * tangent, row,
                                        options.tolerance, 2 * options.iterations)
                              for side in (-1.0, 1.0))
         except FecontactError:

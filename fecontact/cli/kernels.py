@@ -55,7 +55,7 @@ _PARTS = {
         "fecontact.integrate.series.method:SMALL",
         "fecontact.integrate.rodas5p.event_kernels:note_events",
         "fecontact.integrate.rodas5p.sliders:attend",
-        "fecontact.integrate.lanes.step_loop:SMALL",
+        "fecontact.integrate.simd.step_loop:SMALL",
         "fecontact.integrate.collocation.method:SMALL",
         "fecontact.integrate.collocation.columns:SMALL",
         "fecontact.integrate.rodas5p.propagation:SMALL", "fecontact.integrate.reference.watched",

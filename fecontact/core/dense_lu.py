@@ -2,7 +2,7 @@
 
 The systems of a time step, of sticking clusters and of the ends of an orbit have a few to some
 twenty unknowns and are solved inside compiled loops. Eight matrices side by side are eliminated
-faster by :mod:`fecontact.bifurcation.linalg.lane_lu`.
+faster by :mod:`fecontact.bifurcation.linalg.simd_lu`.
 
 A matrix a (rows, columns) may be wider than high, and only its first ``count`` columns may be
 eliminated. The factors of the rows take the place of these, and the inverse pivots stand on the

@@ -160,14 +160,14 @@ class _Increments:
         """Forces, slip, displacement and loss at the next point of the path."""
         q = self._project(self._force, goal)
         moved = self._compliance(q)
-        aim, length = goal, self._length
+        target, length = goal, self._length
         for _ in range(self._most):
             gradient = moved + self._slip
             if self._by_force:
                 # The displacement at which the pixels that stick have no slip on average.
                 stuck = self._touching & (np.linalg.norm(q, axis=-1) < _STICKS * self._limit)
-                aim = gradient[stuck].mean(axis=0)
-            gradient = gradient - aim
+                target = gradient[stuck].mean(axis=0)
+            gradient = gradient - target
             step = self._project(q - length * gradient, goal) - q
             if float(np.abs(step).max()) <= self._rtol * float(self._limit.max()) * max(
                     length / self._length, 1.0):
@@ -181,12 +181,12 @@ class _Increments:
             raise AnalysisError(f"half_space_friction: the tractions did not converge in "
                                 f"{self._most} steps; allow more by max_iterations, or a larger "
                                 f"rtol.")
-        slip = np.where(self._touching[..., None], aim - moved, 0.0)
+        slip = np.where(self._touching[..., None], target - moved, 0.0)
         sticks = np.linalg.norm(q, axis=-1) < _STICKS * self._limit
         slip[sticks] = self._slip[sticks]
         self._loss += float((q * (slip - self._slip)).sum())
         self._force, self._slip = q, slip
-        return q, slip, aim, self._loss
+        return q, slip, target, self._loss
 
     def _project(self, q: Array, goal: Array) -> Array:
         """Nearest forces within the limits; of sum ``goal`` where forces are given."""

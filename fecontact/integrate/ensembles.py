@@ -2,7 +2,7 @@
 
 Each run is one compiled call that releases the GIL, so that threads share the cores without copying
 data; only the requested states are kept. Runs of small systems go eight at once through the lanes
-of a core's vector instructions (:mod:`fecontact.integrate.lanes`).
+of a core's vector instructions (:mod:`fecontact.integrate.simd`).
 """
 
 import os
@@ -28,9 +28,9 @@ from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.events import AnyEvent, Events, as_events
 from fecontact.integrate.field_runs.start import start_any, start_state
 from fecontact.integrate.initial_state import Initial
-from fecontact.integrate.lanes.driver import SideBySide, side_by_side
 from fecontact.integrate.rodas5p.driver import again
 from fecontact.integrate.rodas5p.run import Run
+from fecontact.integrate.simd.driver import SideBySide, side_by_side
 from fecontact.integrate.simulate import (
     require_max_step,
     require_resolved_span,

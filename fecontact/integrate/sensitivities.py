@@ -236,9 +236,9 @@ def _differences(
     largest = np.abs(found).reshape(len(close), 2, -1).max(axis=(0, 2))
     moves = np.repeat(_DIFFERENCE * np.where(largest > 0.0, largest, 1.0), size // 2)
     spans = np.stack([times[:-1], times[1:]], axis=1)
-    aside = np.concatenate([np.diag(moves), -np.diag(moves)])
+    shifts = np.concatenate([np.diag(moves), -np.diag(moves)])
     ends = _states(ensemble(system, np.repeat(spans, 2 * size, axis=0), **settings, initial=(
-        states[:-1, None] + aside).reshape(-1, size)))[:, -1].reshape(pieces, 2, size, size)
+        states[:-1, None] + shifts).reshape(-1, size)))[:, -1].reshape(pieces, 2, size, size)
     columns = ((ends[:, 0] - ends[:, 1]) / (2.0 * moves[:, None])).swapaxes(1, 2)
     sided = np.stack([ends[:, 0] - states[1:, None], states[1:, None] - ends[:, 1]]) / (
         moves[:, None])
@@ -260,18 +260,18 @@ def _differences(
                 continue
             change = moves[i] * np.eye(size)[i]
 
-            def from_beside(offsets: Array, piece: int = piece, change: Array = change) -> Array:
+            def from_perturbed(offsets: Array, piece: int = piece, change: Array = change) -> Array:
                 return _states(ensemble(
                     system, np.tile(spans[piece], (len(offsets), 1)), **settings,
                     initial=states[piece] + offsets[:, None] * change))[:, -1]
 
             columns[piece, :, i], sided[:, piece, :, i] = looked_at(
-                piece, from_beside, apart, float(moves[i]),
+                piece, from_perturbed, apart, float(moves[i]),
                 _open_sides(system, solver, float(times[piece]), states[piece], change), f"y[{i}]")
     forced = None
     if parameter is not None:
         system_at, value = _function_of(system, parameter)
-        above, below, width = _systems_beside(system_at, value, MOVE * (abs(value) or 1.0))
+        above, below, width = _perturbed_systems(system_at, value, MOVE * (abs(value) or 1.0))
         ends = _states(ensemble([above] * pieces + [below] * pieces, np.tile(spans, (2, 1)),
                                 initial=np.tile(states[:-1], (2, 1)), **settings))[:, -1]
         forced = (ends[:pieces] - ends[pieces:]) / width
@@ -362,7 +362,7 @@ def _moved(
     if slider_counts(system).any():
         # Elements that have just begun or ceased to slide must not switch with the parameter.
         move *= _SLIDERS
-    return _systems_beside(system_at, value, move * min(
+    return _perturbed_systems(system_at, value, move * min(
         _slip_limit(system, system_at, value, move),
         _depth_limit(system, system_at, value, move, times, state)))
 
@@ -388,7 +388,7 @@ def _function_of(
     return (lambda at: function(system, at)), number
 
 
-def _systems_beside(
+def _perturbed_systems(
     system_at: Callable[[float], ContactSystem], value: float, move: float,
 ) -> tuple[ContactSystem, ContactSystem, float]:
     """The systems above and below a value of the parameter, and the difference of both."""
@@ -427,7 +427,7 @@ def _depth_limit(
 
     A gap of zero has no size of its own of which a part could be taken.
     """
-    above, below, _ = _systems_beside(system_at, value, move)
+    above, below, _ = _perturbed_systems(system_at, value, move)
     shift = _deeper(above, below, times, state)
     return min(1.0, _DEPTH * system.penetration_scale / shift) if shift > 0.0 else 1.0
 

@@ -145,7 +145,7 @@ class Method(NamedTuple):
 
     name: str
     data: type
-    aim: Callable[..., Any]
+    next_target: Callable[..., Any]
     attempt: Callable[..., Any]
     fill: Callable[..., Any]
     go_on: Callable[..., Any]
@@ -166,7 +166,7 @@ def step_loop(method: Method, constants: str = "") -> Any:
     the same numbers as one that was not interrupted. Where events find no
     room the call returns.
     """
-    aim, attempt, fill, go_on, begin, resume, close, full, find_end, stop_at = method[2:-1]
+    next_target, attempt, fill, go_on, begin, resume, close, full, find_end, stop_at = method[2:-1]
     keep, crowded = _keeping(fill, method.places) if method.places else (_keep_none, _no_events)
 
     def advance(data, most):
@@ -188,7 +188,7 @@ def step_loop(method: Method, constants: str = "") -> Any:
             if last == TAKEN and (attempts >= most or full(data) or crowded(data)):
                 break
             attempts += 1
-            step = aim(t, h, last, smallest, data)
+            step = next_target(t, h, last, smallest, data)
             last, h = attempt(step, last, smallest, data)
             if last != TAKEN:
                 counts[REJECTIONS] += 1

@@ -1,7 +1,7 @@
 """Arctangent and sine of one number or eight, for laws that integrators call millions of times.
 
 They become part of the law, while those of the C library are called, which costs as much again as
-the law itself. Functions of eight numbers are in :mod:`fecontact.core.lanes.functions`; branches
+the law itself. Functions of eight numbers are in :mod:`fecontact.core.simd.functions`; branches
 are faster for one. Arguments are brought to a short interval, on which a polynomial serves; its
 coefficients and intervals are those of the freely distributable library of Sun Microsystems
 (fdlibm). Results are right to two units in the last place of the largest value that they can have.
@@ -11,8 +11,8 @@ import math
 
 from fecontact.core.compiled import helper
 from fecontact.core.kernel_parts import part
-from fecontact.core.lanes import functions
-from fecontact.core.lanes.functions import by_kind
+from fecontact.core.simd import functions
+from fecontact.core.simd.functions import by_kind
 
 # A quarter turn in three parts, the first two of 33 bits, so that multiples of them are exact.
 _QUARTER = 1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21

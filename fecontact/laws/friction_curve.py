@@ -212,9 +212,9 @@ def _per_node(
     # Of one node without any: the shape of a result is known from one only.
     rows, first, inverse = np.unique(_table(law, max(nodes, 1)), axis=0, return_index=True,
                                      return_inverse=True)
-    answers = []
+    found = []
     for row, node in zip(rows, first, strict=True):
         own = {entry.name: value[node] for entry in fields(cast(Any, law))
                if isinstance(value := getattr(law, entry.name), tuple)}
-        answers.append(answer(replace(cast(Any, law), **own), np.ascontiguousarray(row)))
-    return np.array(answers)[inverse.reshape(-1)[:nodes]]
+        found.append(answer(replace(cast(Any, law), **own), np.ascontiguousarray(row)))
+    return np.array(found)[inverse.reshape(-1)[:nodes]]

@@ -1,8 +1,8 @@
 """Laws for eight contact nodes at once, one in each SIMD lane, made of the laws themselves.
 
-They serve runs of many small systems side by side (:mod:`fecontact.integrate.lanes`). Arguments and
+They serve runs of many small systems side by side (:mod:`fecontact.integrate.simd`). Arguments and
 results are those of :mod:`fecontact.laws.signatures`, eight of each, parameters ``p`` (k, 8). A law
-whose branches only choose values by :func:`fecontact.core.lanes.functions.select` is compiled for
+whose branches only choose values by :func:`fecontact.core.simd.functions.select` is compiled for
 eight numbers; one with other branches is called for one lane after the other.
 """
 
@@ -17,9 +17,9 @@ from fecontact.core.addresses import function_at
 from fecontact.core.compiled import CompiledLaw, compile_law, law_at
 from fecontact.core.errors import InputError
 from fecontact.core.kernel_parts import part
-from fecontact.core.lanes.functions import lane_of, rows, with_lane
-from fecontact.core.lanes.vectors import WIDTH, lanes, spread
 from fecontact.core.records import Matrix, numba_type
+from fecontact.core.simd.functions import lane_of, rows, with_lane
+from fecontact.core.simd.vectors import WIDTH, lanes, spread
 
 _NODE = types.UniTuple(lanes, 3)(lanes, lanes, numba_type(Matrix))
 _SIGNAL = types.UniTuple(lanes, 2)(lanes, numba_type(Matrix))

@@ -76,8 +76,8 @@ def require_common_axis(
                          f"the frame that rotates with them, leave frame out.")
     apart = np.cross(np.subtract((*rotation.centre, 0.0)[:3], (*symmetry.centre, 0.0)[:3]),
                      symmetry.axis)
-    aside = np.cross(rotation.axis, symmetry.axis)
-    if max(np.abs(apart).max(), np.abs(aside).max()) > 1e-9 * (1.0 + body.mesh.extent):
+    tilt = np.cross(rotation.axis, symmetry.axis)
+    if max(np.abs(apart).max(), np.abs(tilt).max()) > 1e-9 * (1.0 + body.mesh.extent):
         raise InputError(f"{owner}: rotation is about the axis of the symmetry; give both the "
                          f"same axis and centre.")
 

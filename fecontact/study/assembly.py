@@ -98,7 +98,7 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
         study.normal, study.friction, f"{title}: [normal]"), strict=True) if law is not None}
     if "normal" not in usual and len(_own(study, "normal")) < len(groups):
         raise InputError(NO_NORMAL_LAW.format(f"{title} lacks the section [normal]"))
-    if "friction" not in usual and _rubs(study, basis):
+    if "friction" not in usual and _has_friction(study, basis):
         raise InputError(NO_FRICTION_LAW.format(f"{title} lacks the section [friction]"))
     for section, law, count in _laws(study, groups):
         with located(f"{title}: [{section}]:", type(law).__name__):
@@ -131,7 +131,7 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
         return ContactSystem(basis, gap=gap, **parts)
 
 
-def _rubs(study: Described, basis: ModalBasis) -> bool:
+def _has_friction(study: Described, basis: ModalBasis) -> bool:
     """True if a node of an interface without own friction law can move along its other side."""
     own, first = _own(study, "friction"), 0
     for name, count in basis.groups:

@@ -32,7 +32,7 @@ def bristle_history(times: Vector, states: Matrix, s: SystemArrays, out: Block) 
 
 
 @kernel
-def _settle(t: float, y: Vector, s: SystemArrays) -> None:
+def _set_steady(t: float, y: Vector, s: SystemArrays) -> None:
     """Bring z of each node to z' = 0 by implicit Euler steps of increasing length."""
     n = len(s.rows)
     force, rates = force_workspace(s)
@@ -55,14 +55,14 @@ def _settle(t: float, y: Vector, s: SystemArrays) -> None:
             step *= 2.0
 
 
-def settled(t: float, y: Array, arrays: SystemArrays) -> Array:
+def steady_memory(t: float, y: Array, arrays: SystemArrays) -> Array:
     """The state y with the steady internal variables for its slip velocities and forces.
 
     They are unchanged at nodes without slip.
     """
     state = np.array(y, dtype=float)
     if arrays.memory.any():
-        _settle(t, state, arrays)
+        _set_steady(t, state, arrays)
     return state
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from fecontact.core.compiled import borrowing, helper, kernel, routine
 from fecontact.core.records import Block, Matrix, Vector
-from fecontact.system.kernels import given_at, linear_rates, rates_under
+from fecontact.system.kernels import linear_rates, prescribed_at, rates_under
 from fecontact.system.node_forces import (
     axis_force,
     force_workspace,
@@ -21,9 +21,9 @@ from fecontact.system.nodes import (
 )
 from fecontact.system.parameter_derivatives import (
     given_rates,
-    laws_beside,
     moves,
     node_rates,
+    offset_laws,
     set_shifts,
 )
 from fecontact.system.polynomial_forces import (
@@ -136,7 +136,7 @@ def _fill_rates(t, x, s, load, force, rates, f):
     moved = GroundMotion(0.0, 0.0, 0.0, 0.0)
     for c in range(len(t)):
         if c == 0 or t[c] != t[c - 1]:
-            moved = given_at(t[c], s, load)
+            moved = prescribed_at(t[c], s, load)
         rates_under(load, moved, x[c], s, force, rates, f[c])
 
 
@@ -149,8 +149,8 @@ def batch_rates(t: Vector, x: Matrix, s: SystemArrays, f: Matrix) -> None:
 
 
 @helper
-def _add_contact(j, pushes, s, partial, gradient, rate, out):
-    """Add the forces ``pushes`` (d,) of node j along its axes, and their derivatives.
+def _add_contact(j, node_force, s, partial, gradient, rate, out):
+    """Add the forces ``node_force`` (d,) of node j along its axes, and their derivatives.
 
     ``gradient`` (d, 2 m) is filled with those to q and q'.
     """
@@ -158,13 +158,13 @@ def _add_contact(j, pushes, s, partial, gradient, rate, out):
     _set_gradients(j, s, partial, gradient)
     for i in range(m):
         along, away = s.rows[j, 0, i], s.rows[j, 1, i]
-        rate[m + i] += along * pushes[0] + away * pushes[1]
+        rate[m + i] += along * node_force[0] + away * node_force[1]
         for k in range(2 * m):
             out[m + i, k] += along * gradient[0, k] + away * gradient[1, k]
     for axis in range(2, d):
         for i in range(m):
             row = s.rows[j, axis, i]
-            rate[m + i] += row * pushes[axis]
+            rate[m + i] += row * node_force[axis]
             for k in range(2 * m):
                 out[m + i, k] += row * gradient[axis, k]
 
@@ -172,7 +172,7 @@ def _add_contact(j, pushes, s, partial, gradient, rate, out):
 @borrowing
 def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
     # Counting references to what is made for it costs as much as the laws.
-    load, load_p, force, workspace, memory, shifts, pushes, pushes_p = vectors
+    load, load_p, force, workspace, memory, shifts, node_force, node_force_p = vectors
     rates, workspace_rates, partial, gradient, stiffening = matrices
     n, d, m = s.rows.shape
     states = len(rates)
@@ -183,7 +183,7 @@ def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
     for c in range(len(t)):
         y, out, A = x[c], f[c], J[c]
         if c == 0 or t[c] != t[c - 1]:
-            moved = given_at(t[c], s, load)
+            moved = prescribed_at(t[c], s, load)
             if differs:
                 moved_p = given_rates(t[c], s, r, laws, load_p)
         A[:, :] = 0.0
@@ -207,24 +207,24 @@ def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
                 out[first + k] = rates[k, 0]
             _memory_jacobian(j, s, force, rates, partial, A)
             for axis in range(d):
-                pushes[axis] = axis_force(axis, node, force, rates, s)
+                node_force[axis] = axis_force(axis, node, force, rates, s)
             if differs:
                 set_shifts(j, y, s, r, basis_moves, moved, moved_p, shifts)
                 pressing_p = node_rates(j, node, z, shifts, s, laws, force, partial,
-                                        (workspace, workspace_rates, memory), pushes_p)
+                                        (workspace, workspace_rates, memory), node_force_p)
                 for axis in range(d):
                     for i in range(m):
-                        P[c, m + i] += s.rows[j, axis, i] * pushes_p[axis]
+                        P[c, m + i] += s.rows[j, axis, i] * node_force_p[axis]
                     if basis_moves and node.normal != 0.0:
                         for i in range(m):
-                            P[c, m + i] += r.rows[j, axis, i] * pushes[axis]
+                            P[c, m + i] += r.rows[j, axis, i] * node_force[axis]
                 for k in range(s.memory[j]):
                     P[c, first + k] = rates[k, 2] * pressing_p + memory[k]
                     for tangent in range(d - 1):
                         P[c, first + k] += (rates[k, slip_entry(tangent, states)]
                                             * shifts[d + 2 * tangent])
             if node.normal != 0.0:
-                _add_contact(j, pushes, s, partial, gradient, out, A)
+                _add_contact(j, node_force, s, partial, gradient, out, A)
 
 
 @kernel
@@ -243,7 +243,7 @@ def batch_derivatives(
     step = h if len(P) > 0 else 0.0
     force, rates = force_workspace(s)
     beside, rates_beside = force_workspace(s)
-    _fill_derivatives(t, x, s, r, laws_beside(s, r, step),
+    _fill_derivatives(t, x, s, r, offset_laws(s, r, step),
                       (np.empty(m), np.empty(m), force, beside, np.empty(states),
                        np.empty(2 * d), np.empty(d), np.empty(d)),
                       (rates, rates_beside, np.empty((d + 1, 2 * d)), np.empty((d, 2 * m)),

@@ -69,10 +69,10 @@ def set_constant_load(s, load):
 
 
 @helper
-def add_pull(pull, axis, s, load):
+def add_drive_force(drive_force, axis, s, load):
     """Add the modal forces of a pull of the drive along an axis."""
     for i in range(len(load)):
-        load[i] += pull * s.drive_shapes[axis, i]
+        load[i] += drive_force * s.drive_shapes[axis, i]
 
 
 @helper
@@ -92,11 +92,11 @@ def drive_pull(axis, t, s):
 
 
 @helper
-def given_at(t, s, load):
+def prescribed_at(t, s, load):
     """Fill load (m,) with modal forces given in time; returns the motion of the ground."""
     set_constant_load(s, load)
     for axis in range(len(s.drive)):
-        add_pull(drive_pull(axis, t, s), axis, s, load)
+        add_drive_force(drive_pull(axis, t, s), axis, s, load)
     add_loads(t, s, load)
     return ground_motion(t, s)
 
@@ -154,7 +154,7 @@ def rates_under(load, moved, y, s, force, rates, out):
 def right_hand_side(t: float, y: Vector, s: SystemArrays, out: Vector) -> None:
     """Fill out (2 m + n s,) with y'."""
     load = np.empty(s.rows.shape[2])
-    moved = given_at(t, s, load)
+    moved = prescribed_at(t, s, load)
     force, rates = force_workspace(s)
     rates_under(load, moved, y, s, force, rates, out)
 

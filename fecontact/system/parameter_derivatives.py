@@ -27,7 +27,7 @@ _PLACES = np.array([1.0, -1.0, 2.0, -2.0])
 _WEIGHTS = np.array([8.0, -8.0, -1.0, 1.0])
 
 
-class LawsBeside(NamedTuple):
+class OffsetLaws(NamedTuple):
     """Parameters of all laws at the places of the differences, and the step between these.
 
     Arrays (4, k, p) for k laws of p parameters, (0, k, p) where no parameter moves.
@@ -45,7 +45,7 @@ class LawsBeside(NamedTuple):
 
 
 @helper
-def _beside(parameters, rates, h):
+def _offsets(parameters, rates, h):
     """Laws' parameters (4, k, p) at the offsets of the differences; (0, k, p) if none varies."""
     k, p = parameters.shape
     count = 4 if h > 0.0 and moves(rates) else 0
@@ -68,20 +68,20 @@ def moves(rates):
 
 
 @helper
-def laws_beside(s, r, h):
+def offset_laws(s, r, h):
     """Parameters of all laws beside those of the system, for differences of step h."""
-    return LawsBeside(
-        _beside(s.normal_parameters, r.normal_parameters, h),
-        _beside(s.friction_parameters, r.friction_parameters, h),
-        _beside(s.profile_parameters.reshape(1, -1), r.profile_parameters.reshape(1, -1), h),
-        _beside(s.friction_scale_parameters.reshape(1, -1),
-                r.friction_scale_parameters.reshape(1, -1), h),
-        _beside(s.ground_motion_parameters.reshape(1, -1),
-                r.ground_motion_parameters.reshape(1, -1), h),
-        _beside(s.second_motion_parameters.reshape(1, -1),
-                r.second_motion_parameters.reshape(1, -1), h),
-        _beside(s.drive_parameters, r.drive_parameters, h),
-        _beside(s.load_parameters, r.load_parameters, h), h)
+    return OffsetLaws(
+        _offsets(s.normal_parameters, r.normal_parameters, h),
+        _offsets(s.friction_parameters, r.friction_parameters, h),
+        _offsets(s.profile_parameters.reshape(1, -1), r.profile_parameters.reshape(1, -1), h),
+        _offsets(s.friction_scale_parameters.reshape(1, -1),
+                 r.friction_scale_parameters.reshape(1, -1), h),
+        _offsets(s.ground_motion_parameters.reshape(1, -1),
+                 r.ground_motion_parameters.reshape(1, -1), h),
+        _offsets(s.second_motion_parameters.reshape(1, -1),
+                 r.second_motion_parameters.reshape(1, -1), h),
+        _offsets(s.drive_parameters, r.drive_parameters, h),
+        _offsets(s.load_parameters, r.load_parameters, h), h)
 
 
 @helper
@@ -104,11 +104,11 @@ def given_rates(t, s, r, laws, load):
     for k in range(len(s.drive)):
         value, rate = signal_at(s.drive[k])(t, s.drive_parameters[k])
         value_p, rate_p = _signal_rates(s.drive[k], t, laws.drive, k, h)
-        pull = s.drive_stiffness[k] * value + s.drive_damping[k] * rate
-        pull_p = (r.drive_stiffness[k] * value + s.drive_stiffness[k] * value_p
+        drive_force = s.drive_stiffness[k] * value + s.drive_damping[k] * rate
+        drive_force_p = (r.drive_stiffness[k] * value + s.drive_stiffness[k] * value_p
                   + r.drive_damping[k] * rate + s.drive_damping[k] * rate_p)
         for i in range(m):
-            load[i] += pull * r.drive_shapes[k, i] + pull_p * s.drive_shapes[k, i]
+            load[i] += drive_force * r.drive_shapes[k, i] + drive_force_p * s.drive_shapes[k, i]
     for k in range(len(s.load)):
         value = signal_at(s.load[k])(t, s.load_parameters[k])[0]
         rate = _signal_rates(s.load[k], t, laws.load, k, h)[0]

@@ -13,8 +13,8 @@ from fecontact.bifurcation import (
     Collocation,
     ContinuationOptions,
     PeriodicMotion,
-    codim2_beside,
     codim2_curve,
+    codim2_nearby,
     equilibrium_branch,
     orbit_branch,
     vector_field,
@@ -136,7 +136,7 @@ def test_why_nothing_was_found_is_kept(monkeypatch):
     def failing(*_, **__):
         raise AnalysisError("No orbit.")
 
-    monkeypatch.setattr(codim2_beside, "orbit_branch", failing)
+    monkeypatch.setattr(codim2_nearby, "orbit_branch", failing)
     field = vector_field(tangled, {"b": -1.0, "c": 0.2}, 2)
     _, (point,) = through(field, [-1.0, 0.0], "b", "fold", "c", PLANE)
     with pytest.raises(AnalysisError, match="no homoclinic orbit was found beside it") as found:

@@ -15,7 +15,7 @@ from fecontact.bifurcation import (
     orbit_branch,
     vector_field,
 )
-from fecontact.bifurcation.codim2_beside import _across
+from fecontact.bifurcation.codim2_nearby import _across
 from fecontact.bifurcation.events.branches import nothing_left
 from fecontact.bifurcation.events.conditions import Condition
 from fecontact.bifurcation.orbits.floquet import by_falling_modulus

@@ -111,8 +111,8 @@ def test_curve_of_tori(monkeypatch):
     branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "lam",
                           method=Collocation(intervals=16), bounds=(-0.5, 0.5), scales=np.ones(3))
     point, = branch.of_kind("Neimark-Sacker")
-    monkeypatch.setattr(Expansion, "torus", lambda self, bends: called.append(1) or formula(
-        self, bends))
+    monkeypatch.setattr(Expansion, "torus",
+                        lambda self, terms: called.append(1) or formula(self, terms))
     curve = codim2_curve(field, point, "a", direction=-1.0, both=False,
                          bounds={"lam": (-0.1, 0.5), "a": (-0.5, 0.5)},
                          options=ContinuationOptions(points=30))

@@ -162,7 +162,7 @@ def test_derivatives_of_the_resonance_are_those_of_its_residual(condition, windo
                           window=window)
     if window:
         # Both sides lie on the response, near which the orbit must be.
-        y = starts.corrected(orbit, np.append(np.zeros(orbit.size), f))[1]
+        y = starts.converged_orbit(orbit, np.append(np.zeros(orbit.size), f))[1]
         u[:-1], weights = y, orbit.weights()
         along = orbit.linearise(y).solve(np.eye(len(y))[-1], np.eye(len(y))[-1])
         problem = replace(problem, border=weights * along / np.sqrt(weights @ along**2))

@@ -46,7 +46,7 @@ def distance(problem, u, tangent, samples):
     weights[: problem.size] /= weights[: problem.size] @ u[: problem.size] ** 2
     if problem.autonomous:
         weights[-2] = u[-2] ** -2
-    found, _, _ = newton.corrected(replace(problem, samples=samples), u, weights * tangent, 1e-13,
+    found, _, _ = newton.newton(replace(problem, samples=samples), u, weights * tangent, 1e-13,
                                    20, exact=True)
     return np.sqrt(weights @ (found - u) ** 2)
 

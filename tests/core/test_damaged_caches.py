@@ -16,8 +16,8 @@ import pytest
 from llvmlite.binding import parse_bitcode
 
 from fecontact.core import compiled
-from fecontact.core.lanes import vectors
-from fecontact.core.lanes.vectors import WIDTH
+from fecontact.core.simd import vectors
+from fecontact.core.simd.vectors import WIDTH
 
 MODULE = '''
 from collections.abc import Callable

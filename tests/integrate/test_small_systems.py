@@ -6,11 +6,11 @@ from systems import TURN, friction_oscillator, two_mass_system
 
 from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
 from fecontact.integrate import small_systems
-from fecontact.integrate.lanes import step_loop as lanes_loop
-from fecontact.integrate.lanes.driver import side_by_side
 from fecontact.integrate.rodas5p import driver, method, propagation
 from fecontact.integrate.rodas5p.state import Output
 from fecontact.integrate.rodas5p.variational import Variation
+from fecontact.integrate.simd import step_loop as lanes_loop
+from fecontact.integrate.simd.driver import side_by_side
 from fecontact.laws import DahlFriction, ExponentialFriction, RoughSurface
 
 

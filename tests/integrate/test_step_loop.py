@@ -89,7 +89,7 @@ def _begin(t, data):
 
 
 @helper
-def _aim(t, h, last, smallest, data):
+def _next_target(t, h, last, smallest, data):
     end = data.output.times[-1]
     return Step(t, min(h, end - t), min(t + h, end))
 
@@ -159,7 +159,7 @@ def _go_on(step, h, data):
     return RUNNING, h
 
 
-LOOP = step_loop(Method("runge_kutta", Data, _aim, _attempt, _fill, _go_on, _begin,
+LOOP = step_loop(Method("runge_kutta", Data, _next_target, _attempt, _fill, _go_on, _begin,
                         find_end=_find_end, stop_at=_stop_at))
 
 

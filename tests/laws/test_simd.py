@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from fecontact.core.compiled import kernel
-from fecontact.core.lanes.functions import select
-from fecontact.core.lanes.vectors import read, write
 from fecontact.core.records import Matrix, Vector
+from fecontact.core.simd.functions import select
+from fecontact.core.simd.vectors import read, write
 from fecontact.laws import (
     BilateralPiecewise,
     BilateralPlay,

@@ -8,7 +8,7 @@ their points, meet.
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
+from fecontact.bifurcation.continuation.newton import Solution, finished, newton, norm
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.special_points import located_on
@@ -92,7 +92,7 @@ def _found(
     """The solution at a distance from u along a direction, which its tangent must have."""
     row = np.sign(length) * problem.weights() * leaving
     try:
-        found = corrected(problem, u + length * leaving, row, options.tolerance,
+        found = newton(problem, u + length * leaving, row, options.tolerance,
                           2 * options.iterations)
         if found is None:
             return None

@@ -8,7 +8,7 @@ the whole hairpin, and the branch is nearly a parabola over it.
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
+from fecontact.bifurcation.continuation.newton import Solution, finished, newton, norm
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.special_points import located_on
@@ -88,7 +88,7 @@ def _next(
     """The solution at a distance along the row; None if Newton's method fails."""
     guess = at.u + length / float(row @ at.tangent) * at.tangent
     try:
-        found = corrected(problem, guess, row, _TOLERANCE, 2 * options.iterations)
+        found = newton(problem, guess, row, _TOLERANCE, 2 * options.iterations)
         return None if found is None else finished(problem, *found, row, options)
     except FecontactError:
         return None

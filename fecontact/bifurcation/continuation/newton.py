@@ -110,7 +110,7 @@ class Tests(Mapping[str, float]):
         return len(self._found)
 
 
-def corrected(
+def newton(
     problem: Problem, guess: Array, row: Array, tolerance: float, iterations: int, *,
     known: Linearisation | None = None, exact: bool = False,
 ) -> tuple[Array, Linearisation, int] | None:
@@ -135,7 +135,7 @@ def _iterated(
     problem: Problem, guess: Array, row: Array, tolerance: float, iterations: int,
     known: Linearisation | None, exact: bool,
 ) -> tuple[Array, Linearisation, int] | None:
-    """One attempt of :func:`corrected`, beginning with the matrix of ``known`` if there is one."""
+    """One attempt of :func:`newton`, beginning with the matrix of ``known`` if there is one."""
     u, before, kept = guess, np.inf, known
     weights, scale = problem.weights(), 1.0 + norm(problem, guess)
     more = 0 if known is None else 1

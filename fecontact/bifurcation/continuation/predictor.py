@@ -102,9 +102,9 @@ def _guesses(weights: Vector, trail: Matrix, step: float, out: Matrix) -> int:
     x = 1.0 + step / length
     by_old = length * x * (1.0 - x) ** 2 * factors[1]
     by_here = length * x * x * (x - 1.0) * factors[0]
-    aside = x * x * (3.0 - 2.0 * x)
+    blend = x * x * (3.0 - 2.0 * x)
     for k in range(size):
-        out[1, k] = (trail[2, k] + by_old * trail[3, k] + aside * (trail[0, k] - trail[2, k])
+        out[1, k] = (trail[2, k] + by_old * trail[3, k] + blend * (trail[0, k] - trail[2, k])
                      + by_here * trail[1, k])
     return count
 

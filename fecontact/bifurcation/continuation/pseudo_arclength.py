@@ -12,7 +12,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.corner import round_corner
 from fecontact.bifurcation.continuation.hairpin import round_hairpin
-from fecontact.bifurcation.continuation.newton import Solution, corrected, finished, norm
+from fecontact.bifurcation.continuation.newton import Solution, finished, newton, norm
 from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
 from fecontact.bifurcation.continuation.points import UNRESOLVED
 from fecontact.bifurcation.continuation.problem import (
@@ -238,7 +238,7 @@ def start_of(
     started: Solution | None = problem.started(u, row, options)
     if started is not None:
         return started
-    found = corrected(problem, np.array(u, dtype=float), row, options.tolerance,
+    found = newton(problem, np.array(u, dtype=float), row, options.tolerance,
                       3 * options.iterations)
     if found is None:
         raise InputError(f"There is no solution near the start at the parameter {u[-1]:.6g}; give "
@@ -255,7 +255,7 @@ def _step(
     # One step with the matrix at the guess does where that is no farther than others leave it.
     near = problem.polishes and problem.off(step) <= _NEAR * options.tolerance * (
         1.0 + norm(problem, guess))
-    found = corrected(problem, guess, row, options.tolerance, options.iterations,
+    found = newton(problem, guess, row, options.tolerance, options.iterations,
                       known=None if near else here.linearisation)
     if found is None:
         return None
@@ -362,7 +362,7 @@ def _lead_to_one(
     A branch may pass itself closer than the cubic between two of its points is accurate.
     """
     try:
-        found = [corrected(problem, guess, row, options.tolerance, 2 * options.iterations)
+        found = [newton(problem, guess, row, options.tolerance, 2 * options.iterations)
                  for guess in (one, other)]
     except FecontactError:
         return False

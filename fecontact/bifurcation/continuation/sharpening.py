@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import corrected, finished, norm
+from fecontact.bifurcation.continuation.newton import finished, newton, norm
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import (
     NeimarkSackerPoint,
@@ -318,7 +318,7 @@ def _agree(one: Place, other: Place, kind: str, reach: float) -> bool:
     Beside a hairpin the corrector converges at short distances only.
     """
     for distance in reach * _SHORTER_DISTANCES:
-        found = np.array([[_test_beside(place, kind, side * distance) for place in (one, other)]
+        found = np.array([[_test_at(place, kind, side * distance) for place in (one, other)]
                           for side in (-1.0, 1.0)])
         if not np.isnan(found).any():
             break
@@ -328,12 +328,12 @@ def _agree(one: Place, other: Place, kind: str, reach: float) -> bool:
     return bool((np.abs(found[:, 0] - found[:, 1]) <= _AGREEMENT * size).all())
 
 
-def _test_beside(place: Place, kind: str, along: float) -> float:
+def _test_at(place: Place, kind: str, along: float) -> float:
     """A test function on the branch at a distance from a place; NaN if the corrector fails."""
     problem, u, tangent = place
     options, row = ContinuationOptions(), problem.weights() * tangent
     try:
-        reached = corrected(problem, u + along * tangent, row, options.tolerance,
+        reached = newton(problem, u + along * tangent, row, options.tolerance,
                             2 * options.iterations)
         return (np.nan if reached is None
                 else finished(problem, *reached, row, options).tests[kind])

@@ -7,8 +7,8 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.newton import (
     Solution,
-    corrected,
     finished,
+    newton,
     weighted_norm,
     weighted_product,
     with_values,
@@ -98,7 +98,7 @@ class Step:
     def solution(self, along: float) -> Solution | None:
         """The solution at a length along the row; None if Newton's method fails."""
         try:
-            found = corrected(self.problem, self.cubic(along), self.row, self.options.tolerance,
+            found = newton(self.problem, self.cubic(along), self.row, self.options.tolerance,
                               2 * self.options.iterations)
             return None if found is None else finished(self.problem, *found, self.row,
                                                        self.options)
@@ -120,7 +120,7 @@ class Step:
         guess, row = self.cubic(low), np.zeros(len(self.here.u))
         guess[place], row[place] = value, 1.0
         try:
-            found = corrected(self.problem, guess, row, _EXACT, 2 * self.options.iterations,
+            found = newton(self.problem, guess, row, _EXACT, 2 * self.options.iterations,
                               known=self.there.linearisation, exact=True)
             if found is None or not self._holds(found[0], guess):
                 return None
@@ -216,7 +216,7 @@ class _Search:
         if not self.remeshed and self._jumps():
             raise _LostError
         # Report a zero at once where the secant shows that the remaining error is small enough.
-        return 0.0 if self._settled() else value
+        return 0.0 if self._converging() else value
 
     def _solution(self, along: float) -> Solution:
         """The solution at a length, linearised there and not at the last Newton step."""
@@ -224,7 +224,7 @@ class _Search:
         exact = max(_EXACT, 1e-2 * self.precision)
         for guess, beside in self._guesses(along):
             try:
-                found = corrected(step.problem, guess, step.row, exact, 2 * options.iterations,
+                found = newton(step.problem, guess, step.row, exact, 2 * options.iterations,
                                   exact=True, known=beside.linearisation)
                 if found is not None:
                     return finished(step.problem, *found, step.row, options, stored=False)
@@ -256,7 +256,7 @@ class _Search:
         sizes = self.test(self.step.here), self.test(self.step.there)
         return start * sizes[0] < 0.0 and abs(start) > _JUMP * abs(sizes[1])
 
-    def _settled(self) -> bool:
+    def _converging(self) -> bool:
         """Whether the last two values fall quickly towards a zero of their secant nearby."""
         if self.precision >= _SMOOTH or len(self.known) < 2:
             return False

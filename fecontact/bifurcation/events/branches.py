@@ -9,7 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch, labelled, regular, shortened
 from fecontact.bifurcation.continuation.heading import heading
-from fecontact.bifurcation.continuation.newton import corrected, norm
+from fecontact.bifurcation.continuation.newton import newton, norm
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import special_point
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
@@ -276,7 +276,7 @@ def _starts(
         for sign in (1.0, -1.0):
             row = problem.weights() * sign * tangent
             try:
-                found = corrected(problem, u + sign * step * tangent, row, options.tolerance,
+                found = newton(problem, u + sign * step * tangent, row, options.tolerance,
                                   options.iterations)
                 if found is None or not problem.linearise(found[0]).least.left > 0.0:
                     continue

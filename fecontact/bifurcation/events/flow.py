@@ -266,7 +266,7 @@ def _begin(t, data):
 
 
 @routine
-def _aim(t, h, last, smallest, data):
+def _next_target(t, h, last, smallest, data):
     """The next step to try, of the length h, to the next output at most."""
     goal = data.output.times[data.progress.counts[OUTPUTS]]
     reaching = h >= (goal - t) * (1.0 - 1e-10)
@@ -329,7 +329,7 @@ def _go_on(step, h, data):
     return RUNNING, h
 
 
-METHOD = Method("flow", Data, _aim, _attempt, _fill, _go_on, _begin, close=_close)
+METHOD = Method("flow", Data, _next_target, _attempt, _fill, _go_on, _begin, close=_close)
 flow = step_loop(METHOD)
 
 

@@ -73,10 +73,10 @@ class EventLinearisation:
         starts, durations = self.problem.starts(self.u), self.problem.durations(self.u)
         found = [self.end(phase, begin, start, duration) for phase, begin, start, duration in zip(
             self.problem.phases, self.begins, starts, durations, strict=False)]
-        found[-1] = self._settled(found[-1])
+        found[-1] = self._held_at_rest(found[-1])
         return found
 
-    def _settled(self, end: End) -> End:
+    def _held_at_rest(self, end: End) -> End:
         """The end of the period with stops that are always closed where they are held.
 
         Their equations tell accelerations alone, which would leave place and speed free.
@@ -87,10 +87,11 @@ class EventLinearisation:
         after, d = end.after, len(end.state)
         motion = self.motion
         slopes = motion.slopes_of(
-            lambda t, state, problem: motion.settled(t, state, phase, stops, problem), t, after)
+            lambda t, state, problem: motion.held_at_rest(t, state, phase, stops, problem),
+            t, after)
         jumped = slopes[:, :d] @ end.jumped
         jumped[:, d:] += slopes[:, d:]
-        return replace(end, after=motion.settled(t, after, phase, stops), jumped=jumped)
+        return replace(end, after=motion.held_at_rest(t, after, phase, stops), jumped=jumped)
 
     def end(
         self, phase: Phase, begin: float, start: Array, duration: float,
@@ -114,9 +115,9 @@ class EventLinearisation:
         elif phase.lifts_off():
             # A flight begins at the stop and without speed, whatever the equations of rest say.
             stops = (phase.event - 2 * motion.clusters,)
-            after = motion.settled(t, state, phase, stops)
+            after = motion.held_at_rest(t, state, phase, stops)
             jumped = motion.slopes_of(
-                lambda t, state, problem: motion.settled(t, state, phase, stops, problem),
+                lambda t, state, problem: motion.held_at_rest(t, state, phase, stops, problem),
                 t, state)
         return End(state, rates[0], moved, after, jumped, margin, slopes)
 

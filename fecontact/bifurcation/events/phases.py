@@ -185,7 +185,7 @@ class Motion:
             self.longest, tangential=solver.tangential_restitution)
 
     @cached_property
-    def _beside(self) -> tuple[NonsmoothProblem, NonsmoothProblem, float]:
+    def _perturbed(self) -> tuple[NonsmoothProblem, NonsmoothProblem, float]:
         """Problems at larger and smaller parameters, and half their distance.
 
         Raises
@@ -218,7 +218,7 @@ class Motion:
         """
         d = 2 * self.modes
         states, slopes = np.empty((len(times), d)), np.empty((d if derivatives else 0, d + 2))
-        above, below, change = self._beside if derivatives else (self.problem, self.problem, 1.0)
+        above, below, change = self._perturbed if derivatives else (self.problem, self.problem, 1.0)
         given = Given(self.problem, above, below, change, self.tick, self.rtol, self.longest, begin,
                       1.0 if times[-1] >= 0.0 else -1.0, *phase.arrays, self.sizes)
         sizes, rows = {STATES: d}, Rows(np.abs(times), states)
@@ -253,7 +253,7 @@ class Motion:
         steps = np.append(PART * self.sizes, self.tick)[: len(found)]
         slopes = np.zeros(d + 2)
         slopes[: len(found)] = found @ _WEIGHTS / steps
-        above, below, change = self._beside
+        above, below, change = self._perturbed
         ends = [self.observed(np.array([t]), state[None], phase, problem)[0][0, event]
                 for problem in (above, below)]
         slopes[-1] = (ends[0] - ends[1]) / (2.0 * change)
@@ -276,7 +276,7 @@ class Motion:
         assert phase.strike is not None
         return self._impact(t, state, phase, phase.strike, problem)[0]
 
-    def settled(
+    def held_at_rest(
         self, t: float, state: Array, phase: Phase, stops: tuple[int, ...],
         problem: NonsmoothProblem | None = None,
     ) -> Array:
@@ -303,7 +303,7 @@ class Motion:
         steps = np.append(PART * self.sizes, self.tick)[: len(found)]
         slopes = np.zeros((d, d + 2))
         slopes[:, : len(found)] = (np.einsum("ikj,k->ij", found, _WEIGHTS) / steps[:, None]).T
-        above, below, width = self._beside
+        above, below, width = self._perturbed
         slopes[:, -1] = (change(t, state, above) - change(t, state, below)) / (2.0 * width)
         return slopes
 

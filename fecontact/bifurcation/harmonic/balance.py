@@ -11,7 +11,6 @@ from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks, kink_onsets
 from fecontact.bifurcation.harmonic.elements import follow_elements
 from fecontact.bifurcation.harmonic.engine_order import Waves
-from fecontact.bifurcation.harmonic.few_contacts import Factors, FewContacts, contact_directions
 from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
 from fecontact.bifurcation.harmonic.series import (
@@ -21,6 +20,7 @@ from fecontact.bifurcation.harmonic.series import (
     rows_of,
     series,
 )
+from fecontact.bifurcation.harmonic.woodbury import Factors, WoodburySolver, contact_directions
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, Integers
 from fecontact.system.elastic_sliders import without_elements
@@ -295,7 +295,7 @@ class Linearised:
     def __init__(self, problem: Balance, u: Array) -> None:
         self.problem, self.u = problem, u
         self.period = problem.period(u)
-        self._factors: tuple[Factors | FewContacts, Array] | None = None
+        self._factors: tuple[Factors | WoodburySolver, Array] | None = None
         self._widths: Array | None = None
 
     @cached_property
@@ -418,7 +418,7 @@ class Linearised:
                 slowed[:, m : 2 * m] += self._widths.T / T
             by_period = -turned.reshape(-1) + self._by_rates(slowed)
             return np.stack([by_period, self._by_rates(P[:, :, 0])], axis=1)
-        ends = self._beside()
+        ends = self._perturbed()
         if ends is None:
             return self._by_rates(P[:, :, 0])[:, None]
         sides = [self._balance(end, period, problem.rates(
@@ -434,7 +434,7 @@ class Linearised:
         return np.asarray(-np.matmul(J[:, :, m : 2 * m], x[:, m : 2 * m, None])[:, :, 0]
                           / self.period)
 
-    def _beside(self) -> list[tuple[Array, float, float]] | None:
+    def _perturbed(self) -> list[tuple[Array, float, float]] | None:
         """Unknowns, period and distance beside the parameter; None if the period stays."""
         u, h = self.u, _DIFFERENCE * max(abs(float(self.u[-1])), 1e-3)
         found = []
@@ -449,7 +449,7 @@ class Linearised:
         """Derivatives (e,) of the period to the period, if it is unknown, and the parameter."""
         if self.problem.autonomous:
             return np.array([1.0, 0.0])
-        ends = self._beside()
+        ends = self._perturbed()
         return np.array([0.0 if ends is None else (ends[0][1] - ends[1][1]) / (2.0 * ends[0][2])])
 
     def _by_rates(self, change: Array) -> Array:
@@ -495,7 +495,7 @@ class Linearised:
         common[:, :, -1] = P[:, first:, 0]
         if problem.autonomous:
             common[:, :, 0] = self._slowed(J, x) + differences(x[:, first:]) / T**2
-        elif (ends := self._beside()) is not None:
+        elif (ends := self._perturbed()) is not None:
             sides = []
             for end, period, _ in ends:
                 moved = problem.states(end, period, x[:, first:])
@@ -575,10 +575,11 @@ class Linearised:
             square[:-1], square[-1] = self.condensed, row
             directions = None if self.problem.autonomous else self.problem.directions
             if len(self.problem.left_out):
-                made: Factors | FewContacts | None = Factors.without(square, self.problem.left_out)
+                made: Factors | WoodburySolver | None = Factors.without(
+                    square, self.problem.left_out)
             else:
                 made = (Factors.of(square) if directions is None
-                        else FewContacts.of(square, directions))
+                        else WoodburySolver.of(square, directions))
             if made is None:
                 return np.full(len(row), np.nan)
             self._factors = made, row

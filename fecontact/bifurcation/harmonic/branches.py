@@ -52,7 +52,7 @@ def followed(
     """Branch from a start by collocation; ``limits`` (d,) are those of the growth of scales."""
     problem, u, tangent = starts.start_of(start, method, limits)
     if tangent is None:
-        problem, u = starts.corrected(problem, u)
+        problem, u = starts.converged_orbit(problem, u)
     return follow(problem, u, tangent, method, options, **how)
 
 

@@ -221,8 +221,8 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         guess = u + step * tangent
         if self.bend is None:
             return guess
-        aside = 0.5 * step * step * self.bend
-        return guess if weighted_norm(self.weights(), aside) > _MOST_BENT * step else guess + aside
+        bow = 0.5 * step * step * self.bend
+        return guess if weighted_norm(self.weights(), bow) > _MOST_BENT * step else guess + bow
 
     def orientation(self, linearisation: Any, tangent: Array) -> float:
         """Sign of the determinant of the equations, in their scales, with the tangent below."""

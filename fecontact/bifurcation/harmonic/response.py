@@ -381,7 +381,7 @@ def _started(
             attempts.append(lambda values=values: _excited_further(  # type: ignore[misc]
                 field, values, free, method, options, held))
         elif isinstance(field, ContactField) and method.repeats is None:
-            attempts.append(lambda values=values: _settled(  # type: ignore[misc]
+            attempts.append(lambda values=values: _from_run(  # type: ignore[misc]
                 field, values, free, method, options, held))
         for attempt in attempts:
             try:
@@ -506,7 +506,7 @@ def _from_rest(
     if isinstance(field, ContactField) and not _rests_at_zero(problem, field, u):
         state = rest_state(field, values)
         u = starts.unknowns(problem, np.tile(state, (problem.samples, 1)), 0.0)
-    return _scaled(*starts.corrected(problem, u))
+    return _scaled(*starts.converged_orbit(problem, u))
 
 
 def _rests_at_zero(problem: HarmonicProblem, field: ContactField, u: Array) -> bool:
@@ -542,7 +542,7 @@ def _scaled(problem: HarmonicProblem, u: Array) -> tuple[HarmonicProblem, Array]
     scales = np.concatenate([sizes, problem.scales[-2:]])
     scaled = replace(problem, scales=scales, limits=1e4 * sizes)
     # A branch begins so by itself where that is quick.
-    return (scaled, u) if scaled.equations(float(u[-1])) else starts.corrected(scaled, u)
+    return (scaled, u) if scaled.equations(float(u[-1])) else starts.converged_orbit(scaled, u)
 
 
 def _excited_further(
@@ -590,7 +590,7 @@ def _up_to(
     return np.asarray(last.orbit(samples=501).states)
 
 
-def _settled(
+def _from_run(
     field: ContactField, values: Array, free: int, method: HarmonicBalance,
     options: ContinuationOptions, held: Array | None,
 ) -> tuple[HarmonicProblem, Array]:
@@ -608,7 +608,7 @@ def _taken(
     phases = np.linspace(0.0, 1.0, len(states))
     sampled = np.stack([np.interp(problem.series.times, phases, column) for column in states.T],
                        axis=1)
-    return _scaled(*starts.corrected(problem, starts.unknowns(problem, sampled, 0.0)))
+    return _scaled(*starts.converged_orbit(problem, starts.unknowns(problem, sampled, 0.0)))
 
 
 def observed_amplitudes(branch: Branch, row: Array) -> Array:

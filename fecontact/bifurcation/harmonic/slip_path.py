@@ -98,28 +98,28 @@ def pressing_at(path, n, part, order):
 
 
 @helper
-def beyond(path, n, part, order, pull, base, s):
-    """Path less ``pull`` times P less ``base``, or a derivative of it, and the next derivative."""
+def beyond(path, n, part, order, compliance, base, s):
+    """Path - ``compliance`` P - ``base``, or a derivative of it, and the next derivative."""
     place, rate, bend, third = moved_at(path, n, part, s)
     if order == 0:
-        return (place - pull * pressing_at(path, n, part, 0) - base,
-                rate - pull * pressing_at(path, n, part, 1))
+        return (place - compliance * pressing_at(path, n, part, 0) - base,
+                rate - compliance * pressing_at(path, n, part, 1))
     if order == 1:
-        return (rate - pull * pressing_at(path, n, part, 1),
-                bend - pull * pressing_at(path, n, part, 2))
+        return (rate - compliance * pressing_at(path, n, part, 1),
+                bend - compliance * pressing_at(path, n, part, 2))
     return bend, third
 
 
 @borrowing
-def zero_between(path, n, low, high, order, pull, base, s):
+def zero_between(path, n, low, high, order, compliance, base, s):
     """Zero of :func:`beyond` between two parts of interval n; the nearer end if the sign stays."""
-    f_low, f_high = (beyond(path, n, low, order, pull, base, s)[0],
-                     beyond(path, n, high, order, pull, base, s)[0])
+    f_low, f_high = (beyond(path, n, low, order, compliance, base, s)[0],
+                     beyond(path, n, high, order, compliance, base, s)[0])
     if f_low * f_high >= 0.0:
         return high if abs(f_high) < abs(f_low) else low
     x = low - f_low * (high - low) / (f_high - f_low)
     for _ in range(_STEPS):
-        f, slope = beyond(path, n, x, order, pull, base, s)
+        f, slope = beyond(path, n, x, order, compliance, base, s)
         if f * f_low > 0.0:
             low = x
         else:
@@ -177,7 +177,7 @@ def cut_pieces(path, s):
 
 
 @helper
-def add_row(path, n, part, order, pull, factor, row):
+def add_row(path, n, part, order, compliance, factor, row):
     """Add to a row (2 L,) a factor times the derivatives of :func:`beyond` to coefficients."""
     N, L = len(path.pressing), len(path.series)
     tau = (n + part) / N
@@ -197,7 +197,7 @@ def add_row(path, n, part, order, pull, factor, row):
         else:
             row[2 * k - 1] -= factor * w * w * c
             row[2 * k] -= factor * w * w * d
-    if len(path.slopes) == 0 or pull == 0.0:
+    if len(path.slopes) == 0 or compliance == 0.0:
         return
     if not pressing_at(path, n, part, 0) > 0.0:
         return
@@ -205,4 +205,4 @@ def add_row(path, n, part, order, pull, factor, row):
     for i in range(4):
         there = path.slopes[(n - 1 + i) % N]
         for k in range(2 * L):
-            row[k] -= factor * pull * weights[i] * there[k]
+            row[k] -= factor * compliance * weights[i] * there[k]

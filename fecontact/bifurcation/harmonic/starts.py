@@ -173,7 +173,7 @@ def method_of(attributes: Mapping[str, Any]) -> HarmonicBalance:
                            stability=None if stability == "none" else stability)
 
 
-def corrected(
+def converged_orbit(
     problem: HarmonicProblem, u: Array, tolerance: float = 1e-8
 ) -> tuple[HarmonicProblem, Array]:
     """The orbit near u at fixed parameter.

@@ -45,9 +45,9 @@ _CLOSE = 1e-6
 
 
 @borrowing
-def _stuck_since(path, n, ends, last, pull, s):
+def _stuck_since(path, n, ends, last, compliance, s):
     """Deflection at the end of a piece of an element that slid up to a place before."""
-    return (pull * pressing_at(path, n, ends, 0) + moved_at(path, n, last, s)[0]
+    return (compliance * pressing_at(path, n, ends, 0) + moved_at(path, n, last, s)[0]
             - moved_at(path, n, ends, s)[0])
 
 
@@ -150,21 +150,21 @@ def _means(y):
 
 
 @borrowing
-def _add_begun(path, n, part, pull, spring, stuck, s, r, rows, workspace):
+def _add_begun(path, n, part, compliance, spring, stuck, s, r, rows, workspace):
     """Add to forces r (N,), and to their derivatives, the means about a place where slip begins.
 
     ``stuck`` (2 L,) are the derivatives of z - s before.
     """
     N = len(r)
     _, rate, bend, third = moved_at(path, n, part, s)
-    jump = pull * pressing_at(path, n, part, 1) - rate
-    over = bend - pull * pressing_at(path, n, part, 2)
+    jump = compliance * pressing_at(path, n, part, 1) - rate
+    over = bend - compliance * pressing_at(path, n, part, 2)
     shift, by_jump, by_bend = workspace[0], workspace[1], workspace[2]
     if len(rows) > 0:
         for k in range(len(shift)):
             shift[k], by_jump[k], by_bend[k] = stuck[k], 0.0, 0.0
-        add_row(path, n, part, 0, pull, 1.0, shift)
-        add_row(path, n, part, 1, pull, -1.0, by_jump)
+        add_row(path, n, part, 0, compliance, 1.0, shift)
+        add_row(path, n, part, 1, compliance, -1.0, by_jump)
         add_row(path, n, part, 2, 0.0, -1.0, by_bend)
         for k in range(len(shift)):
             shift[k] = shift[k] / jump if jump != 0.0 else 0.0
@@ -182,18 +182,18 @@ def _add_begun(path, n, part, pull, spring, stuck, s, r, rows, workspace):
 
 
 @borrowing
-def _add_ended(path, n, part, pull, spring, s, r, rows, workspace):
+def _add_ended(path, n, part, compliance, spring, s, r, rows, workspace):
     """Add to forces r (N,), and to their derivatives, the means about a place where slip ends."""
     N = len(r)
     _, _, bend, third = moved_at(path, n, part, s)
-    off, over = beyond(path, n, part, 1, pull, 0.0, s)
+    off, over = beyond(path, n, part, 1, compliance, 0.0, s)
     shift, by_bend = workspace[0], workspace[2]
     if len(rows) > 0:
         for k in range(len(shift)):
             shift[k], by_bend[k] = 0.0, 0.0
         # Elsewhere slip ends because P jumps.
         if abs(off) < _CLOSE * abs(over):
-            add_row(path, n, part, 1, pull, -1.0 / over, shift)
+            add_row(path, n, part, 1, compliance, -1.0 / over, shift)
         add_row(path, n, part, 2, 0.0, 1.0, by_bend)
         for k in range(len(shift)):
             by_bend[k] += third * shift[k]

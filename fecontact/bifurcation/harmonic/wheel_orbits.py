@@ -203,7 +203,7 @@ def wheel_stability(
         rest[: whole.modes] = X[0]
         found = replace(found, kept=found.kept.left_by(rest[None]))
     start = np.append(X.reshape(-1), every.values)
-    found, orbit = starts.corrected(found, start)
+    found, orbit = starts.converged_orbit(found, start)
     floquet = found.linearise(orbit).floquet
     return WheelStability(floquet.multipliers, bool(floquet.stable),
                           float(np.abs(orbit - start)[:-1].max()) / largest)

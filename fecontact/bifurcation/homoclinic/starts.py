@@ -74,7 +74,7 @@ def homoclinic_curve(
                                 np.concatenate([sizes, width]), left_subspaces(jacobian),
                                 (None, None), len(mesh) - 1)
     u = np.concatenate([nodes.reshape(-1), rest, values[list(active)]])
-    problem, u = _corrected(problem, u, point)
+    problem, u = _converged(problem, u, point)
     attributes = {"parameter_names": list(field.parameters), "parameter_values": values,
                   "scales": problem.scales, "degree": degree}
     return problem, u, attributes
@@ -108,7 +108,7 @@ def _cut_open(
     return sampled(open_mesh.node_times(mesh, degree)), np.asarray(found[0]), mesh, time
 
 
-def _corrected(
+def _converged(
     problem: HomoclinicProblem, u: Array, point: BranchPoint
 ) -> tuple[HomoclinicProblem, Array]:
     """The homoclinic orbit at the same second parameter, on an interval and a mesh made for it.

@@ -9,11 +9,11 @@ of the border.
 import numpy as np
 
 from fecontact.bifurcation.linalg.condensation import CondensedFactors
-from fecontact.bifurcation.linalg.lane_lu import (
-    back_lanes,
-    forward_lanes,
+from fecontact.bifurcation.linalg.simd_lu import (
+    back_simd,
     forward_lanes_transposed,
-    reduce_row_lanes,
+    forward_simd,
+    reduce_row_simd,
 )
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.dense_lu import (
@@ -24,8 +24,8 @@ from fecontact.core.dense_lu import (
     reduce_row,
 )
 from fecontact.core.dense_lu import solve as solve_dense
-from fecontact.core.lanes.vectors import WIDTH, gather, read, spread, write
 from fecontact.core.records import Matrix, Vector
+from fecontact.core.simd.vectors import WIDTH, gather, read, spread, write
 
 
 @helper
@@ -86,7 +86,7 @@ def reduce_border(
             write(row[inner + d + c], nothing)
         for c in range(e):
             write(row[inner + 2 * d + c], read(link[3 * d + c]))
-        reduce_row_lanes(factors.inner[group], inner, row, inner_weights[group])
+        reduce_row_simd(factors.inner[group], inner, row, inner_weights[group])
         for c in range(e):
             write(link[3 * d + c], read(row[inner + 2 * d + c]))
         for c in range(d):
@@ -98,7 +98,7 @@ def reduce_border(
             _take(given, 0, group, groups, N, size, d, places, left)
             for c in range(d):
                 write(link[c], read(row[inner + c]) + read(left[c]))
-            reduce_row_lanes(factors.chain[group - 1], d, link, chain_weights[group - 1])
+            reduce_row_simd(factors.chain[group - 1], d, link, chain_weights[group - 1])
         for c in range(d):
             write(link[2 * d + c], read(link[2 * d + c]) + read(row[inner + d + c]))
     whole = np.empty(3 * d + e)
@@ -139,7 +139,7 @@ def reduce_side(factors: CondensedFactors, rhs: Vector, reduced: Vector, side: V
             for lane in range(WIDTH):
                 j = lane * groups + group
                 r[i, lane] = rhs[j * size + (order[i, lane] if inner else i)] if j < N else 0.0
-        forward_lanes(factors.inner[group], inner, r)
+        forward_simd(factors.inner[group], inner, r)
         for i in range(inner):
             write(of_inner[group, i], read(r[i]))
         if group == 0:
@@ -154,7 +154,7 @@ def reduce_side(factors: CondensedFactors, rhs: Vector, reduced: Vector, side: V
             for lane in range(WIDTH):
                 places[lane] = factors.chain_order[group - 1, i, lane] * WIDTH + lane
             write(pair[i], gather(numbers, places, 0))
-        forward_lanes(factors.chain[group - 1], d, pair)
+        forward_simd(factors.chain[group - 1], d, pair)
         for i in range(d):
             write(of_chain[group - 1, i], read(pair[i]))
     both = np.empty(2 * d)
@@ -256,13 +256,13 @@ def expand(
         if group:
             for c in range(d):
                 write(link[2 * d + c], read(ends[group + 1, c]))
-            back_lanes(factors.chain[group - 1], d, of_chain[group - 1], link)
+            back_simd(factors.chain[group - 1], d, of_chain[group - 1], link)
             for c in range(d):
                 write(ends[group, c], read(link[c]))
         for c in range(d):
             write(known[inner + c], read(ends[group, c]))
             write(known[inner + d + c], read(ends[group + 1, c]))
-        back_lanes(factors.inner[group], inner, of_inner[group], known)
+        back_simd(factors.inner[group], inner, of_inner[group], known)
         for lane in range(WIDTH):
             first = (lane * groups + group) * size
             if lane * groups + group < N:

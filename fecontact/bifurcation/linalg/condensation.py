@@ -20,11 +20,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.bifurcation.linalg.lane_lu import eliminate_lanes
+from fecontact.bifurcation.linalg.simd_lu import eliminate_simd
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.dense_lu import factorise
-from fecontact.core.lanes.vectors import WIDTH, gather, read, spread, write
 from fecontact.core.records import Array4, Block, IntegerBlock, IntegerMatrix, Matrix, Vector
+from fecontact.core.simd.vectors import WIDTH, gather, read, spread, write
 from fecontact.core.types import Array
 
 
@@ -132,7 +132,7 @@ def _chain_segments(local, chain, order, end):
             for c in range(e):
                 write(a[i, 3 * d + c], read(end[i, 2 * d + c]))
                 write(a[d + i, 3 * d + c], read(links[i, 2 * d + c]))
-        eliminate_lanes(a, d, order[group - 1], workspace)
+        eliminate_simd(a, d, order[group - 1], workspace)
         for i in range(d):
             for c in range(columns):
                 write(end[i, c], read(a[d + i, d + c]))
@@ -222,7 +222,7 @@ def condense(
                 for c in range(q):
                     write(a[row, inner + 2 * d + with_period + c],
                           read(step) * gather(of_common, places, c))
-        eliminate_lanes(a, inner, factors.inner_order[group], workspace)
+        eliminate_simd(a, inner, factors.inner_order[group], workspace)
         for lane in range(WIDTH):
             j = lane * groups + group
             if j < N:

@@ -13,10 +13,10 @@ from functools import cache
 
 import numpy as np
 
-from fecontact.bifurcation.linalg.lane_lu import eliminate_lanes
+from fecontact.bifurcation.linalg.simd_lu import eliminate_simd
 from fecontact.core.compiled import helper, kernel
-from fecontact.core.lanes.vectors import WIDTH, gather, read, spread, write
 from fecontact.core.records import Block, Matrix, Vector
+from fecontact.core.simd.vectors import WIDTH, gather, read, spread, write
 from fecontact.core.types import Array
 
 
@@ -97,7 +97,7 @@ def motion_transitions(
                               - spread(h * A[i, k]) * by_speed)
                     write(a[i * m + row, size + c], by_place)
                     write(a[i * m + row, size + m + c], spread(once[i]) * by_place + by_speed)
-        eliminate_lanes(a, size, order, pivots)
+        eliminate_simd(a, size, order, pivots)
         _back(a, size, columns)
         for lane in range(min(WIDTH, N - first)):
             M = out[first + lane]

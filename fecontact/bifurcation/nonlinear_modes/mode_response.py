@@ -235,10 +235,10 @@ class _Along:
         places = np.array(self._places())
         s = np.unique(np.concatenate([fine, self.chord[-1:], places]))
         known = self.at(s)
-        answers = self.balance(known) > 0.0
+        responding = self.balance(known) > 0.0
         # The resonance itself belongs to the response on both sides of it.
-        answers |= np.isin(s, places)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], answers.astype(int), [0]])))
+        responding |= np.isin(s, places)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], responding.astype(int), [0]])))
         pieces: list[Array] = []
         for first, end in edges.reshape(-1, 2):
             sides = _frequencies(known[:, first:end])

@@ -26,7 +26,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import corrected, weighted_norm
+from fecontact.bifurcation.continuation.newton import newton, weighted_norm
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.observed import observed_values
@@ -230,7 +230,7 @@ class PeakLinearised:
         """The orbits a window below and above along the response."""
         found = []
         for way in (-self.problem.window, self.problem.window):
-            side = corrected(self.orbit, self.u[:-1] + way * self.along, self.problem.border,
+            side = newton(self.orbit, self.u[:-1] + way * self.along, self.problem.border,
                              _TOLERANCE, _ITERATIONS)
             if side is None:
                 raise AnalysisError("The response beside the resonance was not found; take smaller "

@@ -176,7 +176,7 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, mesh, the extremes of the states and their error."""
-        return self.point_of(u, linearisation, lambda at, side: at.beside(side, tangent))
+        return self.point_of(u, linearisation, lambda at, side: at.orbit_change(side, tangent))
 
     def point_of(
         self, u: Array, linearisation: Any,
@@ -260,8 +260,8 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
             return predictor.predicted(weights, self.trail, straight, step, self.misses, _MOST_BENT)
         # The length of the old tangent changes with mesh and scales.
         length = step / weighted_norm(weights, self.trail[1])
-        aside = 0.5 * length * length * self.trail[2]
-        return straight if weighted_norm(weights, aside) > _MOST_BENT * step else straight + aside
+        bow = 0.5 * length * length * self.trail[2]
+        return straight if weighted_norm(weights, bow) > _MOST_BENT * step else straight + bow
 
     def off(self, step: float) -> float:
         """See :meth:`Problem.off`."""

@@ -235,11 +235,11 @@ class CollocationLinearisation:
             return f, J, np.zeros((*f.shape, len(self.problem.active)))
         return self._derivatives_at(self.times, self._x)
 
-    def derivatives_beside(
+    def perturbed_derivatives(
         self, shifts: list[Array], *, states_alone: bool = False
     ) -> tuple[Array, Array, Array]:
         """Derivatives (k, N m, ...) as :attr:`derivatives`, at the orbit plus k shifts (N m, d)."""
-        x, times = self._beside(shifts)
+        x, times = self._perturbed(shifts)
         found = (self.problem.field.derivatives(times, x, self.problem.parameters(self.u), ())
                  if states_alone else self._derivatives_at(times, x))
         return self._apart(found, len(shifts))
@@ -251,7 +251,7 @@ class CollocationLinearisation:
         differences cancel.
         """
         problem, values = self.problem, self.problem.parameters(self.u)
-        x, times = self._beside(shifts)
+        x, times = self._perturbed(shifts)
         given, known = (problem.active, problem.ranges), self.derivatives[1]
         rough = problem.field.rough_derivatives(times, x, values, *given, None)
         if rough is None:
@@ -260,7 +260,7 @@ class CollocationLinearisation:
             here = problem.field.rough_derivatives(self.times, self._x, values, (),
                                                    problem.ranges, _FAR)
             if rough is None or here is None:
-                _, J, P = self.derivatives_beside(shifts)
+                _, J, P = self.perturbed_derivatives(shifts)
                 return J, P, known
             known = here[1]
         if not problem.autonomous:
@@ -268,7 +268,7 @@ class CollocationLinearisation:
         _, J, P = self._apart(rough, len(shifts))
         return J, P, known
 
-    def _beside(self, shifts: list[Array]) -> tuple[Array, Array]:
+    def _perturbed(self, shifts: list[Array]) -> tuple[Array, Array]:
         return (np.concatenate([self._x + shift for shift in shifts]),
                 np.tile(self.times, len(shifts)))
 
@@ -348,7 +348,7 @@ class CollocationLinearisation:
         """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
         return self.bordered(row).solve(rhs)
 
-    def beside(self, side: Array, tangent: Array) -> Array:
+    def orbit_change(self, side: Array, tangent: Array) -> Array:
         """Change (n,) of the orbit by a right-hand side (n,), zero in the last rows.
 
         The parameter stays as it is. Near folds of the branch, which has this tangent, and at

@@ -106,11 +106,11 @@ class Floquet:
 
     def rest_products(self, *critical: complex) -> tuple[float, float, float]:
         """The :attr:`products` without the multipliers next to the critical ones."""
-        rest, out = self.beside(*critical), np.empty(3)
+        rest, out = self.noncritical(*critical), np.empty(3)
         multiplier_tests(np.ascontiguousarray(rest), -1, out)
         return float(out[0]), float(out[1]), float(out[2])
 
-    def beside(self, *critical: complex) -> NDArray[np.complex128]:
+    def noncritical(self, *critical: complex) -> NDArray[np.complex128]:
         """All multipliers but the trivial one and those next to the critical ones."""
         rest = self.others
         for one in critical:
@@ -119,7 +119,7 @@ class Floquet:
 
     def turning(self, *critical: complex) -> bool:
         """Whether a complex pair beside the critical multipliers lies on the unit circle."""
-        rest = self.beside(*critical)
+        rest = self.noncritical(*critical)
         pairs = rest[rest.imag > 1e-6]
         return bool(len(pairs)) and float(np.abs(np.abs(pairs) - 1.0).min()) <= _NEAR
 

@@ -112,17 +112,18 @@ class JacobianKinks:
         quarter = 1.0 / _SAMPLES
         every = np.stack([self._jacobians(intervals, np.full(len(intervals), k * quarter))
                           for k in range(-3, _SAMPLES + 4)])
-        bends = every[2:] + every[:-2] - 2.0 * every[1:-1]
-        sharpest = np.abs(bends[2:-2] - (bends[:-4] + bends[4:]) / 2.0).max(axis=(2, 3)).argmax(0)
+        second = every[2:] + every[:-2] - 2.0 * every[1:-1]
+        jumps = np.abs(second[2:-2] - (second[:-4] + second[4:]) / 2.0).max(axis=(2, 3))
+        sharpest = jumps.argmax(0)
         centre = sharpest * quarter
         J = [every[sharpest + k, np.arange(len(intervals))] for k in range(1, 6)]
         sizes: list[Array] = []
         for level in range(_BISECTIONS):
-            bends = np.array([J[k - 1] + J[k + 1] - 2.0 * J[k] for k in (1, 2, 3)])
+            second = np.array([J[k - 1] + J[k + 1] - 2.0 * J[k] for k in (1, 2, 3)])
             # A kink bends the first or the third, not both: the smaller one is the smooth part.
-            outer = np.abs(bends[::2]).max(axis=(2, 3))
-            smooth = np.where((outer[0] < outer[1])[:, None, None], bends[0], bends[2])
-            found = np.abs(bends - smooth).max(axis=(2, 3))
+            outer = np.abs(second[::2]).max(axis=(2, 3))
+            smooth = np.where((outer[0] < outer[1])[:, None, None], second[0], second[2])
+            found = np.abs(second - smooth).max(axis=(2, 3))
             largest = found.argmax(axis=0)
             sizes.append(found.max(axis=0) / quarter)
             kept = np.full(len(intervals), True)

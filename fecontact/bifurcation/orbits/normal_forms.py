@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.linalg.bordered import solve_turned
 from fecontact.bifurcation.orbits.curves.kernels import applied, multiplied
 from fecontact.bifurcation.orbits.curves.singularity import (
-    Bend,
+    SecondDerivatives,
     Singularity,
     at_points,
     of_doubling,
@@ -86,7 +86,7 @@ def verdict(coefficient: float, error: float) -> dict[str, Any]:
 
 
 def _judged(
-    expansion: "Expansion", formula: "Callable[[Sequence[Bend]], Share]"
+    expansion: "Expansion", formula: "Callable[[Sequence[SecondDerivatives]], Share]"
 ) -> dict[str, Any]:
     """The coefficient from the first two steps that agree, or else the best pair.
 
@@ -130,19 +130,19 @@ class Expansion:
         self._J = linearised.derivatives[1]
         self._h = np.repeat(problem.widths, problem.degree)[:, None]
 
-    def fold(self, bends: Sequence[Bend]) -> Share:
+    def fold(self, second_derivatives: Sequence[SecondDerivatives]) -> Share:
         """Size of the coefficient b of a fold; its sign is that of the direction of v."""
         term, = self._at.terms
         V, drift = term.states, -term.period / self._T
-        found, size = self._share(term.left, V, _applied(bends[0].first, V) / 2.0
+        found, size = self._share(term.left, V, _applied(second_derivatives[0].first, V) / 2.0
                                   - drift * _applied(self._J, V))
         unit = self._size(V)
         return Share(abs(found.real) / unit, size / unit)
 
-    def doubling(self, bends: Sequence[Bend]) -> Share:
+    def doubling(self, second_derivatives: Sequence[SecondDerivatives]) -> Share:
         """Coefficient c of a period doubling."""
         term, = self._at.terms
-        V, (first, second, _) = term.states, bends[0]
+        V, (first, second, _) = term.states, second_derivatives[0]
         h2, drift = self._response(_applied(first, V))
         found, size = self._share(
             term.left, V, _applied(second, V) / 6.0 + _applied(first, h2) / 2.0
@@ -150,10 +150,10 @@ class Expansion:
         unit = self._size(V) ** 2
         return Share(found.real / unit, size / unit)
 
-    def torus(self, bends: Sequence[Bend]) -> Share:
+    def torus(self, second_derivatives: Sequence[SecondDerivatives]) -> Share:
         """Coefficient Re D of a Neimark-Sacker point, whose multipliers are complex."""
         assert self._at.pair is not None
-        (p, pp, _), (q, qq, _) = bends
+        (p, pp, _), (q, qq, _) = second_derivatives
         one, other = self._at.terms
         V = one.states + 1j * other.states
         angle = float(np.angle(self._at.pair[0]))
@@ -168,19 +168,19 @@ class Expansion:
         return Share(found.real / unit, size / unit)
 
     def coefficient(
-        self, formula: Callable[[Sequence[Bend]], Share], step: float
+        self, formula: Callable[[Sequence[SecondDerivatives]], Share], step: float
     ) -> tuple[Share, float]:
         """A coefficient with the share of jumps of second derivatives, and the error of that share.
 
         ``step`` is the step of the differences in ranges of the states.
         """
-        bends = self.bends(step)
+        second_derivatives = self.second_derivatives(step)
         # Coefficients of folds contain second derivatives only.
         if formula == self.fold or not self._kinks.passages:
-            return formula(bends), 0.0
+            return formula(second_derivatives), 0.0
         found, perturbed = [], []
         span = self._span()
-        for bend, term in zip(bends, self._at.terms, strict=True):
+        for bend, term in zip(second_derivatives, self._at.terms, strict=True):
             change, error = self._kinks.second(term.states, self._step(term.states, step), span)
             found.append(bend._replace(second=bend.second + change))
             perturbed.append(bend._replace(second=bend.second + change + error))
@@ -191,20 +191,20 @@ class Expansion:
     def _kinks(self) -> JacobianKinks:
         return JacobianKinks(self._linearised)
 
-    def bends(self, step: float) -> list[Bend]:
+    def second_derivatives(self, step: float) -> list[SecondDerivatives]:
         """Differences of fourth order along v, over a step in ranges of the states."""
         return [self._bend(term.states, step) for term in self._at.terms]
 
-    def _bend(self, direction: Array, step: float) -> Bend:
+    def _bend(self, direction: Array, step: float) -> SecondDerivatives:
         """Differences along a direction (N m, d)."""
         h = self._step(direction, step)
         if h == 0.0:
-            return Bend(*(np.zeros_like(self._J) for _ in range(3)))
-        _, J, P = self._linearised.derivatives_beside(
+            return SecondDerivatives(*(np.zeros_like(self._J) for _ in range(3)))
+        _, J, P = self._linearised.perturbed_derivatives(
             [part * h * direction for part in (1.0, -1.0, 2.0, -2.0)], states_alone=True)
         odd, far_odd = J[0] - J[1], J[2] - J[3]
         even, far_even = J[0] + J[1], J[2] + J[3]
-        return Bend(np.asarray((8.0 * odd - far_odd) / (12.0 * h)),
+        return SecondDerivatives(np.asarray((8.0 * odd - far_odd) / (12.0 * h)),
                     np.asarray((16.0 * even - far_even - 30.0 * self._J) / (12.0 * h * h)), P[0])
 
     def _span(self) -> Array:

@@ -173,8 +173,8 @@ class ShootingProblem(FloquetTests, Problem):
         assert self.before is not None
         # The length of the last tangent changes with the scales.
         length = step / weighted_norm(weights, self.before[1])
-        aside = 0.5 * length * length * self.bend
-        return guess if weighted_norm(weights, aside) > _MOST_BENT * step else guess + aside
+        bow = 0.5 * length * length * self.bend
+        return guess if weighted_norm(weights, bow) > _MOST_BENT * step else guess + bow
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[ShootingProblem, Array, Array]":
         """The problem for the next step, with the phase condition at u."""

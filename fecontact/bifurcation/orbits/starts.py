@@ -173,7 +173,7 @@ def _return_time(t: Array, x: Array) -> float:
     return float(t[-1] - t[best])
 
 
-def corrected(
+def converged_orbit(
     problem: CollocationProblem, u: Array, tolerance: float = 1e-10, family: bool = False
 ) -> tuple[CollocationProblem, Array]:
     """The orbit near u at fixed parameter, on a mesh equidistributed for it.
@@ -206,16 +206,16 @@ def corrected_samples(
     Raises
     ------
     AnalysisError
-        As :func:`corrected`, if none does.
+        As :func:`converged_orbit`, if none does.
     """
     try:
-        return corrected(*sampled(intervals), family=family)
+        return converged_orbit(*sampled(intervals), family=family)
     except AnalysisError:
         for finer in _FINER:
             try:
-                problem, u = corrected(*sampled(finer * intervals), family=family)
+                problem, u = converged_orbit(*sampled(finer * intervals), family=family)
                 problem, u, _ = on_intervals((problem, u, np.zeros_like(u)), intervals)
-                return corrected(problem, u, family=family)
+                return converged_orbit(problem, u, family=family)
             except AnalysisError:
                 continue
         raise

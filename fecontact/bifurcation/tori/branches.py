@@ -107,7 +107,7 @@ def torus_branch(
         if name == start.branch.parameter_name:
             return _followed(problem, u, float(np.copysign(1.0, direction)) * tangent, chosen, name,
                              1.0, both)
-        return _followed(*_corrected(problem, u), None, chosen, name, direction, both)
+        return _followed(*_converged(problem, u), None, chosen, name, direction, both)
     own = method or TorusBalance()
     if isinstance(start, NeimarkSackerPoint) and second is None:
         if both or name != start.branch.parameter_name:
@@ -125,7 +125,7 @@ def torus_branch(
                          "excitation, second=; else give a Neimark-Sacker point or a "
                          "quasi-periodic run.")
     problem, u = _from_motion(excitation, motion, free, own, given)
-    problem, u = _corrected(problem, u)
+    problem, u = _converged(problem, u)
     return _followed(problem, u, None, chosen, name, direction, both)
 
 
@@ -257,7 +257,7 @@ def _from_torus(
     return problem, u, tangent / np.sqrt(problem.weights() @ tangent**2)
 
 
-def _corrected(problem: TorusProblem, u: Array) -> tuple[TorusProblem, Array]:
+def _converged(problem: TorusProblem, u: Array) -> tuple[TorusProblem, Array]:
     """The torus near u at fixed parameter, by Newton's method with shortened steps.
 
     Raises

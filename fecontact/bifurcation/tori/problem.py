@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
-from fecontact.bifurcation.harmonic.few_contacts import Factors
 from fecontact.bifurcation.harmonic.layout import Layout
+from fecontact.bifurcation.harmonic.woodbury import Factors
 from fecontact.bifurcation.orbits.same_orbit import shrunk
 from fecontact.bifurcation.tori.excitation import Excitation
 from fecontact.bifurcation.tori.series import (

@@ -63,7 +63,7 @@ class Feet:
     nodes: Integers
     values: Array
     slopes: Array
-    bends: Array
+    second_derivatives: Array
     places: Array
     along: Array
     curved: Array
@@ -147,19 +147,19 @@ class DeformedFace:
         lost = np.ones(len(places), bool)
         if before is not None:
             local = self._perpendicular(places, displaced, facet, local)
-            lost = self._beside(local) > _STAYS
+            lost = self._offset(local) > _STAYS
         if lost.any():
             facet[lost], near, distance[lost] = Facets(displaced, self.facets).closest(places[lost])
             local[lost] = self._perpendicular(places[lost], displaced, facet[lost], near)
         feet = self._at(places, displaced, facet, local)
-        valid = self._beside(local) <= _STAYS
+        valid = self._offset(local) <= _STAYS
         return replace(feet, valid=valid, gaps=np.where(valid, feet.gaps, distance))
 
     @property
     def _middle(self) -> float:
         return 1.0 / 3.0 if self.facets.shape[1] in (3, 6) else 0.5
 
-    def _beside(self, local: Array) -> Array:
+    def _offset(self, local: Array) -> Array:
         """Distance of local coordinates outside their facets, relative to the facets' size."""
         far = np.maximum(-local, local - 1.0).max(axis=1)
         if local.shape[1] == 2 and self.facets.shape[1] in (3, 6):
@@ -187,17 +187,17 @@ class DeformedFace:
         d, k = displaced.shape[1], nodes.shape[1]
         corners = displaced[nodes]
         values, slopes = shape_functions(d - 1, k, local)
-        bends = np.empty((*slopes.shape, d - 1))
+        second_derivatives = np.empty((*slopes.shape, d - 1))
         for axis, half in enumerate(0.5 * np.eye(d - 1)):
             # Exact: functions are at most quadratic in each coordinate.
-            bends[..., axis] = (shape_functions(d - 1, k, local + half)[1]
+            second_derivatives[..., axis] = (shape_functions(d - 1, k, local + half)[1]
                                 - shape_functions(d - 1, k, local - half)[1])
         along = np.einsum("nka,nkx->nax", slopes, corners)
         normals = (np.cross(along[:, 0], along[:, 1]) if d == 3
                    else np.stack([along[:, 0, 1], -along[:, 0, 0]], axis=1))
         normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
         foot = np.einsum("nk,nkx->nx", values, corners)
-        return Feet(facet, nodes, values, slopes, bends, foot, along,
-                    np.einsum("nkab,nkx->nabx", bends, corners), normals,
+        return Feet(facet, nodes, values, slopes, second_derivatives, foot, along,
+                    np.einsum("nkab,nkx->nabx", second_derivatives, corners), normals,
                     ((places - foot) * normals).sum(axis=1), np.ones(len(places), bool))
 

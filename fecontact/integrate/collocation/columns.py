@@ -119,7 +119,7 @@ def _set_forced(t, Y, moved, problem, vary, out):
     for i in range(m):
         rate[i] = 0.0
         rate[m + i] = (v.load[0, i] - v.load[1, i]) / vary.width
-    dynamics.push(blocks, w[2], rate[m:])
+    dynamics.add_node_forces(blocks, w[2], rate[m:])
     add_matrices(Y, blocks, vary, rate)
     for i in range(m):
         out[i] = rate[m + i]
@@ -129,7 +129,7 @@ def _set_forced(t, Y, moved, problem, vary, out):
 def _set_rates(i, ahead, J, v):
     """Put into row i of the stages of each column what its begin makes, the time ``ahead`` later.
 
-    ``v.pushed`` holds in its last row what the parameter makes in its column, or zero.
+    ``v.column_forces`` holds in its last row what the parameter makes in its column, or zero.
     """
     m, count = len(J), len(v.columns)
     for c in range(count):
@@ -140,7 +140,7 @@ def _set_rates(i, ahead, J, v):
                 total += J[k, l] * (x[l] + ahead * x[m + l]) + J[k, m + l] * x[m + l]
             out[k] = total
             if c == count - 1:
-                out[k] += v.pushed[c, k]
+                out[k] += v.column_forces[c, k]
 
 
 @routine
@@ -209,7 +209,7 @@ def _error_at(at, h, problem, progress, workspace, c, v):
             c.small_right[k] = total
         if column == len(v.columns) - 1:
             for k in range(m):
-                c.small_right[k] += v.pushed[column, k]
+                c.small_right[k] += v.column_forces[column, k]
         forward(c.small, m, c.small_pivots, c.small_right)
         backward(c.small, m, c.small_right, c.small_right)
         error = 0.0
@@ -227,10 +227,10 @@ def _error_at(at, h, problem, progress, workspace, c, v):
 
 
 @helper
-def _deeper(motion, aside):
+def _deeper(motion, offset):
     """A motion of a node that is so much further on the other side."""
     places = motion.places
-    return NodeMotion((places[0], places[1] - aside, places[2]), motion.speeds)
+    return NodeMotion((places[0], places[1] - offset, places[2]), motion.speeds)
 
 
 @helper
@@ -261,9 +261,9 @@ def _cross(t, near, problem, c, vary):
             # Both sides of the level, in the order in which they are passed.
             jump, slip_jump, largest = 0.0, 0.0, 0.0
             for side in (-1.0, 1.0):
-                aside = levels[level, j] + side * (reach if rate > 0.0 else -reach) - u
+                offset = levels[level, j] + side * (reach if rate > 0.0 else -reach) - u
                 force = v.inside.force[0]
-                F = node_forces(j, _deeper(node_motion(j, c.after, s), aside), moved,
+                F = node_forces(j, _deeper(node_motion(j, c.after, s), offset), moved,
                                 c.after[2 * m :], s, force, v.inside.rates[0]).normal
                 jump += side * F
                 slip_jump += side * force[0]
@@ -294,9 +294,9 @@ def propagate(
     does not feel. The switch is located to the part ``near`` of the step.
     """
     s, v = problem.system, vary.variation
-    count, m = v.pushed.shape
-    J, forced = workspace.reduced.J, v.pushed[count - 1]
-    v.pushed[count - 1] = 0.0
+    count, m = v.column_forces.shape
+    J, forced = workspace.reduced.J, v.column_forces[count - 1]
+    v.column_forces[count - 1] = 0.0
     after = np.nextafter(t, np.inf)
     dynamics.set_given(after, s, workspace.given, workspace.load)
     _linearise(after, progress.state, dynamics.motion_given(workspace.given), problem, workspace,

@@ -137,7 +137,7 @@ def _set_work(x, c, out):
 
 
 @routine
-def _aim(t, h, last, smallest, data):
+def _next_target(t, h, last, smallest, data):
     """The next step to try, of about the length h, or exactly that if the last one was cut."""
     problem, progress, workspace, output, c = (data.problem, data.progress, data.workspace,
                                                data.output, data.collocation)
@@ -291,7 +291,7 @@ def _attempt(step, last, smallest, data):
     return TAKEN, min(h, control.longest)
 
 
-METHOD = Method("collocation", Data, _aim, _attempt, _fill, _go_on, close=_close, places=4)
+METHOD = Method("collocation", Data, _next_target, _attempt, _fill, _go_on, close=_close, places=4)
 # Runs by collocation are of these systems, with any number of columns, or none.
 SMALL = Sized(partial(step_loop, METHOD), (state.Problem, state.Progress, state.Workspace,
                                           state.Output, Collocation))

@@ -158,7 +158,7 @@ def _full(data):
 
 
 @routine
-def _aim(t, h, last, smallest, data):
+def _next_target(t, h, last, smallest, data):
     """The next step to try, of about the length h."""
     times = data.output.times
     stop = times[data.progress.counts[OUTPUTS]] if len(data.varied.columns) else times[-1]
@@ -309,6 +309,6 @@ def _go_on(step, h, data):
     return RUNNING, h
 
 
-METHOD = Method("field", Data, _aim, _attempt, _fill, _go_on, _begin, close=_close, full=_full,
-                find_end=_find_end, stop_at=_stop_at)
+METHOD = Method("field", Data, _next_target, _attempt, _fill, _go_on, _begin, close=_close,
+                full=_full, find_end=_find_end, stop_at=_stop_at)
 advance = step_loop(METHOD)

@@ -37,7 +37,7 @@ from fecontact.integrate.nonsmooth.problem import (
     NonsmoothProblem,
 )
 from fecontact.laws.signatures import signal_at
-from fecontact.system.kernels import body_acceleration, given_at
+from fecontact.system.kernels import body_acceleration, prescribed_at
 from fecontact.system.node_forces import normal_force, plane_friction, pressing_force
 from fecontact.system.nodes import ground_speed, node_contact, node_motion
 from fecontact.system.powers import (
@@ -87,7 +87,7 @@ def speed_rate(t, p):
 @helper
 def free_acceleration(t, Y, s, out):
     """Fill out (m,) with q'' without contact; returns the motion of the ground."""
-    moved = given_at(t, s, out)
+    moved = prescribed_at(t, s, out)
     body_acceleration(out, Y, s, out)
     return moved
 
@@ -191,10 +191,10 @@ def place_size(j, Y, p):
 
 
 @helper
-def force_size(i, Y, pushes, s):
-    """Size of the terms of the force on mode i without contact; ``pushes`` are prescribed."""
+def force_size(i, Y, applied_forces, s):
+    """Size of the terms of the force on mode i without contact, with the ``applied_forces``."""
     m = s.rows.shape[2]
-    size = abs(pushes[i])
+    size = abs(applied_forces[i])
     for k in range(m):
         size += abs(s.stiffness[i, k] * Y[k]) + abs(s.damping[i, k] * Y[m + k])
     return size

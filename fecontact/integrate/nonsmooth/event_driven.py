@@ -46,7 +46,7 @@ from fecontact.integrate.nonsmooth.problem import (
     NonsmoothProblem,
     Output,
     Progress,
-    aim,
+    next_target,
     pace,
     pass_break,
 )
@@ -337,8 +337,8 @@ def _begin(t, data):
     if outcome == RUNNING:
         derivative(t, progress.state, p, progress.status, progress.closed, w, workspace.slopes[0])
         if watch.note != 0:
-            note_at(watch.note)(aim(t, 0.0, CUT, 0.0, data), 0.0, BEGIN, p, progress, w, workspace,
-                                watch)
+            note_at(watch.note)(next_target(t, 0.0, CUT, 0.0, data), 0.0, BEGIN, p, progress, w,
+                                workspace, watch)
             derivative(t, progress.state, p, progress.status, progress.closed, w,
                        workspace.slopes[0])
     _show(t, progress, data.output, w)
@@ -482,13 +482,14 @@ def _change(step, h, data):
     # Wherever the motion goes on from, an output at this moment shows what comes after.
     _show(t, progress, data.output, w)
     if watch.note != 0 and note_at(watch.note)(
-            aim(t, 0.0, CUT, 0.0, data), 0.0, CHANGED, p, progress, w, workspace, watch) <= 1.0:
+            next_target(t, 0.0, CUT, 0.0, data), 0.0, CHANGED, p, progress, w, workspace,
+            watch) <= 1.0:
         return STOPPED, h
     return pace(step, progress, times), h
 
 
-METHOD = Method("events", Data, aim, _attempt, _fill, _go_on, _begin, close=_close, full=_full,
-                find_end=_find_end, stop_at=_stop_at, places=6)
+METHOD = Method("events", Data, next_target, _attempt, _fill, _go_on, _begin, close=_close,
+                full=_full, find_end=_find_end, stop_at=_stop_at, places=6)
 run_events = step_loop(METHOD)
 # For nodes of which each has a slip velocity of its own.
 SMALL = Sized(

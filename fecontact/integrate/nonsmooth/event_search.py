@@ -127,9 +127,9 @@ class Workspace(NamedTuple):
     parting: Annotated[Flags, NODES]
     given: Annotated[Array, GIVEN]
     loads: Annotated[Array, MODES]
-    pushes: Annotated[Array, MODES]
+    applied_forces: Annotated[Array, MODES]
     flights: Annotated[Array, NODES, FLIGHT_FIELDS]
-    pull: Annotated[Array, SLOPES]
+    node_acceleration: Annotated[Array, SLOPES]
     heights: Annotated[Array, PARTS + 2]
 
 

@@ -47,7 +47,7 @@ from fecontact.integrate.nonsmooth.problem import (
     NonsmoothProblem,
     Output,
     Progress,
-    aim,
+    next_target,
     pace,
     pass_break,
 )
@@ -55,8 +55,8 @@ from fecontact.integrate.nonsmooth.space_impulses import (
     ImpactWorkspace,
     find_impulses,
     put_on_ground,
+    set_impulse_responses,
     set_matrix,
-    set_pushes,
     set_rows,
 )
 from fecontact.integrate.step_loop import (
@@ -69,7 +69,7 @@ from fecontact.integrate.step_loop import (
     Method,
     step_loop,
 )
-from fecontact.system.kernels import body_acceleration, given_at
+from fecontact.system.kernels import body_acceleration, prescribed_at
 from fecontact.system.node_forces import friction_scale, plane_friction
 from fecontact.system.nodes import ground_motion, ground_speed, node_contact, node_motion
 from fecontact.system.powers import (
@@ -211,7 +211,7 @@ def _go(t, h, latest, Y, closed, which, quick, p, workspace, out):
     for i in range(m):
         middle[i] = Y[i] + 0.5 * h * Y[m + i]
         middle[m + i] = Y[m + i]
-    given_at(at, s, change)
+    prescribed_at(at, s, change)
     body_acceleration(change, middle, s, change)
     set_matrix(h, p, workspace)
     solve(workspace.matrix, workspace.pivots, change)
@@ -220,7 +220,7 @@ def _go(t, h, latest, Y, closed, which, quick, p, workspace, out):
     struck = _observe_nodes(at, Y, closed, quick, p, workspace)
     workspace.impulses[:] = 0.0
     if workspace.touching.any():
-        set_pushes(p, workspace)
+        set_impulse_responses(p, workspace)
         if not find_impulses(p.restitution, n, workspace):
             return -1
         for _ in range(_PASSES):
@@ -231,7 +231,7 @@ def _go(t, h, latest, Y, closed, which, quick, p, workspace, out):
     for a in range(3 * n):
         if workspace.touching[a % n]:
             for i in range(m):
-                change[i] += workspace.impulses[a] * workspace.pushes[a, i]
+                change[i] += workspace.impulses[a] * workspace.impulse_responses[a, i]
         # Impulses of impacts are no forces.
         workspace.forces[which, a] = 0.0 if struck else workspace.impulses[a] / h
     for j in range(n):
@@ -368,5 +368,5 @@ def _go_on(step, h, data):
     return pace(step, progress, data.output.times), h
 
 
-METHOD = Method("impacts", Data, aim, _attempt, _fill, _go_on, _begin, places=2)
+METHOD = Method("impacts", Data, next_target, _attempt, _fill, _go_on, _begin, places=2)
 run_impact_steps = step_loop(METHOD)

@@ -159,7 +159,7 @@ class Step(NamedTuple):
 
 
 @helper
-def aim(t, h, last, smallest, data):
+def next_target(t, h, last, smallest, data):
     """A step of the length h at most, exactly that if it was cut, to the next break or the end."""
     limits, end = data.limits, data.output.times[-1]
     goal, is_break = end, False

@@ -95,7 +95,7 @@ change_contacts_at = function_at(CHANGE)
 
 
 @routine
-def _push(count, first, p, w, Y):
+def _hold_constraints(count, first, p, w, Y):
     """Change Y[first:] by contact forces so that the residuals ``w.right`` of constraints vanish.
 
     The constraints are the first of ``w.indices``, clusters behind the nodes.
@@ -132,7 +132,7 @@ def _place(t, p, progress, workspace, w, out):
                 count += 1
         if distance == 0.0 or distance > 0.5 * before:
             break
-        _push(count, 0, p, w, Y)
+        _hold_constraints(count, 0, p, w, Y)
         derivative(t, Y, p, status, closed, w, out)
         before = distance
 
@@ -153,7 +153,7 @@ def settle(t, p, status, closed, w, out, Y):
         if status[c] == STICK:
             w.indices[count], w.right[count] = n + c, -w.slip[c]
             count += 1
-    _push(count, m, p, w, Y)
+    _hold_constraints(count, m, p, w, Y)
 
 
 @routine
@@ -307,7 +307,7 @@ def _accelerate(t, near, struck, resting, fall, p, progress, workspace, w, case)
     sizes = np.empty(p.rows.shape[1])
     set_prescribed(t, p.system, workspace)
     for i in range(len(sizes)):
-        sizes[i] = force_size(i, progress.state, workspace.pushes, p.system)
+        sizes[i] = force_size(i, progress.state, workspace.applied_forces, p.system)
     conditions = _conditions(resting, sizes, p, w)
     _omit_fixed(status, conditions)
     ground = speed_rate(t, p)

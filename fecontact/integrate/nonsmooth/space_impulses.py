@@ -74,7 +74,7 @@ class ImpactWorkspace(NamedTuple):
     """
 
     rows: Matrix
-    pushes: Matrix
+    impulse_responses: Matrix
     coupling: Matrix
     given: Vector
     before: Vector
@@ -139,9 +139,10 @@ def set_rows(j, contact, p, workspace):
 
 
 @routine
-def set_pushes(p, workspace):
-    """Fill ``pushes`` and ``coupling`` of the touching nodes, with the factorised matrix."""
-    s, rows, pushes, touching = p.system, workspace.rows, workspace.pushes, workspace.touching
+def set_impulse_responses(p, workspace):
+    """Fill ``impulse_responses`` and ``coupling`` of touching nodes, with the factorised matrix."""
+    s, rows, responses, touching = (p.system, workspace.rows, workspace.impulse_responses,
+                                    workspace.touching)
     n, _, m = s.rows.shape
     for b in range(3 * n):
         j = b % n
@@ -149,15 +150,15 @@ def set_pushes(p, workspace):
             continue
         for i in range(m):
             if b >= n:
-                pushes[b, i] = -rows[b, i]
+                responses[b, i] = -rows[b, i]
             else:
-                pushes[b, i] = rows[b, i] if s.follows_surface else s.rows[j, 1, i]
-        solve(workspace.matrix, workspace.pivots, pushes[b])
+                responses[b, i] = rows[b, i] if s.follows_surface else s.rows[j, 1, i]
+        solve(workspace.matrix, workspace.pivots, responses[b])
         for a in range(3 * n):
             if touching[a % n]:
                 total = 0.0
                 for i in range(m):
-                    total += rows[a, i] * pushes[b, i]
+                    total += rows[a, i] * responses[b, i]
                 workspace.coupling[a, b] = total
 
 
@@ -246,7 +247,7 @@ def put_on_ground(t, Y, closed, p, workspace):
     x[:] = 0.0
     if deepest <= margin:
         return
-    set_pushes(p, workspace)
+    set_impulse_responses(p, workspace)
     for _ in range(_SWEEPS):
         furthest = 0.0
         for j in range(n):
@@ -265,4 +266,4 @@ def put_on_ground(t, Y, closed, p, workspace):
     for j in range(n):
         if workspace.touching[j]:
             for i in range(m):
-                Y[i] += x[j] * workspace.pushes[j, i]
+                Y[i] += x[j] * workspace.impulse_responses[j, i]

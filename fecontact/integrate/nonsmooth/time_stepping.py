@@ -32,7 +32,7 @@ from fecontact.integrate.nonsmooth.problem import (
     NonsmoothProblem,
     Output,
     Progress,
-    aim,
+    next_target,
     pace,
     pass_break,
 )
@@ -401,5 +401,5 @@ def _go_on(step, h, data):
     return pace(step, progress, data.output.times), h
 
 
-METHOD = Method("implicit", Data, aim, _attempt, _fill, _go_on, _begin, places=1)
+METHOD = Method("implicit", Data, next_target, _attempt, _fill, _go_on, _begin, places=1)
 run_steps = step_loop(METHOD)

@@ -61,7 +61,7 @@ def set_given(t, s, given, load):
             value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
             given[PULL + axis] = stiffness * value + damping * rate
             given[PULL_RATE + axis] = stiffness * rate
-            kernels.add_pull(given[PULL + axis], axis, s, load)
+            kernels.add_drive_force(given[PULL + axis], axis, s, load)
     moved = nodes.ground_motion(t, s)
     given[TRAVEL], given[SPEED] = moved.travel, moved.speed
     given[SECOND_TRAVEL], given[SECOND_SPEED] = moved.second_travel, moved.second_speed
@@ -152,14 +152,14 @@ def change_of(row, j, n, w):
 
 
 @helper
-def push(blocks, forces, out):
+def add_node_forces(blocks, forces, out):
     """Add to ``out`` (m,) the modal forces of the node forces (d n,): -T, F, across."""
     for tile in range(len(blocks.tiles)):
-        push_block(block_at(blocks.tiles, tile), blocks.shapes, forces, out)
+        add_block_forces(block_at(blocks.tiles, tile), blocks.shapes, forces, out)
 
 
 @helper
-def push_block(ends, shapes, forces, out):
+def add_block_forces(ends, shapes, forces, out):
     """Add to ``out`` (m,) the modal forces by a block of the rows."""
     top, bottom, left, right = ends
     for i in range(top, bottom):
@@ -171,7 +171,7 @@ def push_block(ends, shapes, forces, out):
 
 @helper
 def gather(y, s, blocks, load, forces, rate):
-    """Fill the first 2 m entries of ``rate`` from the node forces (d n,) of :func:`push`.
+    """Fill the first 2 m entries of ``rate`` from node forces (d n,), see :func:`add_node_forces`.
 
     Without polynomial forces.
     """
@@ -187,12 +187,12 @@ def gather(y, s, blocks, load, forces, rate):
             for k in range(left, right):
                 total += s.stiffness[i, k] * y[k] + s.damping[i, k] * v[k]
             rate[m + i] -= total
-    push(blocks, forces, rate[m : 2 * m])
+    add_node_forces(blocks, forces, rate[m : 2 * m])
 
 
 @helper
 def set_forces(y, s, blocks, moved, w, scratch, rate):
-    """Fill w[2] (d n,) with the node forces of :func:`push`, and the z' of ``rate``.
+    """Fill w[2] (d n,) with the node forces of :func:`add_node_forces`, and the z' of ``rate``.
 
     ``w`` (3, d n) holds the nodes as :func:`project` puts them there, ``scratch`` is workspace.
     """
@@ -228,7 +228,7 @@ def set_rate(y, s, blocks, given, load, w, scratch, rate):
 def set_gradients(y, s, blocks, moved, w, out):
     """Fill the :class:`Gradients` ``out`` at the motion ``moved`` of the ground.
 
-    The node forces go to w[2], in the order of :func:`push`.
+    The node forces go to w[2], in the order of :func:`add_node_forces`.
     """
     set_node_gradients(y, s, blocks, moved, w, out)
     if has_polynomial(s):
@@ -284,7 +284,7 @@ def copy_gradients(there, here, blocks):
 
 
 @helper
-def soon(step):
+def t_plus(step):
     """A time in a step so close to its begin that rates of what is given hardly change."""
     return min(step.t + 1e-4 * step.h, step.latest)
 
@@ -357,7 +357,7 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
                     rate -= (nodes.ground_moved(tangent, j, acceleration[0], acceleration[1], s)
                              * g.rates[j, k, slip_entry(tangent, states)])
             out[2 * m + j * states + k] = rate
-    push(blocks, forces, out[m : 2 * m])
+    add_node_forces(blocks, forces, out[m : 2 * m])
 
 
 @routine

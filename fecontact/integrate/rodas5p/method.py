@@ -133,7 +133,7 @@ def _watched(watch):
 
 
 @routine
-def _aim(t, h, last, smallest, data):
+def _next_target(t, h, last, smallest, data):
     """The next step to try, of about the length h, or exactly that if the last one was cut.
 
     It does not go past a break. After one that has failed it ends at a kink of the forces that
@@ -171,7 +171,7 @@ def _aim(t, h, last, smallest, data):
 @routine
 def _linearise(step, after_t, problem, progress, workspace):
     """Compute the derivatives that a step needs at its start besides the matrices."""
-    s, later = problem.system, dynamics.soon(step)
+    s, later = problem.system, dynamics.t_plus(step)
     acceleration = dynamics.ground_acceleration(step.t, later,
                                                 dynamics.motion_given(workspace.given), s)
     dynamics.set_load_rate(step.t, later, after_t, s, workspace.pull_rate)
@@ -442,8 +442,8 @@ def _go_on(step, h, data):
     return RUNNING, h
 
 
-METHOD = Method("rodas5p", Data, _aim, _attempt, _fill, _go_on, _begin, _resume, _close, _full,
-                _find_end, _stop_at, places=2)
+METHOD = Method("rodas5p", Data, _next_target, _attempt, _fill, _go_on, _begin, _resume, _close,
+                _full, _find_end, _stop_at, places=2)
 advance = step_loop(METHOD)
 SMALL = Sized(partial(step_loop, METHOD), (state.Problem, state.Progress, state.Workspace,
                                            state.Output),

@@ -52,7 +52,7 @@ def _matters(impulse, column, h, blocks, control, progress):
 
 
 @helper
-def _push(j, u, v, s):
+def _law_force(j, u, v, s):
     """Normal force of node j."""
     return normal_force(j, u, v, s)[0]
 
@@ -66,9 +66,10 @@ def _missed_normal_force(j, inside, level, value, ends, brief, s):
     """
     if inside:
         size = abs(value)
-        return abs(_push(j, level + size, 4.0 * size / brief, s) - _push(j, level - size, 0.0, s))
-    force = abs(_push(j, level - value, 0.0, s))
-    return force if force > 2.0 * abs(_push(j, level - ends, 0.0, s)) else 0.0
+        return abs(_law_force(j, level + size, 4.0 * size / brief, s)
+                   - _law_force(j, level - size, 0.0, s))
+    force = abs(_law_force(j, level - value, 0.0, s))
+    return force if force > 2.0 * abs(_law_force(j, level - ends, 0.0, s)) else 0.0
 
 
 @helper
@@ -108,7 +109,7 @@ def _normal_force(place, polynomial, height):
         height[i] = polynomial.coefficients[i, n + polynomial.node]
     gap = StepPolynomial(GAP, polynomial.node, 0.0, polynomial.step, s, polynomial.bounds,
                          polynomial.coefficients, polynomial.row)
-    return abs(_push(polynomial.node, -at(place, height, gap), 0.0, s))
+    return abs(_normal_force(polynomial.node, -at(place, height, gap), 0.0, s))
 
 
 def _first_missed(step, again, problem, progress, workspace):

@@ -237,7 +237,7 @@ def _after_touch(step, t, problem, progress, workspace, vary):
     earlier = _PAST * max(near * progress.numbers[LAST_STEP], _BRIEFEST * abs(t))
     force, rates = force_workspace(s)
     moved = ground_motion(t, s)
-    acceleration = dynamics.ground_acceleration(step.t, dynamics.soon(step), moved, s)
+    acceleration = dynamics.ground_acceleration(step.t, dynamics.t_plus(step), moved, s)
     for j in range(len(control.slider_counts)):
         if control.slider_counts[j] == 0:
             continue
@@ -368,7 +368,7 @@ def _switch(step, problem, progress, workspace, vary):
                 else:
                     again |= _begin_contact(
                         j, 0.0, pushing[(look + 2) % 3, j] != 0.0, dynamics.ground_acceleration(
-                            t, dynamics.soon(step), step.moved, s),
+                            t, dynamics.t_plus(step), step.moved, s),
                         after_t, problem, progress, vary, force, rates)
                 _look(part, view)
         if look == 0:

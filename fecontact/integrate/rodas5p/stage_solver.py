@@ -46,7 +46,7 @@ class Reduced(NamedTuple):
     weights: Annotated[Array, NODES, (AXES - 1) * MEMORY]
     workspace: Annotated[Array, MODES]
     coefficients: Annotated[Array, 2 * AXES, AXES * NODES]
-    answers: Annotated[Array, 2 * MODES, AXES * NODES]
+    force_jacobian: Annotated[Array, 2 * MODES, AXES * NODES]
     solver: Matrix
 
 
@@ -197,7 +197,7 @@ def products(a, b, out):
 
 
 @helper
-def set_answers(blocks, g, w, answers):
+def set_force_jacobian(blocks, g, w, force_jacobian):
     """Fill the answers of the node forces to the motion of each mode, (2 m, 2 n) or (2 m, 3 n).
 
     ``g`` are the Gradients, ``w`` holds the weights and workspace for coefficients.
@@ -218,7 +218,7 @@ def set_answers(blocks, g, w, answers):
             if d > 2:
                 across = shapes[k, 2 * n :]
             for first in range(0, shapes.shape[1], n):
-                by_place, by_speed = answers[k, first:], answers[m + k, first:]
+                by_place, by_speed = force_jacobian[k, first:], force_jacobian[m + k, first:]
                 # Named outside the loop, or it is not vectorised.
                 c0, c1, c2, c3 = c[0, first:], c[1, first:], c[d, first:], c[d + 1, first:]
                 for j in range(left, right):
@@ -258,7 +258,7 @@ def assemble(s, blocks, g, w):
 
     The latter by shapes applied to what the modes' motion does to the node forces.
     """
-    set_answers(blocks, g, w, w.answers)
+    set_force_jacobian(blocks, g, w, w.force_jacobian)
     m = len(w.J)
     for part in range(len(blocks.coupled)):
         top, bottom, left, right = block_at(blocks.coupled, part)
@@ -270,7 +270,7 @@ def assemble(s, blocks, g, w):
     if has_polynomial(s):
         add_polynomial_stiffness(-1.0, g.polynomial, s, w.J)
     for pair in range(len(blocks.pairs)):
-        add_products(blocks.shapes, w.answers, block_at(blocks.pairs, pair),
+        add_products(blocks.shapes, w.force_jacobian, block_at(blocks.pairs, pair),
                      (np.uint64(blocks.pairs[pair, 4]), np.uint64(blocks.pairs[pair, 5])), w.J)
 
 

@@ -16,7 +16,7 @@ numerical benchmarks within the Julia Differential Equations package, BIT 63 (20
 import numpy as np
 
 from fecontact.core.compiled import helper
-from fecontact.core.lanes.vectors import fused, read, spread, write
+from fecontact.core.simd.vectors import fused, read, spread, write
 
 STAGES = 8
 ORDER = 5

@@ -96,9 +96,9 @@ class Variation(NamedTuple):
     tolerance: float
     error_floor: float
     moved: Annotated[Array, COLUMNS, 2 * SIZE]
-    pushed: Annotated[Array, COLUMNS, MODES]
+    column_forces: Annotated[Array, COLUMNS, MODES]
     right: Annotated[Array, COLUMNS, SIZE]
-    answers: Annotated[Array, 4 * MODES, AXES * NODES]
+    force_jacobian: Annotated[Array, 4 * MODES, AXES * NODES]
     both: Annotated[Array, MODES, 4 * MODES]
     solver: Annotated[Array, MODES, 2 * MODES]
     vectors: Annotated[Array, 7, SIZE]
@@ -113,7 +113,7 @@ class Variation(NamedTuple):
     behind: dynamics.Gradients
     usual: dynamics.Gradients
     between: dynamics.Gradients
-    bends: dynamics.Gradients
+    second_derivatives: dynamics.Gradients
 
 
 class Vary(NamedTuple):
@@ -149,7 +149,7 @@ def variation_for(
              AXES: dimension, COMBINATIONS: combinations}
     made = allocate(
         Variation, sizes, tolerance=tolerance, error_floor=error_floor,
-        bends=allocate(dynamics.Gradients, {**sizes, NODES: directions * nodes}))
+        second_derivatives=allocate(dynamics.Gradients, {**sizes, NODES: directions * nodes}))
     np.fill_diagonal(made.columns, 1.0)
     if width:
         # A tenth of the state's own sizes, if the parameter changed by all of its value.
@@ -161,7 +161,7 @@ def variation_for(
 @routine
 def _expand(step, y, s, blocks, given, load, v, g, time_rate):
     """Fill gradients g and the rate at a fixed state of y' of a system at the begin of a step."""
-    after_t, later = np.nextafter(step.t, np.inf), dynamics.soon(step)
+    after_t, later = np.nextafter(step.t, np.inf), dynamics.t_plus(step)
     dynamics.set_given(after_t, s, given, load)
     dynamics.set_gradients(y, s, blocks, dynamics.motion_given(given), v.nodes, g)
     acceleration = dynamics.ground_acceleration(step.t, later, dynamics.motion_given(given), s)
@@ -217,7 +217,7 @@ def _set_pushes(Y, blocks, vary, out):
     for i in range(m):
         out[i] = 0.0
         out[m + i] = (v.load[0, i] - v.load[1, i]) / vary.width
-    dynamics.push(blocks, w[2], out[m : 2 * m])
+    dynamics.add_node_forces(blocks, w[2], out[m : 2 * m])
     add_matrices(Y, blocks, vary, out)
 
 
@@ -234,8 +234,8 @@ def _set_forced(part, Y, u, blocks, vary, out):
     w[2, :] = 0.0
     for k in range(m, len(out)):
         out[k] += part * v.vectors[6, k]
-    columns.push(v.between, vary.above, blocks, u, w, out)
-    dynamics.push(blocks, w[2], out[m : 2 * m])
+    columns.add_node_forces(v.between, vary.above, blocks, u, w, out)
+    dynamics.add_node_forces(blocks, w[2], out[m : 2 * m])
     add_matrices(u, blocks, vary, out)
 
 
@@ -292,10 +292,10 @@ def propagate(
     G = 1.0 / (step.h * tableau.GAMMA)
     if size == 2 * m:
         stage_solver.set_solver(G, blocks, reduced, v.solver)
-    acceleration = dynamics.ground_acceleration(step.t, dynamics.soon(step), step.moved, s)
+    acceleration = dynamics.ground_acceleration(step.t, dynamics.t_plus(step), step.moved, s)
     columns.learn(gradients, v.usual)
     columns.set_paths(step, acceleration, s, blocks, stages, v)
-    columns.set_bends(step, acceleration, problem, progress, workspace, v)
+    columns.set_second_derivatives(step, acceleration, problem, progress, workspace, v)
     if varies:
         _begin_parameter(step, progress, blocks, vary)
     moved, last = step.moved, step.t
@@ -410,14 +410,14 @@ def propagate_in_parts(
     parts, expected = _parts(step, scale, x, forced, workspace.reduced.J, v)
     if expected > v.tolerance:
         return expected
-    answers = v.answers[: 2 * m]
+    force_jacobian = v.force_jacobian[: 2 * m]
     for part in range(parts):
         for i in range(collocation.STAGES):
             place = (part + collocation.NODES[i]) / parts
             now = min(step.t + place * step.h, step.latest)
             tableau.interpolated(place, progress.state, workspace.after, workspace.dense, Y)
             dynamics.set_gradients(Y, s, blocks, ground_motion(now, s), v.nodes, v.inside)
-            columns.set_derivatives(s, blocks, v.inside, workspace.reduced, answers, J[i])
+            columns.set_derivatives(s, blocks, v.inside, workspace.reduced, force_jacobian, J[i])
             if varies:
                 _set_accelerations(now, Y, blocks, vary, forced[i])
         collocation.collocate(step.h / parts, J, forced, x)

@@ -126,7 +126,7 @@ def _onward(direction, j, motion, acceleration, step, s, v, between, rate):
 
 
 @routine
-def _gradients_aside(direction, e, j, motion, moved, z, s, v, out):
+def _offset_gradients(direction, e, j, motion, moved, z, s, v, out):
     """Fill row j of the gradients ``out`` at the distance e along a direction.
 
     ``z`` (size,) holds internal variables where the state does.
@@ -169,8 +169,8 @@ def _difference(ahead, here, behind, factor, forward, usual):
 
 @helper
 def _set_bend(j, row, factor, forward, here, v):
-    """Fill a row of v.bends with the differences of the gradients of node j."""
-    ahead, behind, usual, out = v.ahead, v.behind, v.usual, v.bends
+    """Fill a row of v.second_derivatives with the differences of the gradients of node j."""
+    ahead, behind, usual, out = v.ahead, v.behind, v.usual, v.second_derivatives
     states, width = here.rates.shape[1], here.rates.shape[2]
     for k in range(here.partial.shape[1]):
         for c in range(here.partial.shape[2]):
@@ -190,8 +190,8 @@ def _set_bend(j, row, factor, forward, here, v):
 
 
 @routine
-def set_bends(step, acceleration, problem, progress, workspace, v):
-    """Fill v.bends, whose row D_k n + j is how the gradients of node j change along direction k.
+def set_second_derivatives(step, acceleration, problem, progress, workspace, v):
+    """Fill v.second_derivatives: row D_k n + j has those of the forces of node j along direction k.
 
     Where no stage moves a node along it, or nothing depends on it, v.paths becomes zero instead.
     """
@@ -211,8 +211,8 @@ def set_bends(step, acceleration, problem, progress, workspace, v):
                 for i in range(tableau.STAGES):
                     v.paths[i, direction, j] = 0.0
                 continue
-            _gradients_aside(direction, reach, j, motion, step.moved, z, s, v, v.ahead)
-            _gradients_aside(direction, -reach, j, motion, step.moved, z, s, v, v.behind)
+            _offset_gradients(direction, reach, j, motion, step.moved, z, s, v, v.ahead)
+            _offset_gradients(direction, -reach, j, motion, step.moved, z, s, v, v.behind)
             forward = _onward(direction, j, motion, acceleration, step, s, v, between,
                               progress.rate) >= 0.0
             _set_bend(j, direction * n + j, 1.0 / reach, forward, progress.gradients, v)
@@ -221,13 +221,13 @@ def set_bends(step, acceleration, problem, progress, workspace, v):
 @helper
 def set_ahead(i, y, s, stages, v):
     """Fill v.ahead with the change of the gradients along stage i of a step from y."""
-    g, bends, paths = v.ahead, v.bends, v.paths
+    g, second_derivatives, paths = v.ahead, v.second_derivatives, v.paths
     if has_polynomial(s):
         set_polynomial_change(y, stages[i], s, g.polynomial)
     states, width = g.rates.shape[1], g.rates.shape[2]
     n, entries = paths.shape[2], g.partial.shape[1] * g.partial.shape[2]
     partial = g.partial.reshape((n, entries))
-    changes = bends.partial.reshape((len(bends.partial), entries))
+    changes = second_derivatives.partial.reshape((len(second_derivatives.partial), entries))
     length = g.force.shape[1] if states > 0 else 0
     partial[:] = 0.0
     g.force[:, :length] = 0.0
@@ -241,10 +241,10 @@ def set_ahead(i, y, s, stages, v):
             for k in range(entries):
                 out[k] += path * change[k]
             for k in range(length):
-                g.force[j, k] += path * bends.force[row, k]
+                g.force[j, k] += path * second_derivatives.force[row, k]
             for k in range(states):
                 for c in range(width):
-                    g.rates[j, k, c] += path * bends.rates[row, k, c]
+                    g.rates[j, k, c] += path * second_derivatives.rates[row, k, c]
 
 
 @helper
@@ -286,14 +286,14 @@ def _products(a, b, out):
 
 
 @helper
-def set_derivatives(s, blocks, g, reduced, answers, out):
+def set_derivatives(s, blocks, g, reduced, force_jacobian, out):
     """Fill out (m, 2 m) with [Jq, Jv], the derivatives of the accelerations, by gradients g.
 
-    For systems without internal variables; ``answers`` (2 m, d n) is workspace.
+    For systems without internal variables; ``force_jacobian`` (2 m, d n) is workspace.
     """
     m = len(out)
-    stage_solver.set_answers(blocks, g, reduced, answers)
-    _products(blocks.shapes, answers, out)
+    stage_solver.set_force_jacobian(blocks, g, reduced, force_jacobian)
+    _products(blocks.shapes, force_jacobian, out)
     for row in range(m):
         for k in range(m):
             out[row, k] -= s.stiffness[row, k]
@@ -310,9 +310,9 @@ def all_at_once(i, h, G, s, blocks, reduced, forced, varies, v):
     """
     count, size = v.columns.shape
     m = len(v.none)
-    stage_solver.set_answers(blocks, v.inside, reduced, v.answers)
-    stage_solver.set_answers(blocks, v.ahead, reduced, v.answers[2 * m :])
-    _products(blocks.shapes, v.answers, v.both)
+    stage_solver.set_force_jacobian(blocks, v.inside, reduced, v.force_jacobian)
+    stage_solver.set_force_jacobian(blocks, v.ahead, reduced, v.force_jacobian[2 * m :])
+    _products(blocks.shapes, v.force_jacobian, v.both)
     for row in range(m):
         for k in range(m):
             v.both[row, k] -= s.stiffness[row, k]
@@ -324,33 +324,33 @@ def all_at_once(i, h, G, s, blocks, reduced, forced, varies, v):
         if i == 0:
             for k in range(size):
                 moved[size + k] = v.columns[c, k]
-    _products(v.moved, v.both, v.pushed)
+    _products(v.moved, v.both, v.column_forces)
     for c in range(count):
-        moved, right, pushed = v.moved[c, m:], v.right[c], v.pushed[c]
+        moved, right, column_forces = v.moved[c, m:], v.right[c], v.column_forces[c]
         faster = right[m:]
         for k in range(m):
             right[k] += moved[k]
         for k in range(m):
-            faster[k] += pushed[k]
+            faster[k] += column_forces[k]
     if varies:
         for k in range(size):
             v.right[count - 1, k] += forced[k]
-    _products(v.right, v.solver, v.pushed)
+    _products(v.right, v.solver, v.column_forces)
     time = 1.0 / G
     for c in range(count):
-        out, right, pushed = v.stages[tableau.STAGES * c + i], v.right[c], v.pushed[c]
+        out, right, column_forces = v.stages[tableau.STAGES * c + i], v.right[c], v.column_forces[c]
         faster = out[m:]
         for k in range(m):
-            out[k] = time * (right[k] + pushed[k])
+            out[k] = time * (right[k] + column_forces[k])
         for k in range(m):
-            faster[k] = pushed[k]
+            faster[k] = column_forces[k]
         if i == tableau.STAGES - 1:
             for k in range(size):
                 v.after[c, k] = v.moved[c, k] + out[k]
 
 
 @helper
-def push(g, s, blocks, x, w, rate):
+def add_node_forces(g, s, blocks, x, w, rate):
     """Add to w[2] (d n,) the node forces, and to ``rate`` the z', that x makes by gradients g."""
     n, states, _ = g.rates.shape
     m, d = len(blocks.position), s.rows.shape[1]
@@ -386,8 +386,8 @@ def one_by_one(i, h, G, s, blocks, gradients, reduced, forced, varies, v):
         tableau.combined(tableau.A[i], 1.0, v.columns[c], own, X)
         w[2, :] = 0.0
         rate[2 * m :] = 0.0
-        push(v.ahead, s, blocks, v.columns[c], w, rate)
-        push(v.inside, s, blocks, X, w, rate)
+        add_node_forces(v.ahead, s, blocks, v.columns[c], w, rate)
+        add_node_forces(v.inside, s, blocks, X, w, rate)
         dynamics.gather(X, s, blocks, v.none, w[2], rate)
         if has_polynomial(s):
             add_polynomial_product(-1.0, v.inside.polynomial, X, s, rate[m : 2 * m])

@@ -89,7 +89,7 @@ class Series(NamedTuple):
     combined: Annotated[Array, COMBINATIONS, COEFFICIENTS]
     products: Annotated[Array, PRODUCTS, COEFFICIENTS]
     slopes: Annotated[Array, PRODUCTS, COEFFICIENTS]
-    pull: Annotated[Array, MODES, COEFFICIENTS]
+    polynomial: Annotated[Array, MODES, COEFFICIENTS]
     powers: Annotated[Array, SERIES_POWERS, COEFFICIENTS]
     line: Matrix
     workspace: Matrix

@@ -106,11 +106,11 @@ def _force(j, k, h, series):
 
 @helper
 def _add_polynomial_forces(k, s, series):
-    """Fill coefficient k of ``series.pull``, the polynomial forces, and of what they depend on."""
+    """Fill coefficient k of the forces ``series.polynomial``, and of what they depend on."""
     rows, pairs, L, Q = (s.polynomial_rows, s.polynomial_pairs, s.polynomial_cubic,
                          s.polynomial_quartic)
-    c, p, slopes, q, pull = (series.combined, series.products, series.slopes, series.q,
-                             series.pull)
+    c, p, slopes, q, polynomial = (series.combined, series.products, series.slopes, series.q,
+                             series.polynomial)
     m = len(q)
     for a in range(len(rows)):
         total = 0.0
@@ -120,19 +120,19 @@ def _add_polynomial_forces(k, s, series):
     for r in range(len(pairs)):
         p[r, k] = _product(c[pairs[r, 0]], c[pairs[r, 1]], k)
     for i in range(m):
-        pull[i, k] = 0.0
+        polynomial[i, k] = 0.0
     for r in range(len(pairs)):
         total = 0.0
         for other in range(len(pairs)):
             total += Q[r, other] * p[other, k]
         for i in range(m):
             total += L[r, i] * q[i, k]
-            pull[i, k] -= p[r, k] * L[r, i]
+            polynomial[i, k] -= p[r, k] * L[r, i]
         slopes[r, k] = total
         first, second = _product(slopes[r], c[pairs[r, 1]], k), _product(
             slopes[r], c[pairs[r, 0]], k)
         for i in range(m):
-            pull[i, k] -= first * rows[pairs[r, 0], i] + second * rows[pairs[r, 1], i]
+            polynomial[i, k] -= first * rows[pairs[r, 0], i] + second * rows[pairs[r, 1], i]
 
 
 @routine
@@ -158,7 +158,7 @@ def expand(y, h, s, series):
             # The newest coefficients come last: other terms do not wait for them.
             total, damped = series.forcing[i, k], 0.0
             if has_polynomial(s):
-                total += series.pull[i, k]
+                total += series.polynomial[i, k]
             for j in range(n):
                 total += s.rows[j, 1, i] * series.F[j, k]
             for other in range(m):

@@ -289,7 +289,7 @@ def _full(data):
 
 
 @routine
-def _aim(t, h, last, smallest, data):
+def _next_target(t, h, last, smallest, data):
     """The next step, expanded over the length h: as far as that holds, or to the next switch."""
     problem, progress, series = data.problem, data.progress, data.series
     end, counts = data.output.times[-1], progress.counts
@@ -377,8 +377,8 @@ def _stop_at(part, step, data):
     _go_on(step, 0.0, data)
 
 
-METHOD = Method("series", Data, _aim, _attempt, _fill, _go_on, full=_full, find_end=_find_end,
-                stop_at=_stop_at, places=12)
+METHOD = Method("series", Data, _next_target, _attempt, _fill, _go_on, full=_full,
+                find_end=_find_end, stop_at=_stop_at, places=12)
 advance = step_loop(METHOD)
 SMALL = Sized(partial(step_loop, METHOD),
               (state.Problem, state.Progress, state.Output, Series), FEW)

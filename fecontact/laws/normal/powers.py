@@ -3,7 +3,7 @@
 import math
 
 from fecontact.core.compiled import helper
-from fecontact.core.lanes.functions import everywhere, select
+from fecontact.core.simd.functions import everywhere, select
 
 
 @helper

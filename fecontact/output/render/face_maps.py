@@ -84,8 +84,9 @@ class FaceMaps:
             def state(frame: int, nodes: slice = nodes) -> Array:
                 return np.asarray(states[motion.states[frame, nodes]])
 
-            rubs = motion.largest_friction > 0.0
-            found.append(_Map(f"{name}pressure" + " and friction" * rubs, plan, pressure, rubs))
+            has_friction = motion.largest_friction > 0.0
+            found.append(_Map(f"{name}pressure" + " and friction" * has_friction, plan, pressure,
+                              has_friction))
             found.append(_Map(f"{name}state", plan, state, False))
             if motion.worn is not None:
                 deepest = float(motion.worn.max()) or 1.0

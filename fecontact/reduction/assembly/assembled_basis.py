@@ -161,7 +161,7 @@ def assembled_basis(
         mode_shapes=places.joined_shapes(nodal),
         groups=tuple(zip((*pairings, *springs), counts, strict=True)),
         thickness=_common([one.thickness for one in bases.values()]),
-        inertia_rows=_beside([one.inertia_rows for one in bases.values()]),
+        inertia_rows=_side_by_side([one.inertia_rows for one in bases.values()]),
         boundaries=tuple(f"{name}.{boundary}" for name, basis in bases.items()
                          for boundary in basis.boundaries),
         boundary_rows=_boundary_rows(bases, places),
@@ -430,7 +430,7 @@ def _common(values: Sequence[float | None]) -> float | None:
     return values[0] if len(set(values)) == 1 else None
 
 
-def _beside(rows: Sequence[Array | None]) -> Array | None:
+def _side_by_side(rows: Sequence[Array | None]) -> Array | None:
     known = [one for one in rows if one is not None]
     return np.hstack(known) if len(known) == len(rows) else None
 

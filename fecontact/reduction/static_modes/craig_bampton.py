@@ -50,9 +50,9 @@ def craig_bampton(
     deflections = flexibility.deflections(patterns)
     fixed = _fixed_interface_modes(system, flexibility.rows.T @ patterns, deflections, motion,
                                    count)
-    answers = [] if loads is None else [system.deflection(loads)]
+    responses = [] if loads is None else [system.deflection(loads)]
     squares, shapes = diagonalised(system, _distinguished(
-        system, system.without_rigid(np.hstack([deflections, fixed, *answers]))))
+        system, system.without_rigid(np.hstack([deflections, fixed, *responses]))))
     rigid = system.rigid.shape[1]
     return (np.concatenate([np.zeros(rigid), np.sqrt(squares)]),
             np.hstack([system.rigid, shapes]))
@@ -109,10 +109,10 @@ def _fixed_interface_modes(
     r = motion.shape[1]
     saddle = np.block([[held.T @ deflections, motion], [motion.T, np.zeros((r, r))]])
     inverse = np.linalg.pinv(saddle, rcond=1e-12, hermitian=True)
-    answers = np.hstack([deflections, system.rigid])
+    responses = np.hstack([deflections, system.rigid])
 
     def still(force: Array) -> Array:
-        return np.asarray(system.deflection(force) - answers @ (inverse @ (answers.T @ force)))
+        return np.asarray(system.deflection(force) - responses @ (inverse @ (responses.T @ force)))
 
     start = still(M @ np.random.default_rng(0).standard_normal(size))
     _, shapes = eigsh(K, k=count, M=M, sigma=0.0, v0=start, ncv=min(max(2 * count + 1, 20), size),

@@ -75,9 +75,9 @@ class TrialSpace:
             if len(near.followers) < (1.0 - _WORTH) * near.spread.shape[0]:
                 break
             space = cls(system, near.solver, near)
-            answers = Answers.of(space, some, modes, accuracy)
-            own = known + np.diag(answers.compliance)
-            if answers.converged and (answers.missing <= _FAR * tolerance * own).all():
+            responses = StaticResponses.of(space, some, modes, accuracy)
+            own = known + np.diag(responses.compliance)
+            if responses.converged and (responses.missing <= _FAR * tolerance * own).all():
                 return space
         return whole
 
@@ -132,7 +132,7 @@ class TrialSpace:
 
 
 @dataclass(frozen=True, eq=False)
-class Answers:
+class StaticResponses:
     """Residual response to unit forces at rows W (k, f) beside modes, among displacements B v.
 
     Attributes
@@ -152,7 +152,7 @@ class Answers:
     converged: bool
 
     @classmethod
-    def of(cls, space: TrialSpace, rows: Any, modes: Modes, accuracy: float) -> "Answers":
+    def of(cls, space: TrialSpace, rows: Any, modes: Modes, accuracy: float) -> "StaticResponses":
         """The answers, with deflections to an accuracy in the energy norm."""
         count, near = rows.shape[0], space.near
         momentum = space.system.mass @ modes[1]
@@ -227,19 +227,19 @@ class IteratedFlexibility(Flexibility):
         return self._whole[0].space if self._whole is not None else self._solved[0]
 
     @cached_property
-    def _solved(self) -> tuple[TrialSpace, Answers]:
+    def _solved(self) -> tuple[TrialSpace, StaticResponses]:
         given = (self.rows, self.modes, self.accuracy)
         space = TrialSpace.whole(self.system)
         if self.tolerance:
             space = TrialSpace.suited(self.system, *given, self.tolerance)
-        answers = Answers.of(space, *given)
+        responses = StaticResponses.of(space, *given)
         if space.near is not None:
-            own = np.diag(modal_compliance(self.rows, *self.modes) + answers.compliance)
-            if not answers.converged or (
-                    answers.missing > 2.0 * _FAR * self.tolerance * own).any():
+            own = np.diag(modal_compliance(self.rows, *self.modes) + responses.compliance)
+            if not responses.converged or (
+                    responses.missing > 2.0 * _FAR * self.tolerance * own).any():
                 space = TrialSpace.whole(self.system)
-                answers = Answers.of(space, *given)
-        return space, answers
+                responses = StaticResponses.of(space, *given)
+        return space, responses
 
     def coordinates(self, patterns: Array) -> Array:
         """Coordinates v (s, p) of the residual response B v to force patterns (k, p)."""
@@ -248,9 +248,9 @@ class IteratedFlexibility(Flexibility):
             further = np.zeros((len(which), patterns.shape[1]))
             further[which] = patterns
             return whole.coordinates(further)
-        space, answers = self._solved
-        if answers.found is not None:
-            return np.asarray(answers.found @ patterns.astype(answers.found.dtype), dtype=float)
+        space, responses = self._solved
+        if responses.found is not None:
+            return np.asarray(responses.found @ patterns.astype(responses.found.dtype), dtype=float)
         forces = self.rows.T @ patterns
         forces -= (self.system.mass @ self.modes[1]) @ (self.modes[1].T @ forces)
         found = space.deflections(space.gather(forces), self.accuracy)
@@ -262,8 +262,8 @@ class IteratedFlexibility(Flexibility):
     def deflections(self, patterns: Array) -> Array:
         """G W^T patterns (f, p): elastic displacements under force patterns (k, p) [m/N]."""
         w, shapes = self.modes
-        answers = self.space.spread(self.coordinates(patterns))
-        answers -= shapes @ ((self.system.mass @ shapes).T @ answers)
+        responses = self.space.spread(self.coordinates(patterns))
+        responses -= shapes @ ((self.system.mass @ shapes).T @ responses)
         elastic = shapes[:, w > 0.0]
-        return np.asarray(answers + elastic @ (
+        return np.asarray(responses + elastic @ (
             (elastic.T @ (self.rows.T @ patterns)) / w[w > 0.0, None] ** 2))

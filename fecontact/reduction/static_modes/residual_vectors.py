@@ -105,7 +105,7 @@ def residual_modes(
     for _ in range(2):
         vectors -= shapes @ (inertia.T @ vectors)
     if isinstance(flexibility, IteratedFlexibility):
-        squares, found = _diagonalised_beside(
+        squares, found = _diagonalised_with(
             flexibility.space, flexibility.coordinates(patterns), shapes, inertia, vectors)
     else:
         squares, found = diagonalised(system, vectors)
@@ -141,7 +141,7 @@ def diagonalised(system: FreeSystem, vectors: Array) -> tuple[Array, Array]:
     return squares, shapes * fixed_signs(shapes)
 
 
-def _diagonalised_beside(
+def _diagonalised_with(
     space: TrialSpace, coordinates: Array, modes: Array, inertia: Array, vectors: Array
 ) -> tuple[Array, Array]:
     """Squared frequencies and shapes of displacements B v beside modes, and orthogonal vectors.

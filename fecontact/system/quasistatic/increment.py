@@ -82,7 +82,7 @@ def _motion(j, q, s):
 
 
 @helper
-def _rub(j, tangents, pressing, sliders, pose, workspace, total, out):
+def _friction(j, tangents, pressing, sliders, pose, workspace, total, out):
     """Fill ``total`` (d - 1,) with the forces of the sliders of node j along its tangents.
 
     Places g of the node along its tangents stand in ``pose.node``. Fills rows 0 and 2 of ``out``
@@ -117,7 +117,7 @@ def _rub(j, tangents, pressing, sliders, pose, workspace, total, out):
 
 
 @helper
-def _lean(F, contact, d, out):
+def _follow_surface(F, contact, d, out):
     """Add what contact forces along the surface change to the derivatives of a node."""
     for tangent in range(d - 1):
         for axis in range(d):
@@ -127,7 +127,7 @@ def _lean(F, contact, d, out):
 
 
 @helper
-def _push(away, F, along, T, rounding, workspace):
+def _add_forces(away, F, along, T, rounding, workspace):
     """Add F along one row and -T along another to the out-of-balance force, and to sizes."""
     for i in range(len(away)):
         workspace.residual[i] += away[i] * F - along[i] * T
@@ -182,9 +182,9 @@ def evaluate(
         node[j, FORCE], node[j, PRESSING], node[j, PENETRATION] = F, pressing, contact.penetration
         for k in range(tangents):
             node[j, PLACE + PER_TANGENT * k] = motion.places[2 * k] - ground_travel(k, j, moved, s)
-        _rub(j, tangents, pressing, sliders, pose, workspace, total, out)
+        _friction(j, tangents, pressing, sliders, pose, workspace, total, out)
         if s.follows_surface:
-            _lean(F, contact, d, out)
+            _follow_surface(F, contact, d, out)
         # Springs round off with the displacements whose difference they feel.
         springs = 0.0
         for e in range(sliders.stiffness.shape[1]):
@@ -195,10 +195,11 @@ def evaluate(
             node[j, AGAINST + second], node[j, ALONG_SURFACE + second] = T, F * contact.slope[k]
             rounding = _SPRINGS * (springs * (abs(motion.places[2 * k]) + abs(gone))
                                    + _stretched(j, k, sliders, pose))
-            _push(s.rows[j, 1], F if k == 0 else 0.0, s.rows[j, 2 * k], T, rounding, workspace)
+            _add_forces(s.rows[j, 1], F if k == 0 else 0.0, s.rows[j, 2 * k], T, rounding,
+                        workspace)
         if derive:
             for axis in range(d):
-                answer, sign = workspace.answers[j, axis], -1.0 if axis == 1 else 1.0
+                answer, sign = workspace.flexibility[j, axis], -1.0 if axis == 1 else 1.0
                 for i in range(m):
                     answer[i] = 0.0
                 for other in range(d):
@@ -211,7 +212,7 @@ def evaluate(
         if has_polynomial(s):
             add_polynomial_stiffness(1.0, gradient, s, workspace.matrix)
         workspace.matrix[:] += np.dot(s.rows.reshape((n * d, m)).T,
-                                      workspace.answers.reshape((n * d, m)))
+                                      workspace.flexibility.reshape((n * d, m)))
     return np.sqrt(terms)
 
 

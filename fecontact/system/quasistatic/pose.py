@@ -40,10 +40,10 @@ class Pose(NamedTuple):
 class Workspace(NamedTuple):
     """Workspace of Newton's method; ``scale`` (m,) are typical stiffnesses of the modes.
 
-    ``acting`` (m,) sums the magnitudes of the forces on each mode; ``answers`` (n, d, m) are minus
-    the forces on the nodes along their axes by the modes, ``partial`` (d + 1, 2 d) the derivatives
-    of T, F, T across and the pressing force of a node to its displacements and velocities, and
-    ``total`` (d - 1,) the forces of its sliders.
+    ``acting`` (m,) sums the magnitudes of the forces on each mode; ``flexibility`` (n, d, m) are
+    minus the forces on the nodes along their axes by the modes, ``partial`` (d + 1, 2 d) the
+    derivatives of T, F, T across and the pressing force of a node to its displacements and
+    velocities, and ``total`` (d - 1,) the forces of its sliders.
     """
 
     scale: Vector
@@ -53,7 +53,7 @@ class Workspace(NamedTuple):
     step: Vector
     before: Vector
     multiplier: Matrix
-    answers: Block
+    flexibility: Block
     matrix: Matrix
     partial: Matrix
     total: Vector

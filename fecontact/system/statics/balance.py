@@ -6,7 +6,7 @@ import numpy as np
 
 from fecontact.core.types import Array
 from fecontact.system import kernels
-from fecontact.system.friction_memory import settled
+from fecontact.system.friction_memory import steady_memory
 from fecontact.system.jacobian import jacobian
 from fecontact.system.node_forces import normal_values
 from fecontact.system.nodes import SystemArrays
@@ -82,13 +82,13 @@ class Balance:
         """Out-of-balance force (m,) under a fraction of the load."""
         m = len(q)
         part = self.arrays._replace(constant_load=load * self.load)
-        kernels.right_hand_side(self._time, self._settled(q), part, self._rate)
+        kernels.right_hand_side(self._time, self._steady(q), part, self._rate)
         return self._rate[m : 2 * m].copy()
 
     def gradient(self, q: Array) -> Array:
         """Derivative (m, m) of the force."""
         m = len(q)
-        jacobian(self._time, self._settled(q), self.arrays, self._matrix)
+        jacobian(self._time, self._steady(q), self.arrays, self._matrix)
         gradient = self._matrix[m : 2 * m, :m].copy()
         if len(self._matrix) > 2 * m:
             # The internal variables follow the displacements: z' = 0.
@@ -96,9 +96,9 @@ class Balance:
             gradient -= self._matrix[m : 2 * m, 2 * m :] @ follow
         return gradient
 
-    def _settled(self, q: Array) -> Array:
+    def _steady(self, q: Array) -> Array:
         self._state[: len(q)] = q
-        self._state = settled(self._time, self._state, self.arrays)
+        self._state = steady_memory(self._time, self._state, self.arrays)
         return self._state
 
     def guess(self, load: float) -> Array:
@@ -114,7 +114,7 @@ class Balance:
         shift = 1e-10
         force = self.force(q, load)
         best = self._size(force)
-        settled = 0
+        steady_memory = 0
         for _ in range(200):
             gradient = self.gradient(q)
             for _ in range(40):
@@ -130,8 +130,8 @@ class Balance:
             q, force, best = trial, trial_force, size
             shift = max(0.1 * shift, 1e-10)
             if best <= self._noise(q, load):
-                settled += 1
-                if settled == 3:
+                steady_memory += 1
+                if steady_memory == 3:
                     return q
         return None
 
@@ -167,8 +167,8 @@ class Balance:
             if low > 0.0:
                 for _ in range(30):
                     middle = 0.5 * (low + high)
-                    pushed = self.force(q + middle * step, load) @ step >= 0.0
-                    low, high = (middle, high) if pushed else (low, middle)
+                    advances = self.force(q + middle * step, load) @ step >= 0.0
+                    low, high = (middle, high) if advances else (low, middle)
                 high = low
             q = q + high * step
         return q
@@ -234,7 +234,7 @@ class Balance:
 
     def _energy(self, q: Array, stored: Callable[[Array], Array]) -> float:
         state = np.empty((len(self.arrays.gap), kernels.state_columns(self.arrays)))
-        kernels.contact_state(self._time, self._settled(q), self.arrays, state)
+        kernels.contact_state(self._time, self._steady(q), self.arrays, state)
         elastic = (0.5 * q @ self.arrays.stiffness @ q - self.load @ q
                    + polynomial_energy(q, self.arrays))
         return float(elastic + stored(state[:, kernels.PENETRATION]))

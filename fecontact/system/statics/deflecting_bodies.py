@@ -85,8 +85,8 @@ class DeflectingBodies:
         displacement = self.displacement(q) if self.contacts else np.zeros(0)
         for contact in self.contacts:
             own = contact.forces(displacement)
-            pull, stiffness = self.acting(q, own.force, own.slope)
-            found = replace(found, energy=found.energy + own.energy, force=found.force + pull,
+            acting, stiffness = self.acting(q, own.force, own.slope)
+            found = replace(found, energy=found.energy + own.energy, force=found.force + acting,
                             tangent=(found.tangent + stiffness).tocsc(),
                             contacts=found.contacts + own.status,
                             rounding=found.rounding + own.rounding)
@@ -109,9 +109,9 @@ class DeflectingBodies:
         own, d = self.parts(q), self.places.shape[1]
         slopes = [model.slopes(part) for model, part in zip(models, own, strict=True)]
         J = sp.csc_array(sp.block_diag(slopes))
-        bends = [model.curvature(part, each) for model, part, each in zip(
+        curvatures = [model.curvature(part, each) for model, part, each in zip(
             models, own, np.split(force, d * self.nodes[1:-1]), strict=True)]
-        return J.T @ force, (J.T @ matrix @ J + sp.block_diag(bends)).tocsc()
+        return J.T @ force, (J.T @ matrix @ J + sp.block_diag(curvatures)).tocsc()
 
     def accept(self, q: Array) -> list[PointForces]:
         """Keep a state (f,) of equilibrium: the next one is loaded from it."""
@@ -133,10 +133,10 @@ class DeflectingBodies:
                      if not name or key.partition(".")[0] == name}
             each.append((model, pressures, model.free(nodal_forces(model.body, own, known, time))))
         dead = np.concatenate([one for *_, one in each])
-        pushed = any(pressures for _, pressures, _ in each)
+        pressed = any(pressures for _, pressures, _ in each)
 
         def at(q: Array) -> tuple[Array, Any]:
-            if not pushed:
+            if not pressed:
                 return dead, None
             found = [model.acting(own, *follower_pressure(
                 model.body, pressures, model.displacement(own))) for (model, pressures, _), own

@@ -19,7 +19,7 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import kernels
 from fecontact.system.complex_modes import unstable_count
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.friction_memory import settled
+from fecontact.system.friction_memory import steady_memory
 from fecontact.system.instant import Instant
 from fecontact.system.loads import mean_load
 from fecontact.system.model_limits import limits_exceeded, named_motion, warn_of_limits
@@ -154,7 +154,7 @@ def equilibrium_state(
     """State [q, 0, z] of an equilibrium, with friction's steady internal variables in sliding."""
     q = equilibrium_coordinates(system, kind, time, standing=standing)
     state = np.concatenate([q, np.zeros(system.size - len(q))])
-    return settled(time, state, system.arrays) if kind == "sliding" else state
+    return steady_memory(time, state, system.arrays) if kind == "sliding" else state
 
 
 @one_blas_thread
@@ -245,9 +245,9 @@ def resting(
     ``arrays`` are those of the system with the motions of which ``travel`` (1,), in space (2,), is
     that of the other sides. AnalysisError if there is none.
     """
-    pulls = (arrays.drive_stiffness * motion) @ arrays.drive_shapes
+    drive_forces = (arrays.drive_stiffness * motion) @ arrays.drive_shapes
     arrays = at_rest(arrays, *travel.tolist())._replace(
-        constant_load=load + pulls, drive_shapes=np.zeros_like(arrays.drive_shapes),
+        constant_load=load + drive_forces, drive_shapes=np.zeros_like(arrays.drive_shapes),
         load_shapes=np.zeros_like(arrays.load_shapes))
     problem = Balance(arrays, 0.0, system.penetration_scale)
     solution = problem.equilibrium()

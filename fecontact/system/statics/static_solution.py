@@ -142,10 +142,10 @@ def _require_balance(body: ElasticBody, rigid: Array, force: Array) -> None:
     d = body.dimension
     forces, motions = force.reshape(-1, d), rigid.reshape(-1, d, rigid.shape[1])
     size = np.linalg.norm(forces, axis=1) @ np.linalg.norm(motions, axis=1)
-    pushed = np.abs(rigid.T @ force) > _BALANCED * size
-    if not pushed.any():
+    loaded = np.abs(rigid.T @ force) > _BALANCED * size
+    if not loaded.any():
         return
-    mode = motions[:, :, int(np.argmax(pushed))]
+    mode = motions[:, :, int(np.argmax(loaded))]
     turns = np.ptp(mode, axis=0).max() > 1e-6 * np.abs(mode).max()
     way = "a rotation" if turns else f"a translation in {'xyz'[int(np.argmax(np.abs(mode[0])))]}"
     raise AnalysisError(f"There is no static solution: nothing holds the body against {way}, in "

@@ -18,8 +18,8 @@ class Workspace(NamedTuple):
     k + 1); ``column`` (n,) is the derivative to the parameter, ``linear`` (2, m, m) are stiffness
     and damping. ``along`` (n + 1,) is the solution of the equations without right side that has one
     in the last row. Plain contact forces are found row by row over the samples: ``motion`` (2 m, N)
-    displacements and velocities, ``pushes`` (m, N) forces, ``node`` (9, N) what belongs to a
-    node; ``widths`` (m, N) is what kinks add, see
+    displacements and velocities, ``contact_forces`` (m, N), ``node`` (9, N) what belongs to a node;
+    ``widths`` (m, N) is what kinks add, see
     :func:`fecontact.bifurcation.harmonic.compiled.kinks.add_kinks`. ``friction`` (3, t n, N) is
     that of elements which are followed one by one, with what it is beside the parameter;
     ``by_node`` (t n, N, d (2 H + 1)) are its derivatives, ``left`` (N, c) work array for
@@ -52,11 +52,11 @@ class Workspace(NamedTuple):
     linear: Block
     column: Vector
     residual: Vector
-    beside: Vector
+    perturbed: Vector
     along: Vector
     vectors: Matrix
     motion: Matrix
-    pushes: Matrix
+    contact_forces: Matrix
     node: Matrix
     widths: Matrix
     friction: Block
@@ -70,8 +70,8 @@ class Equations(NamedTuple):
     Arrays of ``contact`` that depend on p are parts of ``flat`` = ``base`` + p ``slope``. Where the
     loads are affine in p at the samples, it is the system of the contact forces alone; stiffness
     and damping are ``body`` (4, m, m), values at p = 0 and slopes of both, loads ``given`` (2, N,
-    m) at the samples, with the harmonics ``pulls`` (2, 2 H + 1, m). Otherwise ``contact`` is the
-    whole system and these are zero. ``springs`` (c, m) and ``offsets`` (c,) give the deflections to
+    m) at the samples, and ``load_harmonics`` (2, 2 H + 1, m). Otherwise ``contact`` is the whole
+    system and these are zero. ``springs`` (c, m) and ``offsets`` (c,) give the deflections to
     which internal variables return, ``blocks`` (n,) how many of a node act on each other; these are
     none where all are elements that are followed one by one, ``elements`` (n,) their numbers, with
     ``kept_offsets`` (c,) of those that never slide. Then ``contact`` is without them, ``whole``
@@ -98,7 +98,7 @@ class Equations(NamedTuple):
     sines: Matrix
     body: Block
     given: Block
-    pulls: Block
+    load_harmonics: Block
     springs: Matrix
     offsets: Vector
     blocks: IntegerVector

@@ -10,7 +10,11 @@ import numpy as np
 
 from fecontact.bifurcation.harmonic.compiled.arrays import PERIOD, PLAIN, STEADY, TIMED, TURN
 from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks
-from fecontact.bifurcation.harmonic.compiled.plain_forces import combine, plain_forces, project
+from fecontact.bifurcation.harmonic.compiled.memoryless_forces import (
+    combine,
+    memoryless_forces,
+    project,
+)
 from fecontact.bifurcation.harmonic.elements import element_forces
 from fecontact.bifurcation.harmonic.memory import LEAK, march, solve_around
 from fecontact.bifurcation.harmonic.series import fill_blocks
@@ -91,30 +95,31 @@ def _take_differences(T, e):
 @helper
 def take_pushes(f, e):
     """Fill the rows of the forces from f (N, d) at the samples."""
-    pushes = e.workspace.pushes
-    m = len(pushes)
+    contact_forces = e.workspace.contact_forces
+    m = len(contact_forces)
     for j in range(m):
         for n in range(len(f)):
-            pushes[j, n] = f[n, m + j]
+            contact_forces[j, n] = f[n, m + j]
 
 
 @helper
 def balance(u, T, loads, e, out):
-    """Fill out (n,) with the harmonics of q'' - f; ``pushes`` are without what is linear.
+    """Fill out (n,) with the harmonics of q'' - f; ``contact_forces`` are without what is linear.
 
     ``loads`` is the factor of the loads.
     """
     m, L = e.springs.shape[1], e.values.shape[1]
     linear, p = e.workspace.linear, u[len(u) - 1]
-    pushed = e.workspace.coefficients[0]
+    force_harmonics = e.workspace.coefficients[0]
     for j in range(m):
-        project(e.projection, e.workspace.pushes[j], pushed[j])
+        project(e.projection, e.workspace.contact_forces[j], force_harmonics[j])
     for k in range(L * m):
         out[k] = 0.0
     for k in e.kept:
         turn = 2.0 * math.pi * ((k + 1) // 2) / T
         for j in range(m):
-            total = pushed[j, k] + loads * (e.pulls[0, k, j] + p * e.pulls[1, k, j])
+            load = e.load_harmonics[0, k, j] + p * e.load_harmonics[1, k, j]
+            total = force_harmonics[j, k] + loads * load
             out[k * m + j] = -turn * turn * u[k * m + j] - total
         for i in range(m):
             place, speed = u[k * m + i], speed_coefficient(u, k, i, m, T)
@@ -142,7 +147,7 @@ def _add_friction(e):
             factor = rows[r // tangents, 2 * (r % tangents), i]
             for n in range(len(friction)):
                 if plain:
-                    workspace.pushes[i, n] -= factor * friction[n]
+                    workspace.contact_forces[i, n] -= factor * friction[n]
                 else:
                     workspace.f[n, m + i] -= factor * friction[n]
 
@@ -166,7 +171,7 @@ def evaluate_at(u, derivatives, e):
     T = take_parameter(u[len(u) - 1], e)
     if e.numbers[PLAIN] != 0.0:
         take_motion(u, T, e)
-        plain_forces(derivatives, T / len(e.tau), e)
+        memoryless_forces(derivatives, T / len(e.tau), e)
         if len(e.elements) > 0 and _friction_at(u, T, derivatives, e) == 0.0:
             return 0.0
         balance(u, T, 1.0, e, workspace.residual)
@@ -228,7 +233,7 @@ def _harmonics_of_derivatives(T, s, e):
                 same = True
                 for n in range(1, len(row)):
                     same = same and row[n] == row[0]
-                cosines, sines = workspace.along[:L], workspace.beside[:L]
+                cosines, sines = workspace.along[:L], workspace.perturbed[:L]
                 if same:
                     for k in range(L):
                         cosines[k], sines[k] = 0.0, 0.0
@@ -253,13 +258,14 @@ def _harmonics_of_derivatives(T, s, e):
 
 @helper
 def _by_parameter(u, T, e):
-    """Fill as :func:`_beside`, where forces depend on the parameter through speeds alone."""
+    """Fill as :func:`_by_differences`, if forces depend on the parameter by speeds alone."""
     workspace = e.workspace
     p, m, L = u[len(u) - 1], e.springs.shape[1], e.values.shape[1]
     N, c = len(e.tau), len(e.offsets)
     # Relative change of the period; that of speeds is the opposite.
     rise = -1.0 / p if e.numbers[TURN] != 0.0 else 0.0
-    plain, row, pushed = e.numbers[PLAIN] != 0.0, workspace.node[0], workspace.coefficients[0]
+    plain, row = e.numbers[PLAIN] != 0.0, workspace.node[0]
+    force_harmonics = workspace.coefficients[0]
     for j in range(m):
         for n in range(N):
             row[n] = 0.0
@@ -274,14 +280,14 @@ def _by_parameter(u, T, e):
             for n in range(N):
                 row[n] += rise * workspace.widths[j, n]
         if moves:
-            project(e.projection, row, pushed[j])
+            project(e.projection, row, force_harmonics[j])
         else:
             for k in range(L):
-                pushed[j, k] = 0.0
+                force_harmonics[j, k] = 0.0
     for k in range(L):
         turn = 2.0 * math.pi * ((k + 1) // 2) / T
         for j in range(m):
-            total = e.pulls[1, k, j] + pushed[j, k]
+            total = e.load_harmonics[1, k, j] + force_harmonics[j, k]
             workspace.column[k * m + j] = 2.0 * rise * turn * turn * u[k * m + j] - total
         for i in range(m):
             place, speed = u[k * m + i], speed_coefficient(u, k, i, m, T)
@@ -300,7 +306,7 @@ def _by_parameter(u, T, e):
 
 
 @helper
-def _beside(u, central, e, followed):
+def _by_differences(u, central, e, followed):
     """Fill ``column``, and the last columns of ``followed``, by differences.
 
     z is held, and so is the friction of elements that are followed one by one.
@@ -326,9 +332,9 @@ def _beside(u, central, e, followed):
                   workspace.J, workspace.widths)
         _add_friction(e)
         take_pushes(workspace.f, e)
-        balance(there, T, 1.0, e, workspace.beside)
+        balance(there, T, 1.0, e, workspace.perturbed)
         for k in range(n):
-            workspace.column[k] += sign * workspace.beside[k] / width
+            workspace.column[k] += sign * workspace.perturbed[k] / width
         if c > 0:
             _take_differences(T, e)
             batch_rates(workspace.t, workspace.y, e.contact, workspace.f_marched)
@@ -440,16 +446,16 @@ def _add_by_elements(u, T, central, e):
         _follow(there, take_parameter(there[n], e), False, e, workspace.friction[1 + side],
                 workspace.left)
     take_parameter(p, e)
-    change, pushed = workspace.node[0], workspace.along[:L]
+    change, force_harmonics = workspace.node[0], workspace.along[:L]
     for r in range(tangents * len(e.elements)):
         j, tangent = r // tangents, 2 * (r % tangents)
         above, below = workspace.friction[1, r], workspace.friction[2 if central else 0, r]
         for i in range(N):
             change[i] = (above[i] - below[i]) / width
-        project(e.projection, change, pushed)
+        project(e.projection, change, force_harmonics)
         for q in range(L):
             for i in range(m):
-                workspace.column[q * m + i] += rows[j, tangent, i] * pushed[q]
+                workspace.column[q * m + i] += rows[j, tangent, i] * force_harmonics[q]
 
 
 @routine
@@ -468,7 +474,7 @@ def condense(u, T, central, e):
     if e.numbers[STEADY] != 0.0:
         _by_parameter(u, T, e)
     else:
-        _beside(u, central, e, workspace.followed)
+        _by_differences(u, central, e, workspace.followed)
     if c > 0:
         _add_memory(T, e)
     elif len(e.elements) > 0:
@@ -490,9 +496,9 @@ def take_forces(p, e, forces):
     m, N = e.springs.shape[1], len(e.tau)
     if e.numbers[PLAIN] != 0.0:
         for j in range(m):
-            push = workspace.pushes[j]
+            forces = workspace.contact_forces[j]
             for n in range(N):
-                forces[n, j] = push[n] + e.given[0, n, j] + p * e.given[1, n, j]
+                forces[n, j] = forces[n] + e.given[0, n, j] + p * e.given[1, n, j]
             for i in range(m):
                 places, speeds = workspace.motion[i], workspace.motion[m + i]
                 stiffness, damping = linear[0, j, i], linear[1, j, i]

@@ -129,17 +129,17 @@ def _add_node(j, n, contact, change, far, s, f, A, widths, derivatives):
     if s.memory[j] == 0:
         _add_friction(j, contact, F, -1.0, s, friction, by_force)
         _add_friction(j, contact, new, 1.0 if new * far >= 0.0 else -1.0, s, friction, by_force)
-    pushes, by_change = np.empty(d), np.empty(d)
-    pushes[1], by_change[1] = dF, 1.0
+    node_force, by_change = np.empty(d), np.empty(d)
+    node_force[1], by_change[1] = dF, 1.0
     for k in range(d - 1):
         by_change[2 * k] = -by_force[1, k]
-        pushes[2 * k] = -friction[k, 0]
+        node_force[2 * k] = -friction[k, 0]
         if s.follows_surface:
             by_change[2 * k] -= contact.slope[k]
-            pushes[2 * k] -= contact.slope[k] * dF
+            node_force[2 * k] -= contact.slope[k] * dF
     for axis in range(d):
         for i in range(m):
-            f[m + i] += s.rows[j, axis, i] * pushes[axis]
+            f[m + i] += s.rows[j, axis, i] * node_force[axis]
             if derivatives:
                 widths[i, n] += s.rows[j, axis, i] * by_change[axis] * by_width
     if not derivatives:

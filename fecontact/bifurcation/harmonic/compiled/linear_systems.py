@@ -50,7 +50,7 @@ def choose_coupled(T, e):
     workspace = e.workspace
     most = int(math.sqrt(float(len(workspace.a)))) // e.values.shape[1]
     m, L, N = e.springs.shape[1], e.values.shape[1], len(e.tau)
-    linear, coupling, extent = workspace.linear, workspace.beside, workspace.extent
+    linear, coupling, extent = workspace.linear, workspace.perturbed, workspace.extent
     fastest = 2.0 * math.pi * (L // 2) / T
     for i in range(m):
         for j in range(2 * m):
@@ -137,12 +137,12 @@ def factorise_with(row, T, e):
     a[k, k] = row[n]
     if count < m:
         for i in range(n):
-            workspace.beside[i] = workspace.column[i]
-        _each_alone(T, e, workspace.beside)
+            workspace.perturbed[i] = workspace.column[i]
+        _each_alone(T, e, workspace.perturbed)
         for place in range(count, m):
             for q in range(L):
                 i = q * m + workspace.order[place]
-                a[k, k] -= row[i] * workspace.beside[i]
+                a[k, k] -= row[i] * workspace.perturbed[i]
     factorise(a, k + 1, workspace.pivots[: k + 1])
 
 
@@ -173,7 +173,7 @@ def _once(row, T, e, x):
     for place in range(count, m):
         for q in range(L):
             i = q * m + workspace.order[place]
-            x[i] -= workspace.beside[i] * x[n]
+            x[i] -= workspace.perturbed[i] * x[n]
 
 
 @helper

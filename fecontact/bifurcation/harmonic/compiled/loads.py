@@ -6,7 +6,7 @@ import numpy as np
 
 from fecontact.core.compiled import kernel
 from fecontact.core.records import Block, Vector
-from fecontact.system.kernels import given_at
+from fecontact.system.kernels import prescribed_at
 from fecontact.system.node_forces import axis_force, force_workspace, node_forces
 from fecontact.system.nodes import SystemArrays, memory_of, node_motion
 
@@ -33,7 +33,7 @@ def forces_at_rest(
         for k in range(len(flat)):
             flat[k] = base[k] + places[place] * slope[k]
         for c in range(N):
-            moved = given_at(tau[c] * periods[place], s, load)
+            moved = prescribed_at(tau[c] * periods[place], s, load)
             for i in range(m):
                 loads[place, c, i] = load[i]
             if place + 1 < P:

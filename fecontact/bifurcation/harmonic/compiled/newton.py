@@ -80,7 +80,7 @@ def _relies(size, scale, e):
 
 
 @routine
-def corrected(u, guess, row, weights, e):
+def newton(u, guess, row, weights, e):
     """Newton's method from u = guess at right angles to a row.
 
     Returns how often factors were made; zero where it fails, -1 where modes cannot be separated.
@@ -170,7 +170,7 @@ def solved(u, guess, row, weights, e):
 
 
 @routine
-def settled(u, row, weights, tolerance, e):
+def damped_newton(u, row, weights, tolerance, e):
     """The orbit near u at right angles to a row, with ``along`` there; 0 where it fails, else 1.
 
     Steps are shortened until the residual falls. u is overwritten.
@@ -251,9 +251,9 @@ def fold_between(u, tangent, there, leaving, row, weights, e, found):
         else:
             high = at
         left = abs(value * (at - x)) / abs(value - f) if value != f else 0.0
-        settled = left <= 0.5 * _LOCATED * way and abs(value) <= _FALLS * abs(f)
+        damped_newton = left <= 0.5 * _LOCATED * way and abs(value) <= _FALLS * abs(f)
         stuck = left <= _ROUNDED * way and abs(value) > _FALLS * abs(f)
-        if value == 0.0 or settled or stuck or high - low <= _LOCATED * way:
+        if value == 0.0 or damped_newton or stuck or high - low <= _LOCATED * way:
             return 1 if abs(value) <= _SMALL * largest else 0
     return 0
 

@@ -13,7 +13,7 @@ from fecontact.bifurcation.harmonic.compiled.linear_systems import (
     factorise_with,
     solve_with,
 )
-from fecontact.bifurcation.harmonic.compiled.newton import settled
+from fecontact.bifurcation.harmonic.compiled.newton import damped_newton
 from fecontact.core.compiled import kernel
 from fecontact.core.records import Matrix, Vector
 
@@ -36,7 +36,7 @@ def evaluate(
     else 1.
     """
     if wanted == ORBIT:
-        if settled(u, row, weights, e.numbers[TOLERANCE], e) == 0:
+        if damped_newton(u, row, weights, e.numbers[TOLERANCE], e) == 0:
             return 0
         for k in range(len(x)):
             x[k] = e.workspace.along[k]

@@ -28,9 +28,9 @@ from fecontact.bifurcation.harmonic.compiled.evaluation import take_forces, take
 from fecontact.bifurcation.harmonic.compiled.linear_systems import inner, length
 from fecontact.bifurcation.harmonic.compiled.newton import (
     bound_between,
-    corrected,
     fold_between,
     linearised,
+    newton,
 )
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Vector
@@ -98,12 +98,12 @@ def _keep(count, u, along, weights, sign, scales, way, e, out):
 @helper
 def _predict(u, tangent, bend, third, step, weights, guess):
     """Fill the guess a step ahead: along the cubic, or the tangent where that bends too much."""
-    aside = 0.0
+    curvature = 0.0
     for k in range(len(u)):
         off = step * step * (bend[k] + step * third[k])
         guess[k] = off
-        aside += weights[k] * off * off
-    kept = 1.0 if aside <= (_MOST_BENT * step) ** 2 else 0.0
+        curvature += weights[k] * off * off
+    kept = 1.0 if curvature <= (_MOST_BENT * step) ** 2 else 0.0
     for k in range(len(u)):
         guess[k] = u[k] + step * tangent[k] + kept * guess[k]
 
@@ -163,7 +163,7 @@ def steps(
             break
         for k in range(n + 1):
             there[k] = guess[k]
-        made = corrected(there, guess, row, weights, e)
+        made = newton(there, guess, row, weights, e)
         if made < 0:
             why[0] = COUPLED
             break

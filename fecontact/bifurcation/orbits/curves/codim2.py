@@ -17,15 +17,15 @@ from fecontact.bifurcation.linalg.bordered import Bordered
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, Intervals
 from fecontact.bifurcation.orbits.curves.codim2_forms import orbit_form
 from fecontact.bifurcation.orbits.curves.singularity import (
-    Bend,
     ContinuedSign,
+    SecondDerivatives,
     Singularity,
     along_parameter,
-    bends,
     gradient,
     of_doubling,
     of_fold,
     of_torus,
+    second_derivatives,
 )
 from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
 from fecontact.bifurcation.orbits.floquet import resting
@@ -135,7 +135,7 @@ class OrbitCurve(Problem):
         assert self.orbit.second is not None
         return {names[self.orbit.second]: float(u[-2]), names[self.orbit.free]: float(u[-1]),
                 **self.orbit.point_of(u, linearisation.orbit,
-                                      lambda _, side: linearisation.beside(side, tangent)),
+                                      lambda _, side: linearisation.orbit_change(side, tangent)),
                 "unstable": 0}
 
     def tests(
@@ -161,9 +161,9 @@ class OrbitCurve(Problem):
         at = linearisation.singularity
         expansion = Expansion(self.orbit, u, linearisation.orbit, at)
 
-        def coefficient(formula: Callable[[Sequence[Bend]], Share]) -> float:
+        def coefficient(formula: Callable[[Sequence[SecondDerivatives]], Share]) -> float:
             """A coefficient, by better derivatives than are known where it is small."""
-            value, size = formula(linearisation.bends)
+            value, size = formula(linearisation.second_derivatives)
             if abs(value) > _NEAR_ZERO * size and not self.has_kinks:
                 return value
             return expansion.coefficient(formula, _NORMAL_FORM_STEP)[0].value
@@ -205,8 +205,8 @@ class OrbitCurve(Problem):
         own = max(critical, key=lambda one: one.imag) if self.kind == "Neimark-Sacker" else 1.0
         if self.kind == "Neimark-Sacker" and kind in _PAIRS.values() and kind != _PAIRS[self.kind]:
             return 1.0, own
-        beside = linearisation.orbit.floquet.beside(*critical)
-        turning = beside[beside.imag > 0.0]
+        others = linearisation.orbit.floquet.noncritical(*critical)
+        turning = others[others.imag > 0.0]
         near = turning[np.argmin(np.abs(np.abs(turning) - 1.0))] if len(turning) else 1.0
         return own, complex(near)
 
@@ -266,12 +266,12 @@ class CurveLinearised:
             return _unit(len(self.u), -3) / self.problem.period
         if self.problem.kind != "Neimark-Sacker":
             self.problem.sign.keep(self.singularity.terms[0], self.problem.orbit.times)
-        return gradient(self.orbit, self.singularity.terms, self.bends)
+        return gradient(self.orbit, self.singularity.terms, self.second_derivatives)
 
     @cached_property
-    def bends(self) -> list[Bend]:
+    def second_derivatives(self) -> list[SecondDerivatives]:
         """Derivatives along the vectors of the test function."""
-        return bends(self.orbit, self.singularity.terms)
+        return second_derivatives(self.orbit, self.singularity.terms)
 
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs."""
@@ -279,7 +279,7 @@ class CurveLinearised:
             self._last = row, self.orbit.with_rows([self.gradient, row])
         return self._last[1].solve(rhs)
 
-    def beside(self, side: Array, tangent: Array) -> Array:
+    def orbit_change(self, side: Array, tangent: Array) -> Array:
         """Change (n,) of the orbit by a right-hand side, to the nearest one of the curve."""
         row = self.problem.weights() * tangent / (self.problem.weights() @ tangent**2)
         change = self.solve(row if self._last is None else self._last[0], side)

@@ -176,7 +176,7 @@ def _vector(vectors: Array, imag: Array, place: int) -> ComplexArray:
     return np.asarray(vectors[:, first] + side * vectors[:, first + 1], dtype=complex)
 
 
-class Bend(NamedTuple):
+class SecondDerivatives(NamedTuple):
     """First and second derivative of df/dx (N m, d, d) along a direction, first one of df/dp."""
 
     first: Array
@@ -184,7 +184,9 @@ class Bend(NamedTuple):
     shift: Array
 
 
-def bends(at: CollocationLinearisation, terms: tuple[Term, ...]) -> list[Bend]:
+def second_derivatives(
+    at: CollocationLinearisation, terms: tuple[Term, ...]
+) -> list[SecondDerivatives]:
     """Derivatives along the states of each term at the Gauss points."""
     span = np.maximum(at.problem.ranges, _LEAST_RANGE * at.problem.ranges.max())
     steps = [_STEP / max(float(np.abs(term.states / span).max()), 1e-300) for term in terms]
@@ -194,14 +196,14 @@ def bends(at: CollocationLinearisation, terms: tuple[Term, ...]) -> list[Bend]:
     for k, step in enumerate(steps):
         first, second = np.empty_like(here), np.empty_like(here)
         central(J[2 * k], J[2 * k + 1], here, step, first, second)
-        found.append(Bend(first, second, (P[2 * k] - P[2 * k + 1]) / (2.0 * step)))
+        found.append(SecondDerivatives(first, second, (P[2 * k] - P[2 * k + 1]) / (2.0 * step)))
     return found
 
 
 def gradient(
-    at: CollocationLinearisation, terms: tuple[Term, ...], bent: list[Bend]
+    at: CollocationLinearisation, terms: tuple[Term, ...], bent: list[SecondDerivatives]
 ) -> Array:
-    """Derivative (n,) of a test function to all unknowns, with the :func:`bends` of its terms."""
+    """Derivative (n,) of a test function to all unknowns, with its :func:`second_derivatives`."""
     problem, T = at.problem, at.period
     _, J, P = at.derivatives
     points, out = np.zeros(J.shape[:2]), np.zeros(len(at.u))

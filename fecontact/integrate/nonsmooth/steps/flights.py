@@ -51,7 +51,7 @@ def _acceleration_size(j, p, progress, workspace):
     s, Y = p.system, progress.state
     m, total = s.rows.shape[2], 0.0
     for i in range(m):
-        size = force_size(i, Y, workspace.pushes, s) + abs(workspace.slopes[0, m + i])
+        size = force_size(i, Y, workspace.applied_forces, s) + abs(workspace.slopes[0, m + i])
         total += abs(s.rows[j, 1, i]) * size
     return total
 
@@ -63,22 +63,23 @@ def _rise(j, step, p, progress, workspace):
     Coefficients of its rate go into ``workspace.along``. Returns the rounding of the height at the
     end.
     """
-    row, pull, c, h = p.system.rows[j, 1], workspace.pull, workspace.nested, step.h
+    row, c, h = p.system.rows[j, 1], workspace.nested, step.h
+    node_acceleration = workspace.node_acceleration
     rate, heights, m = workspace.along, workspace.heights, p.rows.shape[1]
     for k in range(SLOPES):
-        pull[k] = 0.0
+        node_acceleration[k] = 0.0
         for i in range(m):
-            pull[k] += row[i] * workspace.slopes[k, m + i]
+            node_acceleration[k] += row[i] * workspace.slopes[k, m + i]
     change = 0.0
     for k in range(STAGES):
-        change += h * B[k] * pull[k]
+        change += h * B[k] * node_acceleration[k]
     c[0], c[1] = workspace.flights[j, CLIMB], change
-    c[2] = h * pull[0] - change
-    c[3] = 2.0 * change - h * (pull[STAGES] + pull[0])
+    c[2] = h * node_acceleration[0] - change
+    c[3] = 2.0 * change - h * (node_acceleration[STAGES] + node_acceleration[0])
     for q in range(len(DENSE)):
         c[4 + q] = 0.0
         for k in range(SLOPES):
-            c[4 + q] += h * DENSE[q, k] * pull[k]
+            c[4 + q] += h * DENSE[q, k] * node_acceleration[k]
     from_nested(c, rate)
     heights[0] = workspace.flights[j, HEIGHT]
     for k in range(PARTS + 1):

@@ -49,11 +49,11 @@ def floor_of(system: ContactSystem, state: Array, times: Array, longest: float) 
                 depth / longest)
     # Velocities that drive and loads bring about in each mode, within a step where it is slow.
     springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes
-    pushes = [(springs, [motion.largest for motion in drive.motions[: len(springs)]]),
+    applied_forces = [(springs, [motion.largest for motion in drive.motions[: len(springs)]]),
               (arrays.load_shapes, [signal.largest for signal in system.load.signals.values()])]
-    push = sum(np.array(sizes) @ np.abs(shapes) for shapes, sizes in pushes)
+    applied = sum(np.array(sizes) @ np.abs(shapes) for shapes, sizes in applied_forces)
     slowest = np.maximum(np.diag(arrays.stiffness), 1.0 / longest**2)
-    driven = push / np.sqrt(slowest)
+    driven = applied / np.sqrt(slowest)
     energy = (0.5 * state[m : 2 * m] @ state[m : 2 * m]
               + 0.5 * abs(state[:m] @ system.arrays.stiffness @ state[:m])
               + work_of_loads(system.basis, system.load, depth)

@@ -15,7 +15,12 @@ from fecontact.integrate.nonsmooth.equations import (
     share_friction,
 )
 from fecontact.laws.signatures import signal_at
-from fecontact.system.kernels import add_loads, add_pull, body_acceleration, set_constant_load
+from fecontact.system.kernels import (
+    add_drive_force,
+    add_loads,
+    body_acceleration,
+    set_constant_load,
+)
 from fecontact.system.nodes import GroundMotion, ground_motion
 from fecontact.system.powers import DASHPOTS, DRIVE, LOAD, POWER_COUNT, matrix_powers
 
@@ -32,7 +37,7 @@ def nothing_given() -> np.ndarray:
 
 @helper
 def set_prescribed(t, s, workspace):
-    """Fill ``workspace.given``, and ``loads``, ``pushes`` (m,): modal forces of loads, of all."""
+    """Fill ``workspace.given``, ``loads``, and ``applied_forces`` (m,), with those of the drive."""
     given = workspace.given
     if given[WHEN] == t:
         return
@@ -41,13 +46,13 @@ def set_prescribed(t, s, workspace):
     set_constant_load(s, workspace.loads)
     add_loads(t, s, workspace.loads)
     for i in range(len(workspace.loads)):
-        workspace.pushes[i] = workspace.loads[i]
+        workspace.applied_forces[i] = workspace.loads[i]
     for axis in range(len(s.drive)):
         stiffness, damping = s.drive_stiffness[axis], s.drive_damping[axis]
         if stiffness != 0.0 or damping != 0.0:
             value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
             given[MOTION + 2 * axis], given[MOTION + 2 * axis + 1] = value, rate
-            add_pull(stiffness * value + damping * rate, axis, s, workspace.pushes)
+            add_drive_force(stiffness * value + damping * rate, axis, s, workspace.applied_forces)
 
 
 @helper
@@ -65,7 +70,7 @@ def set_rates(t, Y, p, progress, w, workspace, out):
     acceleration = out[m : 2 * m]
     for i in range(m):
         out[i] = Y[m + i]
-    body_acceleration(workspace.pushes, Y, s, acceleration)
+    body_acceleration(workspace.applied_forces, Y, s, acceleration)
     add_contact_forces(t, Y, _moved(workspace.given), p, progress.status, progress.closed, w,
                        acceleration)
 

@@ -68,10 +68,10 @@ def contact_maps(
     for plan in plans:
         nodes = plan.face.nodes
         arrows = plan.directions(friction[:, nodes])
-        rubs = bool(arrows.any())
-        rows.append(_Row(f"pressure\nand friction\nup to {most}" if rubs else "pressure", plan,
-                         pressure[:, nodes], PRESSURE_MAP, float(pressure.max()), "Pa",
-                         arrows if rubs else None))
+        has_friction = bool(arrows.any())
+        title = f"pressure\nand friction\nup to {most}" if has_friction else "pressure"
+        rows.append(_Row(title, plan, pressure[:, nodes], PRESSURE_MAP, float(pressure.max()), "Pa",
+                         arrows if has_friction else None))
         rows.append(_Row("state", plan, code[:, nodes], shades, len(states) - 1.0))
         if depth is not None:
             rows.append(_Row("worn depth", plan, depth[:, nodes], WEAR_MAP, float(depth.max()),

@@ -8,8 +8,8 @@ another one computes, so that results do not depend on which runs are side by si
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
-from fecontact.core.lanes.functions import reciprocal_fifth_root
-from fecontact.core.lanes.vectors import (
+from fecontact.core.simd.functions import reciprocal_fifth_root
+from fecontact.core.simd.vectors import (
     WIDTH,
     bits,
     chosen,
@@ -19,8 +19,13 @@ from fecontact.core.lanes.vectors import (
     spread,
     write,
 )
-from fecontact.integrate.lanes import arrays, checks, equations, stages
-from fecontact.integrate.lanes.arrays import (
+from fecontact.integrate.polynomial_bounds import needs_search
+from fecontact.integrate.rodas5p import state as run_arrays
+from fecontact.integrate.rodas5p.driver import SWITCH_PART as _SWITCH_PART
+from fecontact.integrate.rodas5p.missed_contacts import first_missed_at
+from fecontact.integrate.rodas5p.state import Step
+from fecontact.integrate.simd import arrays, checks, equations, stages
+from fecontact.integrate.simd.arrays import (
     AGAIN,
     ATTEMPTS,
     CAUTIOUS,
@@ -40,11 +45,6 @@ from fecontact.integrate.lanes.arrays import (
     TIME,
     WAITING,
 )
-from fecontact.integrate.polynomial_bounds import needs_search
-from fecontact.integrate.rodas5p import state as run_arrays
-from fecontact.integrate.rodas5p.driver import SWITCH_PART as _SWITCH_PART
-from fecontact.integrate.rodas5p.missed_contacts import first_missed_at
-from fecontact.integrate.rodas5p.state import Step
 from fecontact.integrate.small_systems import FEW, Sized
 from fecontact.integrate.step_loop import FINISHED, MINIMUM_STEP, NOT_FINITE
 from fecontact.integrate.step_polynomials import QUICKEST, set_polynomials
@@ -153,7 +153,7 @@ def _go_to_end(where, progress, w):
 
 
 @helper
-def _aim(t, b):
+def _next_target(t, b):
     """End of the step to try, and the length of the step before, which failed, or zero."""
     progress, numbers = b.progress, b.progress.numbers
     h, stop = read(numbers[STEP]), read(numbers[END])
@@ -277,7 +277,7 @@ def _attempt(active, b, runs, problem, progress, workspace):
     numbers = mine.numbers
     t = read(numbers[TIME])
     checks.note_extremes(control, mine)
-    target, caution = _aim(t, b)
+    target, caution = _next_target(t, b)
     h = target - t
     speed, switched = stages.step(t, h, target, s, mine, w)
     equations.set_rate_and_forces(w.after, speed, s, w.load, w.places, w.speeds, w.forces, w.base)

@@ -7,7 +7,7 @@ for 48. What is left in place of a matrix is the same; arrays have a last axis o
 """
 
 from fecontact.core.compiled import helper
-from fecontact.core.lanes.vectors import WIDTH, magnitude, read, spread, where_larger, write
+from fecontact.core.simd.vectors import WIDTH, magnitude, read, spread, where_larger, write
 
 
 @helper
@@ -41,7 +41,7 @@ def _with_pivot(a, k, order, workspace):
 
 
 @helper
-def eliminate_lanes(a, count, order, workspace):
+def eliminate_simd(a, count, order, workspace):
     """Eliminate the first columns of a (rows, columns, 8); ``order`` (rows, 8) is filled.
 
     ``order`` says which row came to each place; ``workspace`` (8,) is overwritten. Four columns are
@@ -87,7 +87,7 @@ def eliminate_lanes(a, count, order, workspace):
 
 
 @helper
-def reduce_row_lanes(a, count, row, weights):
+def reduce_row_simd(a, count, row, weights):
     """Eliminate the first entries of a further row (columns, 8)."""
     columns = len(row)
     for k in range(count):
@@ -98,7 +98,7 @@ def reduce_row_lanes(a, count, row, weights):
 
 
 @helper
-def forward_lanes(a, count, r):
+def forward_simd(a, count, r):
     """Reduce a right side r (rows, 8) whose rows are in their ``order`` already."""
     rows = len(r)
     for k in range(count):
@@ -109,7 +109,7 @@ def forward_lanes(a, count, r):
 
 @helper
 def forward_lanes_transposed(a, count, r):
-    """The transpose of :func:`forward_lanes`."""
+    """The transpose of :func:`forward_simd`."""
     rows = len(r)
     for k in range(count - 1, -1, -1):
         total = read(r[k])
@@ -119,7 +119,7 @@ def forward_lanes_transposed(a, count, r):
 
 
 @helper
-def back_lanes(a, count, r, known):
+def back_simd(a, count, r, known):
     """Back-substitution of r (count, 8): fill known[:count] (.., 8) from its other entries."""
     width = len(known)
     for i in range(count):

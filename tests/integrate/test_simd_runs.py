@@ -20,10 +20,10 @@ from fecontact import (
     simulate,
 )
 from fecontact.integrate import Rodas5P, Scipy
-from fecontact.integrate.lanes import driver as lane_driver
-from fecontact.integrate.lanes.driver import SideBySide, kind_of, side_by_side
-from fecontact.integrate.lanes.step_loop import SMALL
 from fecontact.integrate.rodas5p import driver
+from fecontact.integrate.simd import driver as lane_driver
+from fecontact.integrate.simd.driver import SideBySide, kind_of, side_by_side
+from fecontact.integrate.simd.step_loop import SMALL
 from fecontact.laws import (
     ConstantFriction,
     DahlFriction,
@@ -209,7 +209,7 @@ def test_a_run_that_was_left_goes_on_bit_for_bit(monkeypatch):
     assert (found.states == wanted.states).all()
 
 
-def test_lanes_are_at_work():
+def test_simd_runs_are_at_work():
     """Runs of very different lengths: a lane that is done takes the next run at once."""
     times = np.linspace(0.0, 1.0, 2) * np.linspace(0.2, 2.0, 240)[::-1, None]
     one = SideBySide(kind_of(slider(), 0.0, 2.0), list(range(240)), [slider()] * 240,

@@ -113,7 +113,7 @@ _LONG = replace(_SEARCH, stop_at=(), largest_step=0.1, points=200)
 _INTERVALS = 40
 
 
-def torus_beside(field: VectorField, point: BranchPoint, parameter: str) -> BranchPoint:
+def nearby_torus(field: VectorField, point: BranchPoint, parameter: str) -> BranchPoint:
     """A Neimark-Sacker point of the orbits with the frequency of a zero-Hopf or double Hopf point.
 
     Near a double Hopf point, with r1' = r1 (m1 + p11 r1^2 + p12 r2^2) and likewise r2, the orbits
@@ -135,13 +135,13 @@ def torus_beside(field: VectorField, point: BranchPoint, parameter: str) -> Bran
                   "start from their Neimark-Sacker point.")
 
 
-def homoclinic_beside(field: VectorField, point: BranchPoint, parameter: str) -> BranchPoint:
+def nearby_homoclinic(field: VectorField, point: BranchPoint, parameter: str) -> BranchPoint:
     """An orbit next to a homoclinic one, beside a Bogdanov-Takens point.
 
     Raises
     ------
     InputError
-        As :func:`torus_beside`.
+        As :func:`nearby_torus`.
     AnalysisError
         If none is found.
     """
@@ -304,9 +304,9 @@ _Found = Callable[[VectorField, BranchPoint, str], BranchPoint]
 # first of a point is that which is followed without being named, where no curve of equilibria is.
 BEGIN: Mapping[str, Mapping[str, _Found]] = {
     "Bautin": {"fold": fold_at_bautin},
-    "zero-Hopf": {"Neimark-Sacker": torus_beside},
-    "double Hopf": {"Neimark-Sacker": torus_beside},
-    "Bogdanov-Takens": {"homoclinic": homoclinic_beside},
+    "zero-Hopf": {"Neimark-Sacker": nearby_torus},
+    "double Hopf": {"Neimark-Sacker": nearby_torus},
+    "Bogdanov-Takens": {"homoclinic": nearby_homoclinic},
     "generalised period doubling": {
         "fold": lambda field, point, parameter: of_doubled(field, point, parameter, "fold")},
     "resonance 1:1": {

@@ -8,7 +8,7 @@ Checks and their limits are as in :mod:`fecontact.integrate.rodas5p.error_contro
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.lanes.vectors import (
+from fecontact.core.simd.vectors import (
     chosen,
     magnitude,
     mask_of,
@@ -18,7 +18,9 @@ from fecontact.core.lanes.vectors import (
     spread,
     write,
 )
-from fecontact.integrate.lanes.arrays import (
+from fecontact.integrate.rodas5p.driver import SLIP_PART as _SLIP_PART
+from fecontact.integrate.rodas5p.tableau import STAGES
+from fecontact.integrate.simd.arrays import (
     BY_PLACE,
     BY_RATE,
     FORCE,
@@ -27,8 +29,6 @@ from fecontact.integrate.lanes.arrays import (
     RTOL,
     SPEED_SCALE,
 )
-from fecontact.integrate.rodas5p.driver import SLIP_PART as _SLIP_PART
-from fecontact.integrate.rodas5p.tableau import STAGES
 
 
 @helper

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fecontact.core.compiled import kernel
-from fecontact.core.lanes import functions
-from fecontact.core.lanes.vectors import bits, chosen, mask_of, read, write
 from fecontact.core.records import Block, Matrix
+from fecontact.core.simd import functions
+from fecontact.core.simd.vectors import bits, chosen, mask_of, read, write
 
 
 @kernel

@@ -100,7 +100,7 @@ def _near_kinks(j, level, h, e):
 
 @routine
 def _add_polynomial(derivatives, e):
-    """Add polynomial forces to ``pushes`` (m, N), and their derivatives to ``rows``."""
+    """Add polynomial forces to ``contact_forces`` (m, N), and their derivatives to ``rows``."""
     workspace, s = e.workspace, e.contact
     m, N = e.springs.shape[1], len(e.tau)
     x, force = np.empty(m), np.empty(m)
@@ -118,22 +118,22 @@ def _add_polynomial(derivatives, e):
                 for k in range(m):
                     workspace.rows[i * m + k, n] += stiffness[i, k]
         for i in range(m):
-            workspace.pushes[i, n] += force[i]
+            workspace.contact_forces[i, n] += force[i]
 
 
 @routine
-def plain_forces(derivatives, h, e):
-    """Fill ``pushes`` (m, N) from ``motion``, and the ``rows`` of their derivatives if asked for.
+def memoryless_forces(derivatives, h, e):
+    """Fill ``contact_forces`` (m, N) from ``motion``, and ``rows`` of derivatives if asked for.
 
     Row (part m + i) m + k of these is that of force i to displacement (part 0) or velocity k.
     h [s] is the distance of samples.
     """
     workspace, s = e.workspace, e.contact
     m, N = e.springs.shape[1], len(e.tau)
-    pushes, rows, node = workspace.pushes, workspace.rows, workspace.node
+    contact_forces, rows, node = workspace.contact_forces, workspace.rows, workspace.node
     for i in range(m):
         for n in range(N):
-            pushes[i, n] = 0.0
+            contact_forces[i, n] = 0.0
     if derivatives:
         for i in range(m):
             for n in range(N):
@@ -148,9 +148,9 @@ def plain_forces(derivatives, h, e):
         level = -s.gap[j]
         if s.on_ground[j]:
             level += ground_at(s.profile)(s.places[j, 0], s.profile_parameters)[0]
-        rubs = False
+        has_friction = False
         for i in range(m):
-            rubs = rubs or s.rows[j, 0, i] != 0.0
+            has_friction = has_friction or s.rows[j, 0, i] != 0.0
         # Derivatives of the normal force to height and rate, of friction to slip and normal force.
         for n in range(N):
             F, F_u, F_v = normal_force(j, level - node[0, n], -node[1, n], s)
@@ -159,7 +159,7 @@ def plain_forces(derivatives, h, e):
             node[3, n], node[4, n], node[5, n] = F, -F_u, -F_v
         if len(e.onsets) > 0:
             _near_kinks(j, level, h, e)
-        if rubs:
+        if has_friction:
             for n in range(N):
                 F, R, R_v, R_F = node[3, n], 0.0, 0.0, 0.0
                 if F != 0.0:
@@ -170,22 +170,23 @@ def plain_forces(derivatives, h, e):
         for i in range(m):
             tx, ty = s.rows[j, 0, i], s.rows[j, 1, i]
             for n in range(N):
-                pushes[i, n] += ty * node[3, n]
-            if rubs:
+                contact_forces[i, n] += ty * node[3, n]
+            if has_friction:
                 for n in range(N):
-                    pushes[i, n] -= tx * node[0, n]
+                    contact_forces[i, n] -= tx * node[0, n]
             if not derivatives:
                 continue
             if len(e.onsets) > 0:
                 for n in range(N):
-                    workspace.widths[i, n] += (ty - tx * (node[7, n] if rubs else 0.0)) * node[8, n]
+                    ratio = node[7, n] if has_friction else 0.0
+                    workspace.widths[i, n] += (ty - tx * ratio) * node[8, n]
             for k in range(m):
                 by, sx = s.rows[j, 1, k], tx * s.rows[j, 0, k]
                 q, v = rows[i * m + k], rows[(m + i) * m + k]
                 for n in range(N):
                     q[n] += ty * by * node[4, n]
                     v[n] += ty * by * node[5, n]
-                if rubs:
+                if has_friction:
                     for n in range(N):
                         q[n] -= tx * by * node[7, n] * node[4, n]
                         v[n] -= tx * by * node[7, n] * node[5, n] + sx * node[6, n]

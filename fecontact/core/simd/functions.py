@@ -24,7 +24,7 @@ from numba.core.typeconv.rules import default_type_manager
 from numba.extending import intrinsic, lower_cast, overload, register_model
 
 from fecontact.core.compiled import helper
-from fecontact.core.lanes.vectors import (
+from fecontact.core.simd.vectors import (
     _VECTOR,
     WIDTH,
     _spread,

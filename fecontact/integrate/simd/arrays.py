@@ -9,13 +9,13 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from fecontact.core.lanes.vectors import WIDTH
 from fecontact.core.records import (
     ANY,
     IntegerVector,
     Matrix,
     allocate,
 )
+from fecontact.core.simd.vectors import WIDTH
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p import tableau
 from fecontact.system.nodes import MODES, NODES
@@ -147,7 +147,7 @@ class LaneWorkspace(NamedTuple):
     by_speed: Annotated[Array, MODES, MODES, WIDTH]
     work: Annotated[Array, MODES, MODES, WIDTH]
     inverse: Annotated[Array, MODES, MODES, WIDTH]
-    answers: Annotated[Array, MODES, MODES, WIDTH]
+    stiffness_inverse: Annotated[Array, MODES, MODES, WIDTH]
     stage: Annotated[Array, 2 * MODES, WIDTH]
     right: Annotated[Array, 2 * MODES, WIDTH]
     after: Annotated[Array, 2 * MODES, WIDTH]

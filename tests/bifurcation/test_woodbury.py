@@ -13,8 +13,8 @@ from fecontact.bifurcation import (
     frequency_response,
 )
 from fecontact.bifurcation.harmonic import balance
-from fecontact.bifurcation.harmonic.few_contacts import Factors, FewContacts, contact_directions
 from fecontact.bifurcation.harmonic.starts import problem_for
+from fecontact.bifurcation.harmonic.woodbury import Factors, WoodburySolver, contact_directions
 from fecontact.laws import JenkinsFriction, RoughSurface
 
 
@@ -40,8 +40,8 @@ def test_systems_of_few_contact_displacements_are_those_of_all():
     assert directions.shape == (24, 4)
     square = np.vstack([here.condensed, row])
     rhs = np.append(here.residual, 1.0)
-    found = FewContacts.of(square, directions)
-    assert isinstance(found, FewContacts)
+    found = WoodburySolver.of(square, directions)
+    assert isinstance(found, WoodburySolver)
     assert len(found.core[0]) == 19 * 4 + 2
     exact = np.linalg.solve(square, rhs)
     for solution in (found.solve(rhs), here.solve(row, rhs), Factors.of(square).solve(rhs)):

@@ -5,10 +5,10 @@ size of the modes as in :mod:`fecontact.integrate.rodas5p.stage_solver`.
 """
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.lanes.vectors import chosen, magnitude, mask_of, read, spread, write
-from fecontact.integrate.lanes import equations
+from fecontact.core.simd.vectors import chosen, magnitude, mask_of, read, spread, write
 from fecontact.integrate.rodas5p.error_control import DEFECT_POINTS, DEFECT_WEIGHTS
 from fecontact.integrate.rodas5p.tableau import DENSE, GAMMA, NODES, STAGES, TIME, A, C
+from fecontact.integrate.simd import equations
 
 
 @routine
@@ -48,9 +48,9 @@ def _set_inverse(work, inverse):
 
 @helper
 def _set_solver(G, w):
-    """Fill ``w.inverse`` with G (G^2 - G Jv - Jq)^-1 and ``w.answers`` with that matrix times Jq.
+    """Fill ``w.inverse`` with A = G (G^2 - G Jv - Jq)^-1, ``w.stiffness_inverse`` with A Jq.
 
-    With them u_v = inverse r_v + answers r_q solves a stage.
+    With them u_v = inverse r_v + stiffness_inverse r_q solves a stage.
     """
     m = len(w.work)
     for i in range(m):
@@ -63,7 +63,7 @@ def _set_solver(G, w):
             total = spread(0.0)
             for c in range(m):
                 total += read(w.inverse[i, c]) * read(w.by_place[c, k])
-            write(w.answers[i, k], total)
+            write(w.stiffness_inverse[i, k], total)
     for i in range(m):
         for k in range(m):
             write(w.inverse[i, k], G * read(w.inverse[i, k]))
@@ -80,7 +80,7 @@ def _solve(i, h_part, per_G, w):
         total = spread(0.0)
         for k in range(m):
             total += (read(w.inverse[row, k]) * read(w.right[m + k])
-                      + read(w.answers[row, k]) * read(w.right[k]))
+                      + read(w.stiffness_inverse[row, k]) * read(w.right[k]))
         write(u[m + row], total)
         write(u[row], (read(w.right[row]) + total) * per_G)
 

@@ -75,7 +75,7 @@ class Factors:
 
 
 @dataclass(frozen=True, eq=False)
-class FewContacts:
+class WoodburySolver:
     """Factors by Woodbury's formula, for the columns Q (m, r) of contact displacements.
 
     ``blocks`` are factors of D but for its last entry, one; ``left`` (n + 1, c) is X, ``right``
@@ -89,7 +89,7 @@ class FewContacts:
     core: tuple[Any, Any]
 
     @classmethod
-    def of(cls, square: Array, directions: Array) -> "FewContacts | Factors | None":
+    def of(cls, square: Array, directions: Array) -> "WoodburySolver | Factors | None":
         """None for a singular matrix; factors of all where a harmonic alone is singular."""
         m, r = directions.shape
         n = len(square) - 1

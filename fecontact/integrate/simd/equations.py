@@ -5,7 +5,7 @@ has no memory.
 """
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.lanes.vectors import (
+from fecontact.core.simd.vectors import (
     bits,
     chosen,
     magnitude,
@@ -14,7 +14,7 @@ from fecontact.core.lanes.vectors import (
     spread,
     write,
 )
-from fecontact.integrate.lanes.arrays import BY_FORCE, BY_PLACE, BY_RATE, BY_SLIP, FORCE
+from fecontact.integrate.simd.arrays import BY_FORCE, BY_PLACE, BY_RATE, BY_SLIP, FORCE
 from fecontact.laws.simd import node_lanes_at, signal_lanes_at
 
 
@@ -79,7 +79,7 @@ def _accelerate(y, s, load, rate):
 
 
 @helper
-def _push(j, F, R, s, rate):
+def _add_node_force(j, F, R, s, rate):
     """Add the forces of node j."""
     m = s.rows.shape[2]
     for i in range(m):
@@ -99,7 +99,7 @@ def set_rate(y, speed, s, load, places, speeds, forces, rate):
                                        -read(speeds[n + j]), s.normal_parameters[j])[0]
         R = node_lanes_at(s.friction[j])(slip, magnitude(F), s.friction_parameters[j])[0]
         write(forces[j, FORCE], F)
-        _push(j, F, R, s, rate)
+        _add_node_force(j, F, R, s, rate)
 
 
 @routine
@@ -120,7 +120,7 @@ def set_rate_and_forces(y, speed, s, load, places, speeds, forces, rate):
         write(forces[j, BY_RATE], by_rate)
         write(forces[j, BY_SLIP], chosen(closed, by_slip, 0.0))
         write(forces[j, BY_FORCE], chosen(F >= 0.0, by_force, -by_force))
-        _push(j, F, R, s, rate)
+        _add_node_force(j, F, R, s, rate)
 
 
 @helper
@@ -172,11 +172,11 @@ def set_time_rate(t, later, speed, s, forces, out):
         if s.drive[axis] != 0:
             damping = read(s.drive_damping[axis])
             rate = signal_lanes_at(s.drive[axis])(t, s.drive_parameters[axis])[1]
-            pull = read(s.drive_stiffness[axis]) * rate
+            drive_force = read(s.drive_stiffness[axis]) * rate
             if bits(magnitude(damping) > 0.0) != 0:
                 rise = signal_lanes_at(s.drive[axis])(later, s.drive_parameters[axis])[1] - rate
-                pull += damping * rise * per_time
-            add_load(pull, s.drive_shapes[axis], out)
+                drive_force += damping * rise * per_time
+            add_load(drive_force, s.drive_shapes[axis], out)
     for k in range(len(s.load)):
         add_load(signal_lanes_at(s.load[k])(t, s.load_parameters[k])[1], s.load_shapes[k], out)
     if s.steady != 0:

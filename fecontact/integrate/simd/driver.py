@@ -10,8 +10,12 @@ import numpy as np
 
 from fecontact.core.checks import require_state
 from fecontact.core.types import Array, Integers
-from fecontact.integrate.lanes import arrays, step_loop
-from fecontact.integrate.lanes.arrays import (
+from fecontact.integrate.rodas5p.blocks import one_block
+from fecontact.integrate.rodas5p.driver import control_for, start
+from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Workspace
+from fecontact.integrate.series.branches import series_pay
+from fecontact.integrate.simd import arrays, step_loop
+from fecontact.integrate.simd.arrays import (
     ATTEMPTS,
     OPEN,
     TAKEN,
@@ -20,10 +24,6 @@ from fecontact.integrate.lanes.arrays import (
     Lanes,
     lanes_for,
 )
-from fecontact.integrate.rodas5p.blocks import one_block
-from fecontact.integrate.rodas5p.driver import control_for, start
-from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Workspace
-from fecontact.integrate.series.branches import series_pay
 from fecontact.integrate.small_systems import FEW
 from fecontact.integrate.step_loop import FINISHED, RUNNING
 from fecontact.integrate.step_polynomials import QUICKEST
