@@ -496,9 +496,9 @@ def take_forces(p, e, forces):
     m, N = e.springs.shape[1], len(e.tau)
     if e.numbers[PLAIN] != 0.0:
         for j in range(m):
-            forces = workspace.contact_forces[j]
+            found = workspace.contact_forces[j]
             for n in range(N):
-                forces[n, j] = forces[n] + e.given[0, n, j] + p * e.given[1, n, j]
+                forces[n, j] = found[n] + e.given[0, n, j] + p * e.given[1, n, j]
             for i in range(m):
                 places, speeds = workspace.motion[i], workspace.motion[m + i]
                 stiffness, damping = linear[0, j, i], linear[1, j, i]
