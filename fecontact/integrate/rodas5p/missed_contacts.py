@@ -109,7 +109,7 @@ def _normal_force(place, polynomial, height):
         height[i] = polynomial.coefficients[i, n + polynomial.node]
     gap = StepPolynomial(GAP, polynomial.node, 0.0, polynomial.step, s, polynomial.bounds,
                          polynomial.coefficients, polynomial.row)
-    return abs(_normal_force(polynomial.node, -at(place, height, gap), 0.0, s))
+    return abs(_law_force(polynomial.node, -at(place, height, gap), 0.0, s))
 
 
 def _first_missed(step, again, problem, progress, workspace):
