@@ -57,7 +57,7 @@ def test_the_page_has_the_same_values_in_its_units():
         assert 1e-6 * 10.0**x == pytest.approx(curve.x, rel=1e-5)
         assert table["factor"] * y == pytest.approx(curve.y, abs=1e-5 * curve.y.max())
     assert [line["name"] for line in table["lines"]] == ["force one", "force two"]
-    assert (stored_array(table["lines"][0]["stable"], contents) == STABLE).all()
+    assert (stored_array(table["lines"][0]["solid"], contents) == STABLE).all()
     (x, y, letters), = table["marks"]
     assert (1e-6 * 10.0**x, y, letters) == (
         pytest.approx(X[25]), pytest.approx(3e4 * X[25] ** 0.5), "F")
@@ -90,3 +90,19 @@ def test_round_off_about_a_constant_is_not_magnified():
     ("ratio", 5.0, (1.0, "ratio")), ("gap [m]", np.nan, (1.0, "gap [m]"))])
 def test_units_suit_the_values(label, largest, expected):
     assert in_unit(label, np.array([0.0, largest])) == expected
+
+
+def test_dashed_lines_say_nothing_of_stability():
+    curves = Curve("whole", "#0072b2", X, X), Curve("thin", "", X, X, dashed=True)
+    diagram = Diagram("x", "y", curves)
+    with new_figure(5.0, 4.0) as figure:
+        axes = figure.subplots()
+        draw(axes, diagram)
+        assert [line.is_dashed() for line in axes.lines] == [False, True]
+    entries = legend_entries([diagram])
+    assert [(one.get_label(), one.is_dashed()) for one in entries] == [
+        ("whole", False), ("thin", True)]
+    header, contents = table_of(diagram)
+    whole, thin = header["one"]["lines"]
+    assert "solid" not in whole
+    assert not stored_array(thin["solid"], contents).any()

@@ -31,7 +31,9 @@ class Curve:
     marker : float
         Diameter of a marker at each point [points]; zero for none.
     stable : (N - 1,) bool array or None
-        False for pieces between neighbours that are drawn dashed and thin.
+        False for pieces between neighbours that are unstable: drawn dashed and thin.
+    dashed : bool
+        Whether the whole line is dashed and thin, whatever its stability.
     bars : (N,) array or None
         Half the length of a bar of uncertainty at each point.
     """
@@ -43,7 +45,18 @@ class Curve:
     width: float = WIDTH
     marker: float = 0.0
     stable: NDArray[np.bool_] | None = None
+    dashed: bool = False
     bars: Array | None = None
+
+    @property
+    def solid(self) -> NDArray[np.bool_] | None:
+        """Which pieces (N - 1,) between neighbours are solid lines; None if all are."""
+        return np.zeros(len(self.x) - 1, dtype=np.bool_) if self.dashed else self.stable
+
+    @property
+    def partly_unstable(self) -> bool:
+        """Whether any piece is unstable."""
+        return self.stable is not None and not self.stable.all()
 
 
 @dataclass(frozen=True)

@@ -110,7 +110,7 @@ def forces_on_body_diagram(run: Trajectory, width: float = WIDTH) -> Diagram:
             curves.append(Curve(
                 f"{face.name}: friction", colour, run.time,
                 np.linalg.norm(total, axis=1) if space else total[:, 0], width,
-                stable=np.zeros(len(run.time) - 1, dtype=bool)))
+                dashed=True))
     return _over_time(run, "total [N]", tuple(curves))
 
 

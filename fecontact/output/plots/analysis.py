@@ -348,7 +348,7 @@ def plot_receptance(
         # The first is the widest: others on top do not hide it.
         shown: dict[str, Any] = {
             "width": 3.0 if many and number == 0 else WIDTH,
-            "stable": None if curve.of.stable else np.zeros(len(curve.values) - 1, dtype=bool)}
+            "dashed": not curve.of.stable}
         # From the lower end of the axis on: what follows a force at 180 degrees does not leap.
         degrees = (np.degrees(np.angle(curve.values)) + 190.0) % 360.0 - 190.0
         upper_curves.append(Curve(name, colour, curve.of.frequency_hz, np.abs(curve.values),

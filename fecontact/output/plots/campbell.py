@@ -52,7 +52,7 @@ def plot_campbell(
     for order in orders:
         critical = diagram.critical_speeds(order)
         curves += [Curve("", COLOURS[6], speeds, order * speeds / (2.0 * np.pi), 0.9,
-                         stable=np.zeros(len(speeds) - 1, dtype=bool)),
+                         dashed=True),
                    Curve("", INK, critical, order * critical / (2.0 * np.pi), 0.0, 4.0)]
     shown = Diagram("speed [rad/s]", "frequency [Hz]", tuple(curves),
                     x_limits=(speeds[0], speeds[-1]), y_limits=(0.0, top))

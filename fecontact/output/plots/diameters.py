@@ -53,7 +53,7 @@ def plot_diameters(
         folded = np.abs((orders + N // 2) % N - N // 2)
         curves.append(Curve(f"engine orders at {speed:g} rad/s", COLOURS[6], folded,
                             np.asarray(orders * speed / (2.0 * np.pi)), 0.9, 2.0,
-                            stable=np.zeros(len(orders) - 1, dtype=bool)))
+                            dashed=True))
     diagram = Diagram("nodal diameter", "frequency [Hz]", tuple(curves), y_limits=(0.0, top))
     with new_figure(7.0, 5.0, path) as figure:
         axis = figure.subplots()

@@ -119,20 +119,20 @@ def _draw_curve(axes: "Axes", curve: Curve) -> None:
                       linestyle="-" if curve.width else "none", **shown)
     elif not curve.width:
         axes.plot(curve.x, curve.y, linestyle="none", markeredgewidth=0.0, rasterized=True, **shown)
-    elif curve.stable is None:
+    elif curve.solid is None:
         axes.plot(*thinned(curve.x, curve.y), linewidth=curve.width,
                   zorder=2.5 - 0.1 * curve.width, **shown)
     else:
-        for first, last in runs_of(curve.stable):
-            solid = bool(curve.stable[first])
+        for first, last in runs_of(curve.solid):
+            solid = bool(curve.solid[first])
             axes.plot(*thinned(curve.x[first : last + 1], curve.y[first : last + 1]),
                       linewidth=curve.width if solid else min(curve.width, WIDTH),
                       linestyle="-" if solid else DASHES, **shown)
 
 
-def runs_of(stable: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def runs_of(pieces: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last point of each run of equal pieces."""
-    edges = [0, *(np.flatnonzero(np.diff(stable)) + 1).tolist(), len(stable)]
+    edges = [0, *(np.flatnonzero(np.diff(pieces)) + 1).tolist(), len(pieces)]
     return list(pairwise(edges))
 
 
@@ -148,12 +148,12 @@ def legend_entries(diagrams: Iterable[Diagram]) -> list[Any]:
                           for heading in dict.fromkeys(one.heading for one in given) if heading]
     for name in names:
         curve = curves[name]
+        dashes = DASHES if curve.dashed else "-" if curve.width else "none"
         handles.append(Line2D(
             [], [], color=curve.colour or INK, linewidth=curve.width, label=legend_label(name),
-            linestyle="-" if curve.width else "none", marker="o" if curve.marker else "",
+            linestyle=dashes, marker="o" if curve.marker else "",
             markersize=max(curve.marker, 4.0)))
-    if any(curve.stable is not None and not curve.stable.all()
-           for one in given for curve in one.curves):
+    if any(curve.partly_unstable for one in given for curve in one.curves):
         handles += [Line2D([], [], color=INK, linewidth=1.8, label="stable"),
                     Line2D([], [], color=INK, linewidth=WIDTH, linestyle=DASHES, label="unstable")]
     for kind in dict.fromkeys(mark.kind for one in given for mark in one.marks):

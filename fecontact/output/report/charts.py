@@ -61,8 +61,9 @@ def diagram_table(
             x = shown("x", curve.x)
             size = max(float(np.ptp(x)), _ACROSS * float(np.abs(x).max()))
             line["x"] = payload.add(x, max(_ACROSS * size, SMALLEST))
-        if curve.stable is not None and not curve.stable.all():
-            line["stable"] = payload.add(curve.stable)
+        solid = curve.solid
+        if solid is not None and not solid.all():
+            line["solid"] = payload.add(solid)
         lines.append(line)
     return {"title": diagram.title or name, "unit": unit, "factor": factor, "xLabel": x_label,
             "log": diagram.logarithmic, "limits": limits, "lines": lines,

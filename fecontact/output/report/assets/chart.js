@@ -66,8 +66,8 @@ function layer(canvas, width, height) {
 }
 
 // Lines of a diagram of the page: over the clock, or over abscissae of their own.
-const linesOf = ({ lines }) => lines.map(({ x, y, stable, ...line }) => ({
-  ...line, y: y.values, x: x?.values, stable: stable?.values }));
+const linesOf = ({ lines }) => lines.map(({ x, y, solid, ...line }) => ({
+  ...line, y: y.values, x: x?.values, solid: solid?.values }));
 
 // Letters of labels.
 function letters(c, textAlign) {
@@ -77,7 +77,7 @@ function letters(c, textAlign) {
 }
 
 class Chart {
-  // lines: [{name, colour, width?, x?, y, stable?}] with arrays; without x over the time of the clock.
+  // lines: [{name, colour, width?, x?, y, solid?}] with arrays; without x over the time of the clock.
   // Logarithmic axes, named in `log`, have common logarithms; `limits` fixes ends of axes, `marks` are
   // places with letters.
   constructor(clock, { title, unit, xLabel, lines, legend = lines, height = 132, kind = "chart",
@@ -161,7 +161,7 @@ class Chart {
       c.beginPath();
       if (line.x) this.trace(c, line); else this.envelope(c, line.y);
       c.stroke();
-      if (line.stable) this.unstable(c, line);
+      if (line.solid) this.dashed(c, line);
     }
     c.restore();
     c.font = `600 12px ${css("font")}`;
@@ -191,22 +191,22 @@ class Chart {
     }
   }
 
-  trace(c, { x, y, stable }) {
+  trace(c, { x, y, solid }) {
     const [i0, i1] = this.clock.window(), end = min(i1, x.length - 1);
     for (let i = i0; i <= end; i++) {
-      if (stable && i && !stable[i - 1]) c.moveTo(this.px(x[i]), this.py(y[i]));
+      if (solid && i && !solid[i - 1]) c.moveTo(this.px(x[i]), this.py(y[i]));
       else c.lineTo(this.px(x[i]), this.py(y[i]));
     }
   }
 
-  // Unstable parts are dashed and thin.
-  unstable(c, { x, y, stable }) {
+  // Pieces that are not solid are dashed and thin.
+  dashed(c, { x, y, solid }) {
     c.beginPath();
     c.setLineDash([6, 4]);
     c.lineWidth = 1.2;
-    stable.forEach((solid, i) => {
-      if (solid) return;
-      if (!i || stable[i - 1]) c.moveTo(this.px(x[i]), this.py(y[i]));
+    solid.forEach((whole, i) => {
+      if (whole) return;
+      if (!i || solid[i - 1]) c.moveTo(this.px(x[i]), this.py(y[i]));
       c.lineTo(this.px(x[i + 1]), this.py(y[i + 1]));
     });
     c.stroke();
