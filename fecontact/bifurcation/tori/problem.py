@@ -242,9 +242,9 @@ class TorusProblem(Problem):
         if self.multipliers and points:
             fastest = self.linearise(points[-1].u).fastest_change
             if fastest > RESOLVED:
-                notes.append(f"Modes of up to {fastest / (2.0 * np.pi):.3g} times the first "
-                             f"frequency are too fast for the multipliers, which tell nothing of "
-                             f"their growth: check the stability by fecontact.simulate.")
+                notes.append(f"The multipliers do not resolve modes of up to "
+                             f"{fastest / (2.0 * np.pi):.3g} times the first frequency: check the "
+                             f"stability by fecontact.simulate.")
         return " ".join(notes)
 
 

@@ -41,9 +41,9 @@ class TorusStability:
     ----------
     multipliers : (d,) array
         Mean growth of deviations in one period 1 / f1, falling; one of them is one for each
-        frequency that the motion finds itself.
+        frequency that no excitation prescribes.
     trivial : (a,) array of int
-        Places of these.
+        Indices of the multipliers that are one.
     """
 
     multipliers: Array
