@@ -42,17 +42,17 @@ class Drive:
     Parameters
     ----------
     stiffness_x, stiffness_y, stiffness_z : float
-        c_x, c_y, c_z, zero or above [N/m].
+        Stiffnesses c_x, c_y, c_z of the springs at B, zero or above [N/m].
     damping_x, damping_y, damping_z : float
-        b_x, b_y, b_z, zero or above [N s/m].
+        Damping b_x, b_y, b_z of the dashpots at B, zero or above [N s/m].
     amplitude_x, amplitude_y, amplitude_z : float
-        x_0, y_0, z_0 [m].
+        Amplitudes x_0, y_0, z_0 of the driven ends [m].
     frequency_hz : float
-        f_E, zero or above [Hz].
+        Excitation frequency f_E, zero or above [Hz].
     motion_x, motion_y, motion_z : Signal, optional
-        u_x(t), u_y(t), u_z(t) [m], instead of the harmonic motion.
+        Motions u_x(t), u_y(t), u_z(t) of the driven ends [m], instead of the harmonic motion.
     dashpots : 'absolute' or 'relative'
-        Whether the dashpots act on the velocity of B, or on that relative to the driven end.
+        Velocity on which the dashpots act: that of B, or that of B relative to the driven end.
 
     Raises
     ------

@@ -30,13 +30,13 @@ class FrictionContact3D(NormalLaw):
     Parameters
     ----------
     normal_stiffness : float or (n,) sequence
-        k_n of the whole face, or of each node, positive [N/m].
+        Normal stiffness k_n of the whole face, or of each node, positive [N/m].
     tangential_stiffness : float or (n,) sequence
-        k_t of the whole face, or of each node, positive [N/m].
+        Tangential stiffness k_t of the whole face, or of each node, positive [N/m].
     friction_coefficient : float or (n,) sequence
-        mu, zero or above.
+        Friction coefficient mu, zero or above.
     preload : float or (n,) sequence
-        N_0 of the whole face, or of each node, zero or above [N].
+        Preload N_0 of the whole face, or of each node, zero or above [N].
 
     References
     ----------

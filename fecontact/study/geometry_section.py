@@ -44,10 +44,10 @@ class MeshFile:
     points : mapping of name to name or place
         Points to name: a group of the file, or the node nearest to [x, y], of solids [x, y, z] [m].
     part : str, optional
-        One of several bodies in the file: the name of a group of its cells.
+        Body to take if the file has several: name of a group of cells.
     pretension : mapping of name to table
-        ``[geometry.pretension.NAME]``: sections of bolts; NAME is that of the control point, on
-        which a force along x is the tension in the bolt.
+        ``[geometry.pretension.NAME]``: sections of bolts. NAME is the control point; a force on it
+        along x is the tension of the bolt.
     """
 
     file: str

@@ -19,10 +19,15 @@ from fecontact.system.gap import Crown
 
 _HEAD = """# Study files
 
-Every section and key of a study file, with its type, default and meaning; units stand in brackets.
-This page is made from the code, by `fecontact keys > docs/study.md`; `fecontact keys SECTION`
-prints one section, `fecontact keys WORD` the keys that have the word. A key without a default has
-to be given.
+All sections and keys of a study file, with type, default and meaning. Units are in brackets.
+
+- A key without a default is required. `none` means that the key may be left out; None in a meaning
+  stands for a key that is left out.
+- `fecontact keys SECTION` prints one section, `fecontact keys WORD` all keys with a word in their
+  name or meaning.
+- A number "of the whole face" is divided among the contact nodes by their lengths or areas.
+
+The command `fecontact keys` writes this page from the code.
 """
 
 
@@ -86,10 +91,11 @@ def _keys_with(word: str, parts: Mapping[str, str]) -> str:
 
 def _parts() -> Iterator[tuple[str, str]]:
     hints = get_type_hints(Study)
-    yield "gap", ("## `gap`\n\nAbove all sections: initial distance of the contact nodes from flat "
-                  "ground [m]; a number, a list with one per node, or a table for a face that is "
-                  "an arc:\n\n" + _table(Crown) + "\n\nor for measured heights of a "
-                  "solid's face:\n\n" + _table(HeightMap) + "\n")
+    yield "gap", ("## `gap`\n\nInitial distance of the contact nodes from flat ground [m]. The key "
+                  "stands above all sections. It is a number, a list with one number per node, or "
+                  "a table.\n\nTable for a face that is an arc:\n\n" + _table(Crown)
+                  + "\n\nTable for measured heights of a solid's face:\n\n"
+                  + _table(HeightMap) + "\n")
     shapes = [_table(cls, f'`shape = "{name}"`: {_summary(cls)}') for name, cls in SHAPES.items()]
     yield "geometry", _section("geometry", "A shape and its dimensions, or the file of a mesh.",
                                *shapes, _table(MeshFile, f"`file`: {_summary(MeshFile)}"))
@@ -104,7 +110,7 @@ def _parts() -> Iterator[tuple[str, str]]:
         yield from _sections(name, _inner(hints[entry.name]), printed)
     kinds = [_table(cls, f'`kind = "{name}"`: {_summary(cls)}') for name, cls in LINKS.items()]
     yield "links.NAME", _section(
-        "links.NAME", "What joins bodies at points or faces and does not open.", *kinds)
+        "links.NAME", "Links join bodies at points or faces and do not open.", *kinds)
 
 
 def _sections(name: str, classes: list[Any], printed: dict[Any, str]) -> Iterator[tuple[str, str]]:
@@ -113,7 +119,7 @@ def _sections(name: str, classes: list[Any], printed: dict[Any, str]) -> Iterato
     if printed.get(known) == name:  # a key that several of the classes have
         return
     if known in printed:
-        yield name, _section(name, f"As `[{printed[known]}]`.")
+        yield name, _section(name, f"Keys of `[{printed[known]}]`.")
         return
     printed[known] = name
     if is_kind(classes[0]):
@@ -136,8 +142,8 @@ def _inner(hint: Any) -> list[Any]:
 
 
 def _laws(kind: Any) -> Iterator[str]:
-    yield ("The key `law` names the law, the other keys are its parameters; `fecontact laws NAME` "
-           "prints one with its formula.")
+    yield ("The key `law` names the law; the other keys are its parameters. `fecontact laws NAME` "
+           "prints a law with its formula.")
     names: Mapping[str, type] = law_names()[kind]
     for name, cls in names.items():
         yield _table(cls, f'`law = "{name}"`: {_summary(cls)}')

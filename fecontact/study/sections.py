@@ -46,29 +46,31 @@ class BodySettings:
     Parameters
     ----------
     material : str, optional
-        'steel' or 'aluminium'; the keys below override single values. If no material value is
-        given at all, the materials of the mesh file, or steel if it holds none.
+        'steel' or 'aluminium'; the keys below override single values. Without any of these keys the
+        body has the materials of its mesh file, or else is of steel.
     youngs_modulus, poisson_ratio, density : float, optional
-        [Pa], dimensionless, [kg/m^3]; all three are needed without ``material``.
+        Young's modulus [Pa], Poisson's ratio, density [kg/m^3]; all three are required without
+        ``material``.
     materials : list of tables
-        ``[[body.materials]]``: materials of groups of cells, or an anisotropic one of the whole
-        body, in place of the keys above.
+        ``[[body.materials]]``, instead of the keys above: materials of groups of cells, or an
+        anisotropic material of the whole body.
     thickness : float
         Out-of-plane thickness of a plane body [m]; required in plane stress, 1 m by default in
-        plane strain; not for a solid.
+        plane strain. An error for a solid.
     plane : 'stress' or 'strain'
-        Plane stress for thin bodies, plane strain for long ones; not for a solid.
+        Plane stress for thin bodies, plane strain for long bodies. An error for a solid.
     degree : 1 or 2
         Polynomial degree of the finite elements.
     bricks : 'full' or 'incompatible', optional
-        Kind of hexahedra with ``degree = 1``; by default as the mesh file gives them.
+        Hexahedra with ``degree = 1``: fully integrated, or with incompatible modes; by default as
+        in the mesh file.
     fixed : mapping of name to 'x', 'y', 'xy', of solids also 'z', 'xz', 'yz', 'xyz', or 'hinge'
-        Supports on boundaries and points of the mesh: the directions that are held, or a hole
-        that turns about its centre; 'hinge_x', 'hinge_y', 'hinge_z' name the axis in a solid.
-        At reference points of couplings also 'clamped', or components such as 'x y phi_z'.
+        Supports on boundaries and points of the mesh: held directions, or 'hinge' for a hole that
+        turns about its centre. In a solid 'hinge_x', 'hinge_y', 'hinge_z' give the axis. At
+        reference points of couplings also 'clamped', or components such as 'x y phi_z'.
     rotation : Rotation, optional
-        ``[body.rotation]``: the body rotates at a constant speed about an axis, of a plane body
-        about a point of its plane.
+        ``[body.rotation]``: rotation at constant speed, of a solid about an axis, of a plane body
+        about a point.
     """
 
     material: str | None = None
@@ -160,46 +162,46 @@ class BasisSettings:
         Number of modes, the rigid ones included.
     contact : str or list of str
         Boundary in contact with the ground, or several; each becomes an interface of its name.
-        Without any, ``contact = []``, the system is linear and needs no laws.
-        Faces of solids look down, towards -z.
+        Faces of solids on the ground must face -z. With ``contact = []`` the system is linear and
+        needs no laws.
     contact_nodes : int or 'all', of solids also two integers, or list
         Number of contact nodes, or 'all' for every mesh node of the boundary; a list has one entry
-        for each boundary. A solid's face is cut into so many patches of about equal area, 'all'
-        makes every facet one, and ``[n, m]`` are numbers along its first and second tangent, x and
-        y, or around and across a ring.
+        for each boundary. Contact nodes of a solid are patches of about equal area: their number,
+        'all' for one patch per facet, or ``[n, m]`` along the first and second tangent (x and y on
+        the ground; around and across a ring).
     B, C : place, optional
-        Excitation and load point: name of a point or boundary, [x, y], of solids [x, y, z], or a
-        patch ``{at = name or place, radius = r}``.
+        Drive point B and load point C: name of a point or boundary, [x, y] ([x, y, z] of solids),
+        or a patch ``{at = name or place, radius = r}``.
     points : mapping of name to place
         Further points to observe.
     damping : float, list, Rayleigh, LossFactor or 'materials'
-        One damping ratio, one per mode, ``{mass_factor, stiffness_factor}`` or
-        ``{loss_factor}``; 'materials': that of the loss factors of the body's materials.
+        One damping ratio, one ratio per mode, ``{mass_factor, stiffness_factor}`` (Rayleigh),
+        ``{loss_factor}``, or 'materials' for the loss factors of the body's materials.
     reduction : 'vibration', 'residual' or 'craig-bampton'
-        Static shapes added to the vibration modes.
+        'vibration': free vibration modes; 'residual': these with residual vectors; 'craig-bampton':
+        Craig-Bampton modes (with constraint modes).
     tolerance : float
-        For 'residual': fraction of the static compliance at the points, and of the response to the
-        loads, that may be neglected.
+        For 'residual': largest fraction of the static compliance at the points, and of the response
+        to the loads, that may be neglected.
     loads : list of places
         Loads whose static response is added to the modes, for 'residual' and 'craig-bampton':
         'gravity' (and base acceleration), boundaries (pressure and shear), points (forces).
     dashpots : mapping of point to [b_x, b_y], of solids [b_x, b_y, b_z]
-        Viscous dampers between points, or contact nodes by number, and the inertial frame
-        [N s/m].
+        Viscous dampers to the inertial frame [N s/m], at points or at contact nodes by number.
     select : list, optional
         Indices of the modes to keep, counted from 0; all by default.
     eigensolver : 'auto', 'direct' or 'iterative'
         Solver for the modes of solids; 'auto' takes the iterative one for large, compact bodies.
     prestress : bool
-        Whether modes are those about the static state under ``[load]``, whose stress stiffens the
-        body, which its supports have to hold.
+        True: modes about the static state under ``[load]``, whose stress stiffens the body. The
+        supports must hold the body.
     temperature : float or 'mesh', optional
-        Change of temperature of the whole body from the state without stress [K], a constant load;
-        for 'residual' and 'craig-bampton'. 'mesh': that which the deck of the mesh holds.
+        Change of temperature of the whole body from the state without stress [K], a constant load,
+        or 'mesh' for the temperatures in the deck of the mesh. Needs 'residual' or 'craig-bampton'.
     large_deflections : LargeDeflections, optional
         ``[basis.large_deflections]``: forces of large deflections of some modes.
     half_space : bool
-        Whether the contact nodes of a solid have the local compliance of a half-space where its
+        True: adds the local compliance of a half-space at the contact nodes of a solid, where
         elements and modes are too stiff; see :func:`fecontact.reduction.with_half_space`.
     """
 

@@ -31,9 +31,9 @@ class Crown:
     Parameters
     ----------
     radius : float
-        R, positive [m].
+        Radius R of the arc, positive [m].
     centre : float, of solids (float, float)
-        Abscissa of the lowest point, of solids x and y; a single number is x, with y zero [m].
+        Place of the lowest point [m]: x of a plane body; x and y of a solid, or x alone with y = 0.
 
     Raises
     ------

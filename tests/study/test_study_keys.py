@@ -57,7 +57,7 @@ def test_every_key_stands_on_the_page():
 
 def test_defaults_and_units_of_a_section():
     section = study_keys("[ground]")
-    assert "| `speed` | a number | `0` | V, positive in +x [m/s]. |" in section
+    assert "| `speed` | a number | `0` | Speed V of the ground in +x [m/s]. |" in section
     assert "| `amplitude`, `wavelength`" not in section
     needed = study_keys("load.forces")
     assert ('| `component` | "x", "y", "z", "phi", "phi_x", "phi_y", "phi_z", a list of two '

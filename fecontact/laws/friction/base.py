@@ -67,12 +67,13 @@ class SmoothedFriction(MemorylessFriction):
     Parameters
     ----------
     smoothing_slope : float or (n,) sequence
-        k_s, positive [s/m]. Below slip velocities of about 1/k_s the contact creeps instead of
-        sticking.
+        Smoothing slope k_s, positive [s/m]. Below a slip velocity of about 1/k_s [m/s] the contact
+        creeps instead of sticking.
     viscous_coefficient : float or (n,) sequence
-        c_v, zero or above [s/m].
+        Viscous coefficient c_v, zero or above [s/m]: friction c_v v per normal force.
     smoothing : {"arctan", "tanh", "square-root"}
-        s(v), see :class:`~fecontact.laws.friction.base.SmoothedFriction`.
+        Smoothed sign s(v) of the slip velocity, see
+        :class:`~fecontact.laws.friction.base.SmoothedFriction`.
     """
 
     choices: ClassVar = {"smoothing": get_args(Smoothing)}
@@ -133,7 +134,7 @@ class LimitedFriction(MemoryFriction):
     Parameters
     ----------
     friction_coefficient : float or (n,) sequence
-        mu, zero or above.
+        Friction coefficient mu, zero or above.
     """
 
     friction_coefficient: base.PerNode

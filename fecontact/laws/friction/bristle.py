@@ -233,11 +233,11 @@ class DahlFriction(LimitedFriction):
     Parameters
     ----------
     friction_coefficient : float or (n,) sequence
-        mu, positive.
+        Friction coefficient mu, positive.
     presliding_stiffness : float or (n,) sequence
-        sigma, positive: stiffness at R = 0 per normal force [1/m].
+        Presliding stiffness sigma at R = 0 per normal force, positive [1/m].
     exponent : float or (n,) sequence
-        i, one or above: 1 is an exponential approach to mu F.
+        Exponent i, one or above; with 1 friction approaches mu F exponentially.
 
     References
     ----------
@@ -287,22 +287,22 @@ class LuGreFriction(MemoryFriction):
     Parameters
     ----------
     static_coefficient : float or (n,) sequence
-        mu_s, at least mu_k.
+        Coefficient mu_s at rest, at least mu_k.
     kinetic_coefficient : float or (n,) sequence
-        mu_k, positive.
+        Coefficient mu_k at high slip velocity, positive.
     stribeck_velocity : float or (n,) sequence
-        v_s, positive [m/s].
+        Stribeck velocity v_s, positive [m/s].
     stribeck_exponent : float or (n,) sequence
-        a, positive; mostly 2 or 1.
+        Exponent a of the Stribeck curve, positive; mostly 2 or 1.
     bristle_stiffness : float or (n,) sequence
-        sigma_0, positive: stiffness at rest per normal force [1/m].
+        Bristle stiffness sigma_0 at rest per normal force, positive [1/m].
     bristle_damping : float or (n,) sequence
-        sigma_1, zero or above: damping at rest per normal force [s/m].
+        Bristle damping sigma_1 at rest per normal force, zero or above [s/m].
     viscous_coefficient : float or (n,) sequence
-        sigma_2, zero or above [s/m].
+        Viscous coefficient sigma_2 per normal force, zero or above [s/m].
     damping_decay : float or (n,) sequence
-        lambda_1, zero or above: bristle damping falls to 1/e at the velocity 1 / lambda_1; zero
-        keeps it constant [s/m].
+        Decay rate lambda_1 of the bristle damping, zero or above [s/m]: the damping falls to 1/e at
+        the velocity 1 / lambda_1; with zero it is constant.
 
     References
     ----------
@@ -368,12 +368,12 @@ class BoucWenFriction(LimitedFriction):
     Parameters
     ----------
     yield_displacement : float or (n,) sequence
-        u_s, positive: deflection at which the initial stiffness would reach mu F [m].
+        Deflection u_s at which the initial stiffness would reach mu F, positive [m].
     beta : float or (n,) sequence
         beta, at least 1/2 so that loops dissipate energy; 1/2 unloads with the initial stiffness to
         R = 0, larger values make loops wider.
     exponent : float or (n,) sequence
-        n, one or above: sharpness of the transition to sliding.
+        Exponent n, one or above: sharpness of the transition to sliding.
 
     References
     ----------

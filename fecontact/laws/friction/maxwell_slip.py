@@ -135,7 +135,7 @@ class _MaxwellSlip(LimitedFriction):
     Parameters
     ----------
     stiffness : float or (n,) sequence
-        k, positive: presliding stiffness of the whole face, or of each node [N/m].
+        Presliding stiffness k of the whole face, or of each node, positive [N/m].
     """
 
     kernel: ClassVar = _maxwell_slip
@@ -231,7 +231,7 @@ class IwanFriction(_MaxwellSlip):
     Parameters
     ----------
     elements : int
-        N, from 1 to 10,000: internal variables of each node.
+        Number N of elements (internal variables) of each node, from 1 to 10,000.
 
     References
     ----------
@@ -289,7 +289,8 @@ class FourParameterIwanFriction(_MaxwellSlip):
     beta : float
         Ratio of stiffnesses of the delta and of the power law, zero or above.
     elements : int
-        N, from 1 to 10,000: internal variables of each node, with one more for beta > 0.
+        Number N of elements (internal variables) of each node, from 1 to 10,000; one more for beta
+        > 0.
     spacing_ratio : float
         Width of an interval over that of the one before, one or above.
 

@@ -123,7 +123,8 @@ class _FallingFriction(SmoothedFriction):
     Parameters
     ----------
     static_coefficient, kinetic_coefficient : float or (n,) sequence
-        mu_0 and mu_inf, zero or above; friction rises with velocity if mu_0 is below mu_inf.
+        Coefficients mu_0 at rest and mu_inf at high slip velocity, zero or above. Friction rises
+        with velocity if mu_0 is below mu_inf.
     """
 
     static_coefficient: NotNegative
@@ -145,7 +146,7 @@ class ExponentialFriction(_FallingFriction):
     Parameters
     ----------
     decay : float or (n,) sequence
-        lambda, zero or above [s/m].
+        Decay rate lambda of the coefficient over slip velocity, zero or above [s/m].
 
     References
     ----------
@@ -175,7 +176,8 @@ class GaussianFriction(_FallingFriction):
     Parameters
     ----------
     stribeck_velocity : float or (n,) sequence
-        v_s, positive [m/s].
+        Stribeck velocity v_s, at which 63 % of the drop from mu_0 to mu_inf is reached, positive
+        [m/s].
 
     References
     ----------
@@ -206,7 +208,8 @@ class HyperbolicFriction(_FallingFriction):
     Parameters
     ----------
     stribeck_velocity : float or (n,) sequence
-        v_s, positive: velocity of half the drop [m/s].
+        Stribeck velocity v_s, at which half of the drop from mu_0 to mu_inf is reached, positive
+        [m/s].
 
     References
     ----------
@@ -231,7 +234,7 @@ class ConstantFriction(SmoothedFriction):
     Parameters
     ----------
     friction_coefficient : float or (n,) sequence
-        mu, zero or above.
+        Friction coefficient mu, zero or above.
     """
 
     kernel: ClassVar = constant
@@ -268,13 +271,13 @@ class ProductFriction(MemorylessFriction):
     Parameters
     ----------
     factor : float or (n,) sequence
-        a_1, zero or above.
+        Factor a_1, zero or above: 2 / pi times the coefficient at high slip velocity.
     excess : float or (n,) sequence
-        a_2, zero or above: ratio of friction near rest to that at high velocities, minus one.
+        Excess a_2, zero or above: friction near rest over friction at high velocities, minus one.
     decay : float or (n,) sequence
-        b_1, zero or above [s/m].
+        Decay rate b_1 of the excess over slip velocity, zero or above [s/m].
     smoothing_slope : float or (n,) sequence
-        b_2, positive [s/m].
+        Smoothing slope b_2 of the arctan, positive [s/m].
 
     References
     ----------
@@ -309,11 +312,12 @@ class GalvanettoFriction(_FallingFriction):
     Parameters
     ----------
     static_coefficient, kinetic_coefficient : float or (n,) sequence
-        mu_s and mu_k, zero or above; friction rises from rest if mu_s is below mu_k.
+        Coefficients mu_s at rest and mu_k, zero or above. Friction rises from rest if mu_s is below
+        mu_k.
     decay : float or (n,) sequence
-        gamma, zero or above [s/m].
+        Decay rate gamma of the coefficient over slip velocity, zero or above [s/m].
     growth : float or (n,) sequence
-        eta, zero or above [s^2/m^2].
+        Factor eta of the increase with the square of slip velocity, zero or above [s^2/m^2].
 
     References
     ----------
@@ -345,11 +349,11 @@ class CubicFriction(SmoothedFriction):
     Parameters
     ----------
     static_coefficient : float or (n,) sequence
-        mu_s, at least mu_m.
+        Coefficient mu_s at rest, at least mu_m.
     minimum_coefficient : float or (n,) sequence
-        mu_m, zero or above.
+        Smallest coefficient mu_m, zero or above.
     minimum_velocity : float or (n,) sequence
-        v_m, positive [m/s].
+        Slip velocity v_m of the smallest coefficient, positive [m/s].
 
     References
     ----------

@@ -47,11 +47,12 @@ class FourierSeries(Profile):
     Parameters
     ----------
     wavelength : float
-        lambda, positive: period of the ground [m].
+        Period lambda of the ground, positive [m].
     amplitudes : (n,) sequence
-        A_k from the longest wave to the shortest [m], or relative to the friction force.
+        Amplitudes A_k from the longest wave to the shortest; heights [m], or parts of the friction
+        force.
     phases : (n,) sequence, optional
-        phi_k [rad]; zero by default.
+        Phases phi_k [rad]; zero by default.
 
     Raises
     ------

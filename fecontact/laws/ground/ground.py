@@ -48,13 +48,13 @@ class Ground:
     Parameters
     ----------
     speed : float
-        V, positive in +x [m/s].
+        Speed V of the ground in +x [m/s].
     amplitude : float
-        y_A, zero or above; zero is flat ground [m].
+        Amplitude y_A of the waves, zero or above; zero is flat ground [m].
     wavelength : float
-        lambda_w, positive [m].
+        Wavelength lambda_w, positive [m].
     profile : Profile, optional
-        Heights [m] instead of the sine.
+        Heights of the ground [m], instead of the sine wave.
     motion : GroundMotion, optional
         Time-dependent speed; by default the constant V.
     friction_variation : Profile, optional
@@ -62,7 +62,7 @@ class Ground:
     speed_y : float
         Speed along y, below solids only [m/s].
     motion_y : GroundMotion, optional
-        The same in time; by default the constant ``speed_y``.
+        Time-dependent speed along y; by default the constant ``speed_y``.
     rotation_speed : float
         Rotation about the normal, below solids only, positive counter-clockwise from above
         [rad/s]; of flat and even ground.

@@ -100,7 +100,7 @@ class HeightMap:
     heights : (N, M) sequence
         Heights z at N places in x and M in y, positive out of the ground; at least 4 x 4 [m].
     spacing_x, spacing_y : float
-        h_x and h_y, distances of the points, positive; required with heights [m].
+        Distances h_x and h_y between the points, positive; required with heights [m].
     origin_x, origin_y : float
         Place of the first point [m].
     file : str, optional

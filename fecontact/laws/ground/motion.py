@@ -85,11 +85,11 @@ class HarmonicSpeed(GroundMotion):
     Parameters
     ----------
     amplitude : float
-        A [m/s].
+        Amplitude A of the speed [m/s].
     frequency_hz : float
-        f, positive [Hz].
+        Frequency f, positive [Hz].
     phase : float
-        phi [rad].
+        Phase phi [rad].
 
     Raises
     ------
@@ -153,11 +153,11 @@ class SpeedRamp(GroundMotion):
     Parameters
     ----------
     end_speed : float
-        V_1 [m/s].
+        Speed V_1 at the end of the ramp [m/s].
     start : float
-        t_1 [s].
+        Time t_1 at which the ramp starts [s].
     duration : float
-        T, positive [s].
+        Duration T of the ramp, positive [s].
 
     Raises
     ------

@@ -114,11 +114,11 @@ class Sine(Profile):
     Parameters
     ----------
     amplitude : float
-        y_A, zero or above [m], or relative to the friction force.
+        Amplitude y_A, zero or above; a height [m], or a part of the friction force.
     wavelength : float
-        lambda_w, positive [m].
+        Wavelength lambda_w, positive [m].
     phase : float
-        phi [rad].
+        Phase phi [rad].
 
     Raises
     ------

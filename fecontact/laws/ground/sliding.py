@@ -24,7 +24,7 @@ class SlidingTranslation:
     Parameters
     ----------
     speed : float
-        V [m/s].
+        Speed V [m/s].
     direction : (x, y) or (x, y, z)
         e, of any length above zero; stored with length one. Of solids +x by default too.
     motion : GroundMotion, optional

@@ -73,18 +73,18 @@ class BilateralPolynomial(BilateralLaw):
     Parameters
     ----------
     stiffness, cubic_stiffness : float or (n,) sequence
-        c, c_3 [N/m], [N/m^3]; c is below zero for a spring with two places of rest, c_3 above zero
-        for one that hardens, below for one that softens.
+        Stiffnesses c [N/m] and c_3 [N/m^3]. A negative c makes a spring with two positions of rest;
+        the spring hardens with positive c_3 and softens with negative c_3.
     damping : float or (n,) sequence
-        b, zero or above [N s/m].
+        Damping b, zero or above [N s/m].
     preload : float or (n,) sequence
-        N_0 [N].
+        Constant tension N_0 [N].
     shortening : float or (n,) sequence
-        s: prescribed shortening [m].
+        Prescribed shortening s [m].
     quadratic_stiffness, quintic_stiffness : float or (n,) sequence
-        c_2, c_5 [N/m^2], [N/m^5], of any sign.
+        Stiffnesses c_2 [N/m^2] and c_5 [N/m^5], of any sign.
     quadratic_damping, cubic_damping : float or (n,) sequence
-        b_2, b_3, zero or above [N s^2/m^2], [N s^3/m^3].
+        Damping b_2 [N s^2/m^2] and b_3 [N s^3/m^3], zero or above.
     """
 
     kernel: ClassVar = _polynomial
@@ -152,15 +152,15 @@ class BilateralPlay(BilateralLaw):
     Parameters
     ----------
     stiffness : float or (n,) sequence
-        c beyond the clearance, positive [N/m].
+        Stiffness c beyond the clearance, positive [N/m].
     clearance : float or (n,) sequence
-        h: play to either side, zero or above [m].
+        Play h to either side, zero or above [m].
     damping : float or (n,) sequence
-        b beyond the clearance, zero or above [N s/m].
+        Damping b beyond the clearance, zero or above [N s/m].
     preload : float or (n,) sequence
-        N_0, a constant tension [N].
+        Constant tension N_0 [N].
     shortening : float or (n,) sequence
-        s: prescribed shortening [m]; moves the middle of the play to e = -s.
+        Prescribed shortening s [m]; it moves the middle of the play to e = -s.
     """
 
     kernel: ClassVar = _play
@@ -222,13 +222,13 @@ class BilateralPiecewise(BilateralLaw):
     elongations : sequence
         Elongations of the corners, at least two, ascending [m]; the same at all nodes.
     forces : sequence
-        Tension at each of them [N].
+        Tension at each corner [N].
     damping : float or (n,) sequence
-        b, zero or above [N s/m].
+        Damping b, zero or above [N s/m].
     preload : float or (n,) sequence
-        N_0 [N].
+        Constant tension N_0 [N].
     shortening : float or (n,) sequence
-        s: prescribed shortening [m].
+        Prescribed shortening s [m].
     """
 
     kernel: ClassVar = _piecewise

@@ -40,11 +40,12 @@ class LinearContact(NormalLaw):
     Parameters
     ----------
     stiffness : float or (n,) sequence
-        c of the whole face, or of each node, positive [N/m].
+        Stiffness c of the whole face, or of each node, positive [N/m].
     damping : float or (n,) sequence
-        d of the whole face, or of each node, zero or above [N s/m].
+        Damping d of the whole face, or of each node, zero or above [N s/m].
     preload : float or (n,) sequence
-        N_0 of the whole face, or of each node if the stiffness is, zero or above [N].
+        Preload N_0, zero or above [N]; of the whole face, or of each node if the stiffness is given
+        for each.
     """
 
     kernel: ClassVar = _linear
@@ -121,13 +122,13 @@ class TwoSidedStop(NormalLaw):
     Parameters
     ----------
     stiffness : float or (n,) sequence
-        K of each stop over the whole face, or at each node, positive [N/m^n].
+        Stiffness K of each stop over the whole face, or at each node, positive [N/m^n].
     clearance : float or (n,) sequence
-        s: clearance between the stops, zero or above [m].
+        Clearance s between the stops, zero or above [m].
     exponent : float or (n,) sequence
-        n, one or above.
+        Exponent n of the force over penetration, one or above.
     damping_factor : float or (n,) sequence
-        chi, zero or above [s/m].
+        Hunt-Crossley damping factor chi, zero or above [s/m].
     """
 
     kernel: ClassVar = _two_sided
@@ -187,7 +188,7 @@ class PrescribedForce(NormalLaw):
     Parameters
     ----------
     force : float or (n,) sequence
-        F_0 of the whole face, or of each node, zero or above [N].
+        Normal force F_0 of the whole face, or of each node, zero or above [N].
     """
 
     kernel: ClassVar = _prescribed

@@ -68,10 +68,11 @@ class MeasuredSurface(RoughSurface):
     Parameters
     ----------
     bearing : sequence
-        h from the highest peak, 0, to the deepest valley, 1, not decreasing; the same at all nodes.
-        By default uniform heights.
+        Bearing fractions h, from 0 at the highest peak to 1 at the deepest valley, not decreasing;
+        the same at all nodes. By default heights are uniform.
     depths : sequence
-        s of these values, ascending from 0 to 1; equally spaced by default.
+        Depths s of these fractions below the highest peak, divided by R_Z, ascending from 0 to 1;
+        equally spaced by default.
     file : str, optional
         File of heights, see :meth:`from_file`, instead of ``bearing``, ``depths`` and
         ``roughness_height``. It is read once; then ``file`` is None.

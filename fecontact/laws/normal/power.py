@@ -46,11 +46,11 @@ class _Power(NormalLaw):
     Parameters
     ----------
     stiffness : float or (n,) sequence
-        K of the whole face, or of each node, positive [N/m^n].
+        Stiffness K of the whole face, or of each node, positive [N/m^n].
     exponent : float, (n,) sequence, "point" or "line"
-        n, one or above; by name 3/2 for point contact and 10/9 for line contact.
+        Exponent n, one or above; "point" is 3/2, "line" is 10/9.
     damping_factor : float or (n,) sequence
-        chi, zero or above [s/m].
+        Hunt-Crossley damping factor chi, zero or above [s/m].
     """
 
     kernel: ClassVar = _power
@@ -150,9 +150,10 @@ class RestitutionContact(_Hertz):
     Parameters
     ----------
     restitution : float or (n,) sequence
-        e, above zero and at most 1; with Hunt-Crossley and Lankarani-Nikravesh also zero.
+        Coefficient of restitution e, above zero and at most 1; with Hunt-Crossley and
+        Lankarani-Nikravesh also zero.
     reference_velocity : float or (n,) sequence
-        v_r, positive [m/s].
+        Impact velocity v_r at which e holds, positive [m/s].
     damping_model : {"exact", "hunt-crossley", "lankarani-nikravesh", "flores"}
         Relation between chi and e.
 
@@ -231,11 +232,11 @@ class BackBurdekinContact(_Power):
     Parameters
     ----------
     nominal_area : float or (n,) sequence
-        A of the whole face, or of each node, positive [m^2].
+        Nominal area A of the whole face, or of each node, positive [m^2].
     coefficient : float or (n,) sequence
-        C, positive [m/Pa^m]; 1 um/MPa^0.5 is 1e-9 m/Pa^0.5.
+        Coefficient C, positive [m/Pa^m]; 1 um/MPa^0.5 is 1e-9 m/Pa^0.5.
     exponent : float or (n,) sequence
-        m, above zero and at most 1; about 0.5 for metals.
+        Exponent m of the pressure, above zero and at most 1; about 0.5 for metals.
 
     References
     ----------

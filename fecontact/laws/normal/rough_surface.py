@@ -133,13 +133,13 @@ class RoughSurface(NormalLaw):
     Parameters
     ----------
     stiffness : float or (n,) sequence
-        c, positive: stiffness of the whole face when all asperities are in contact, or of each
-        node [N/m].
+        Stiffness c of the whole face, or of each node, when all asperities are in contact, positive
+        [N/m].
     roughness_height : float or (n,) sequence
-        R_Z, positive: peak-to-valley height of the surface [m].
+        Peak-to-valley height R_Z of the surface, positive [m].
     damping : float or (n,) sequence
-        beta c, zero or above: damping of the whole face when all asperities are in contact, or of
-        each node [N s/m].
+        Damping beta c of the whole face, or of each node, when all asperities are in contact, zero
+        or above [N s/m].
 
     References
     ----------
@@ -240,7 +240,7 @@ class GaussianSurface(RoughSurface):
     Parameters
     ----------
     deviation : float or (n,) sequence
-        sigma: standard deviation of the heights before truncation, divided by R_Z; from 0.02 to 1
+        Standard deviation sigma of the heights before truncation, divided by R_Z; from 0.02 to 1
         (nearly uniform).
     """
 

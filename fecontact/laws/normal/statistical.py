@@ -43,12 +43,12 @@ class ExponentialContact(NormalLaw):
     Parameters
     ----------
     force : float or (n,) sequence
-        F_0 of the whole face, or of each node, at u = 0, positive [N].
+        Force F_0 at u = 0 of the whole face, or of each node, positive [N].
     decay_length : float or (n,) sequence
-        u_0, positive; of the order of the rms roughness [m].
+        Decay length u_0, of the order of the rms roughness, positive [m].
     damping_factor : float or (n,) sequence
-        chi, zero or above [s/m]: damping proportional to the real contact area, and so to the
-        force.
+        Damping factor chi, zero or above [s/m]: damping is proportional to the real contact area,
+        and so to the force.
 
     References
     ----------
@@ -162,17 +162,17 @@ class GreenwoodWilliamson(NormalLaw):
     Parameters
     ----------
     asperities : float or (n,) sequence
-        N: number of asperities of the whole face, or of each node, positive.
+        Number N of asperities of the whole face, or of each node, positive.
     asperity_radius : float or (n,) sequence
-        R: radius of their summits, positive [m].
+        Radius R of the summits of asperities, positive [m].
     composite_modulus : float or (n,) sequence
-        E*, with 1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2, positive [Pa].
+        Composite modulus E*, 1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2, positive [Pa].
     height_deviation : float or (n,) sequence
-        sigma: standard deviation of the asperity heights, positive [m].
+        Standard deviation sigma of the asperity heights, positive [m].
     separation : float or (n,) sequence
-        h_0: distance h at u = 0.
+        Distance h_0 of the mean planes at u = 0, divided by sigma.
     damping_factor : float or (n,) sequence
-        chi, zero or above [s/m].
+        Hunt-Crossley damping factor chi, zero or above [s/m].
 
     References
     ----------

@@ -67,11 +67,11 @@ class Harmonic(Signal):
     Parameters
     ----------
     amplitude : float
-        A, in the unit of the quantity.
+        Amplitude A, in the unit of the quantity.
     frequency_hz : float
-        f, zero or above [Hz]; w / (2 pi) of an angular frequency w [rad/s].
+        Frequency f, zero or above [Hz]; w / (2 pi) of an angular frequency w [rad/s].
     phase : float
-        phi [rad]; pi / 2 for a cosine.
+        Phase phi [rad]; pi / 2 for a cosine.
 
     Raises
     ------
@@ -134,7 +134,7 @@ class Harmonics(Signal):
     frequencies_hz : sequence
         f_k, zero or above [Hz].
     phases : sequence, optional
-        phi_k [rad]; zero by default.
+        Phases phi_k [rad]; zero by default.
 
     Raises
     ------
@@ -221,11 +221,11 @@ class SweptSine(Signal):
     Parameters
     ----------
     amplitude : float
-        A, in the unit of the quantity.
+        Amplitude A, in the unit of the quantity.
     start_frequency_hz, end_frequency_hz : float
-        f_0, f_1, zero or above, for a logarithmic sweep above zero [Hz].
+        Frequencies f_0 and f_1 [Hz], zero or above; above zero for a logarithmic sweep.
     duration : float
-        T, positive [s].
+        Duration T of the sweep, positive [s].
     kind : 'linear' or 'logarithmic'
 
     Raises

@@ -103,13 +103,13 @@ class Pulse(Signal):
     ----------
     kind : 'half-sine', 'rectangle', 'triangle' or 'haversine'
     amplitude : float
-        A, in the unit of the quantity.
+        Amplitude A, in the unit of the quantity.
     duration : float
-        T, positive [s].
+        Duration T, positive [s].
     start : float
-        t_0 [s].
+        Start t_0 [s].
     rise : float, optional
-        For a rectangle, above zero and at most T / 2 [s]; by default T / 100.
+        Rise time of a rectangle, above zero and at most T / 2 [s]; by default T / 100.
 
     Raises
     ------
