@@ -148,7 +148,7 @@ def legend_entries(diagrams: Iterable[Diagram]) -> list[Any]:
                           for heading in dict.fromkeys(one.heading for one in given) if heading]
     for name in names:
         curve = curves[name]
-        dashes = DASHES if curve.dashed else "-" if curve.width else "none"
+        dashes: Any = DASHES if curve.dashed else "-" if curve.width else "none"
         handles.append(Line2D(
             [], [], color=curve.colour or INK, linewidth=curve.width, label=legend_label(name),
             linestyle=dashes, marker="o" if curve.marker else "",
