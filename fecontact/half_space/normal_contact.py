@@ -115,8 +115,8 @@ def half_space_contact(
     approach : float
         In place of the force: rigid approach delta of the bodies [m].
     periodic : bool
-        Whether the grid repeats itself, or is a part of a free surface without contact beyond it.
-        The displacement of a periodic surface has the mean zero, and so needs a force.
+        True if the grid is one period of a surface; then give the force. Its displacement has the
+        mean zero. Otherwise the surface is free, without contact beyond the grid.
     rtol : float
         Largest error of the gap in contact, relative to the largest displacement.
     max_iterations : int
@@ -137,8 +137,8 @@ def half_space_contact(
     if (force is None) == (approach is None):
         raise InputError(f"{owner}: give either force [N] or approach [m].")
     if periodic and force is None:
-        raise InputError(f"{owner}: a periodic surface has no displacement without reference, so "
-                         f"that approach says nothing of its mean pressure; give force [N].")
+        raise InputError(f"{owner}: approach is not for periodic = True, where it does not "
+                         f"determine the mean pressure; give force [N].")
     if force is not None:
         require_positive(owner, force=force)
     if approach is not None:
