@@ -27,10 +27,10 @@ from fecontact.core.files.atomic_write import write_text
 DOCS = Path(__file__).resolve().parents[1]
 HEAD = """# Validation
 
-Results of the package, beside closed forms, published numbers and the figures of W. Sextro,
-*Dynamical Contact Problems with Friction*, chapter 4. `make validation` computes everything here
-again, in about ten minutes on two cores, and writes this page. Scripts named here are in
-`docs/validation/cases`; each runs by itself and draws its pictures.
+Results of the package compared with closed forms, published numbers and the figures of W. Sextro,
+*Dynamical Contact Problems with Friction*, chapter 4. `make validation` computes all results
+in about ten minutes on two cores and writes this page. The scripts named here are in
+`docs/validation/cases`; each can be run alone and draws its pictures.
 
 """
 

@@ -27,9 +27,9 @@ def section() -> str:
     rows = stuart_landau() + lorenz() + reactor() + predator() + mode_coupling()
     return f"""## Continuation
 
-Equilibria and periodic orbits followed by `equilibrium_branch` and `orbit_branch`. Closed forms for
-the Stuart-Landau orbit, Lorenz' Hopf point and mode coupling; the other numbers are known to the
-digits shown, those of the demos as AUTO-07p prints them.
+Equilibria and periodic orbits are followed by `equilibrium_branch` and `orbit_branch`. The
+Stuart-Landau orbit, the Hopf point of the Lorenz equations and mode coupling have closed forms.
+Other references are known to the digits shown; those of AUTO's demos are as AUTO-07p prints them.
 
 {comparisons(rows)}
 """

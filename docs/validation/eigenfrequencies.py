@@ -33,9 +33,10 @@ def section() -> str:
                  zip(MEMBRANE_PUBLISHED, MEMBRANE, membrane, strict=True))]
     return f"""## Eigenfrequencies
 
-Steel beams of 1 m x 10 mm in plane stress against converged values of plane elasticity, which
-differ from beam theory by up to 2e-3; the clamped one on a mesh graded into its corners. The
-tapered membrane of NAFEMS FV32 against converged values; the published ones are upper bounds.
+The reference for steel beams of 1 m x 10 mm in plane stress are converged values of plane
+elasticity, which differ from beam theory by up to 2e-3. The mesh of the clamped beam is graded into
+its corners. The reference for the tapered membrane of NAFEMS FV32 are converged values; the
+published values are upper bounds.
 
 {comparisons(rows)}
 """

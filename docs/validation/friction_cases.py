@@ -28,9 +28,9 @@ def section() -> str:
     rows = coulomb_decay() + den_hartog() + leine() + unexcited() + hopf() + flutter()
     return f"""## Friction of one mass
 
-"Set-valued" is friction without smoothing (`solver=SetValued()`), the rest has the smoothing
-slope k_s that is given. Smoothing changes the belt's period by 6 % at k_s = 1e3 s/m: that is the
-model, and the numbers agree with those of the smoothed law.
+"Set-valued" is friction without smoothing (`solver=SetValued()`); other rows give the smoothing
+slope k_s. Smoothing with k_s = 1e3 s/m changes the period of the belt oscillator by 6 %. This is a
+property of the model: the reference is the period of the smoothed law.
 
 {comparisons(rows)}
 """

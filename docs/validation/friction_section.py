@@ -112,9 +112,9 @@ def solvers() -> list[Comparison]:
 TEXT = """## Section 4.3: friction oscillator
 
 A mass on a moving belt, pulled to and fro through a spring: `friction_oscillator.py`. The
-source gives no third mode. Taken: 30 Hz, D = 0.01, with amplitudes of 0.5 at B and -0.5 at the
-contact relative to the rigid mode; with equal signs no vibration is seen. The contact is stuck
-during stick, so that the vibration shows at B alone.
+source gives no third mode. The values taken are 30 Hz and D = 0.01, with amplitudes of 0.5 at B and
+-0.5 at the contact relative to the rigid mode. With equal signs there is no visible vibration. In
+stick only B vibrates, because the contact does not move.
 
 {figures}
 
@@ -122,10 +122,11 @@ during stick, so that the vibration shows at B alone.
 
 {slips}
 
-These waves have slopes of up to 0.50, and the source keeps the contact force on them vertical
-(`ground.normal = "vertical"`). By default the contact force is normal to the sloping surface
-("leaning" below), which an elastic contact needs to conserve energy. It then pushes the mass along
-the belt with up to half of the normal force, beside a friction of at most 0.8 of it:
+The waves have slopes of up to 0.50. In the source the contact force is vertical on them
+(`ground.normal = "vertical"`). By default the contact force is normal to the sloping surface, as an
+elastic contact needs to conserve energy; the table and the picture name this case "leaning". The
+contact force then pushes the mass along the belt with up to half of the normal force, in addition
+to a friction of at most 0.8 of it:
 
 {leaning}
 

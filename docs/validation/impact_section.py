@@ -173,21 +173,21 @@ Data that the source does not give, and the values taken here:
 
 ### Regimes
 
-Found by the program from the motion, strobed once a drive period: a motion repeats if it comes back
-to within 0.2 % of its size, or 3 % if it comes to rest on the stop. Exponents of orbits are those
-of their largest multipliers, by derivatives of the motion; those with a standard error are mean
-growths over 400 periods of motions that do not repeat to 0.1 %.
+The regime follows from the states once per drive period. A motion is periodic if it repeats to
+0.2 % of its size, or to 3 % if it comes to rest on the stop. The exponent of a periodic orbit is
+that of its largest multiplier. An exponent with a standard error is the mean growth over 400
+periods of a motion that does not repeat to 0.1 %.
 
 {regimes}
 
-At 1.567 Hz the rough contact is hardly damped at small penetrations, and with the rotation and
-one bending mode some ripple is left when the spring lifts the pendulum off. It differs from period
-to period: with two modes these are alike to 1 or 2 % only, and the exponent is not decided: runs of
-different lengths and tolerances give values from -0.3 to +1.4 1/s, the longest ones the smallest.
-The irregular transient lasts for tens of seconds, and rounding decides for how long; after 80 s,
+At 1.567 Hz the rough contact has little damping at small penetrations. With the rotation and
+one bending mode, some vibration is left when the spring lifts the pendulum off. This vibration
+differs from period to period: periods agree to 1 or 2 % only. The exponent is uncertain: runs of
+different lengths and tolerances give -0.3 to +1.4 1/s, the longest runs the smallest values.
+The irregular transient lasts for tens of seconds, depending on round-off. After 80 s,
 all of twelve starts at a tolerance of 1e-7, and eleven at 1e-9, were near a motion of six periods
 (10, 11, 9, 14, 8, 13 impacts) that repeats to 0.3 %. With a third mode the periods repeat exactly.
-"Rests" are contacts of a tenth of a period or more in which the velocity stays below a tenth of the
+"Rests" are contacts that last a tenth of a period or more, with velocities below a tenth of the
 largest impact velocity.
 
 ### Figures
@@ -205,17 +205,17 @@ points of the periodic motions.
 
 ### Impacts
 
-On the mesh with four modes, until the motion repeats (six periods of the chaotic one). Velocities
-are means over the contact; vibrations that come from earlier impacts can give back more than one
-impact takes, so that restitution may exceed one.
+The impacts of the finite element model with four modes, over one period of the motion (six periods
+of the chaotic one). Velocities are means over the contact. Restitution may exceed one, because
+vibration can return energy of earlier impacts.
 
 {impacts}
 
 ### How narrow it is
 
-Two-mode model, followed upwards and downwards over 601 frequencies, 80 periods at each. Chaos
-fills most of the range from 1.75 to 4.3 Hz, and grows out of the chatter; above, different motions
-exist side by side: {hysteresis}.
+Runs of the two-mode model follow 601 frequencies upwards and downwards, with 80 periods at each.
+Most of the range from 1.75 to 4.3 Hz is chaotic; below lies chatter. Different motions coexist
+at {hysteresis}.
 
 ![Bifurcation diagram](images/validation/impact-bifurcation.png)
 

@@ -25,10 +25,10 @@ def section(images: Path) -> str:
     save(line_contact.figure(found), images / "line-contact.png")
     return f"""## Line contact with partial slip
 
-A cylinder of R = 50 mm on a rigid plane, plane strain, E = 210 GPa, P' = 1 MN/m, mu = 0.3: pressed
-without friction, then sheared by Q = mu P / 2 (`line_contact.py`; sixteen quadratic
-elements per half-width). On a rigid plane normal and tangential contact are coupled, unless nu is
-1/2: at 0.49 Cattaneo's closed form holds.
+A cylinder of R = 50 mm in plane strain (E = 210 GPa, P' = 1 MN/m, mu = 0.3) is pressed on a rigid
+plane without friction, then sheared by Q = mu P / 2 (`line_contact.py`; sixteen quadratic
+elements per half-width). On a rigid plane normal and tangential contact are coupled unless
+nu = 1/2. The results at nu = 0.49 are compared with Cattaneo's closed form.
 
 {comparisons(rows)}
 

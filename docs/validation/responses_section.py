@@ -215,16 +215,18 @@ def bodies() -> str:
 
 TEXT = """## Frequency responses
 
-Responses by harmonic balance, `frequency_response`. Published numbers to the digits shown; one
-harmonic of a mass with a Jenkins element by its describing function, with 128 samples; the third
-harmonic of small vibration by perturbation; Mathieu's characteristic values for Hill's method.
+Responses are computed by harmonic balance (`frequency_response`). The references are published
+numbers to the digits shown, the describing function of a Jenkins element (one harmonic, 128
+samples), a perturbation solution of the third harmonic at small vibration, and Mathieu's
+characteristic values for Hill's method.
 
 {published}
 
 ![Responses of the Duffing oscillator](images/validation/duffing-responses.png)
 
-Errors of the displacement over a period with H harmonics, relative to half its range, against 61
-harmonics. Smooth forces converge exponentially; forces with kinks about as H^-3:
+Error of the displacement over a period with H harmonics, relative to half its range; the reference
+has 61 harmonics. Responses converge exponentially for smooth forces, and about as H^-3 for forces
+with kinks:
 
 {convergence}
 
@@ -233,9 +235,9 @@ samples, collocation on 200 intervals, shooting with two segments, and a run of 
 
 {methods}
 
-Elastic bodies with friction dampers at resonance (`friction_damper.py` with a smoothing
-slope of 200 s/m, `blade_pair.py` with the best load) beside runs that have settled. With
-one harmonic the amplitude of the blades agrees by chance:
+Elastic bodies with friction dampers at resonance are compared with steady runs:
+`friction_damper.py` with a smoothing slope of 200 s/m, `blade_pair.py` with the normal load of the
+smallest peak. With one harmonic the amplitude of the blades agrees by chance:
 
 {bodies}
 """

@@ -35,10 +35,10 @@ def section(images: Path) -> str:
         for ratio in (0.1, 0.5, 1.0)}), images / "dithered-friction.png")
     return f"""## Solids
 
-A steel box of 0.3 x 0.2 x 0.1 m whose six faces slide without friction (`sliding_box.py`):
-standing waves fit in exactly, without any singularity. Relative error of the frequency, the larger
-one of the two waves (1, 1, 1), and how it falls with the element size h between the last two
-meshes; linear elements promise h^2, quadratic ones h^4:
+The six faces of a steel box of 0.3 x 0.2 x 0.1 m slide without friction (`sliding_box.py`). Its
+modes are standing waves in closed form, without singularities. The table has the larger relative
+error of the frequencies of the two waves (1, 1, 1), and its order in the element size h between
+the last two meshes. Theory gives h^2 for linear and h^4 for quadratic elements:
 
 {_box(errors)}
 
@@ -68,9 +68,9 @@ centre of pressure runs ahead by mu h / 2.
 
 {comparisons(_throw(block))}
 
-The way that smoothing adds over the belt is the integral of v (1 / s(v) - 1) / (mu g) over the
-speeds v, with the smoothed sign s: of first order in 1 / k_s with the arctan, of second with the
-others.
+Smoothing lengthens the path on the belt by the integral of v (1 / s(v) - 1) / (mu g) over the
+speeds v, with the smoothed sign s. The integral is of first order in 1 / k_s for the arctan, of
+second order for the other functions.
 
 {comparisons([Comparison(f"{smoothing}, k_s = {slope:g} s/m: too far on the belt [m]",
                          thrown_block.excess(smoothing, slope), far)
@@ -79,9 +79,9 @@ others.
 
 ![Path of the block, and what smoothing adds to it](images/validation/thrown-block.png)
 
-Steady sliding at V while the ground shakes with a cos w t across or along the motion
-(`dithered_friction.py`, k_s = 1e6 s/m): mean friction along the motion over mu N, beside
-2/pi V / sqrt(V^2 + a^2) K(a^2 / (V^2 + a^2)) and 2/pi arcsin(V / a).
+A body slides at V while the ground moves with the velocity a cos w t across or along the motion
+(`dithered_friction.py`, k_s = 1e6 s/m). The mean friction along the motion over mu N is compared
+with 2/pi V / sqrt(V^2 + a^2) K(a^2 / (V^2 + a^2)) (across) and 2/pi arcsin(V / a) (along).
 
 {comparisons([Comparison(f"dither {direction}, V = {ratio:g} a",
                          float(dithered_friction.closed_form(ratio, direction)), value)
@@ -118,10 +118,11 @@ def spheres(images: Path) -> str:
 Two steel spheres of R = 50 mm are pressed together (Hertz) and moved to and fro by the displacement
 that Q = 0.75 mu P needs, at 30 degrees to the x axis (`two_spheres.py`). Near the contact
 they are half-spaces whose compliance between rings is a closed form, so that no mesh matters, and
-are of one material, so that normal and tangential contact are not coupled. Cattaneo and Mindlin,
-loss by Mindlin and Deresiewicz (1953): as the small difference of large works it feels errors of
-the forces up to thirty times. The same rings solved in increments without time lose as much to
-0.1 %, and with 44 rings what the closed form says to 0.15 % (`tests/system/test_two_spheres.py`).
+are of one material, so that normal and tangential contact are not coupled. The references are
+Cattaneo and Mindlin, and for the loss Mindlin and Deresiewicz (1953). The loss is a small
+difference of large works, which magnifies errors of the forces up to thirty times. Quasi-static
+increments with the same rings give the same loss to 0.1 %, with 44 rings the closed form to 0.15 %
+(`tests/system/test_two_spheres.py`).
 
 {comparisons(rows)}
 

@@ -27,8 +27,8 @@ def section() -> str:
     rows = van_der_pol() + two_oscillators() + duffing() + friction()
     return f"""## Quasi-periodic motions
 
-Tori followed by `torus_branch`. Averaged solutions have errors of the order of eps and of the
-force; runs and the Neimark-Sacker point by collocation have none but their tolerances.
+Tori are followed by `torus_branch`. Averaged solutions have errors of the order of eps and of the
+force. Runs and the Neimark-Sacker point by collocation have only the errors of their tolerances.
 
 {comparisons(rows)}
 """

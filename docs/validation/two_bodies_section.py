@@ -36,9 +36,10 @@ strip sticks; for equal materials normal and tangential contact are not coupled.
 
 ![Pressure and shear between two bodies beside closed forms](images/validation/two-bodies.png)
 
-Two blocks under uniform pressure, without friction (`stacked_blocks.py`): largest error of
-a stress component over the pressure. At mesh nodes of meshes that do not match, the other face is
-loaded unevenly, as `pair_faces` reports; segments with mean displacements load both evenly.
+Two blocks are pressed together uniformly without friction (`stacked_blocks.py`). The table has the
+largest error of a stress component over the pressure. Mesh nodes of meshes that do not match load
+the other face unevenly, which `pair_faces` reports. Segments with mean displacements load both
+faces evenly.
 
 {table(("meshes of the faces", "error"), patches)}
 

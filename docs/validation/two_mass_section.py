@@ -94,11 +94,11 @@ over v_0.
 
 {printed}
 
-The first Hopf point and the fold of the orbits born there lie 5.7 % and 1.2 % above the print,
-which seems wrong in these two places: with the same constants all the rest agrees to the last digit
-printed, but for the third doubling, which rounds to 9.37. Between T1 and H1 steady sliding and a
-stable orbit exist side by side, as the source says; the unstable orbit between them parts the
-starts. The three stable motions at 3.8 m/s, found by runs of 400 s: {attractors}. Of the starts of
+The first Hopf point and the fold of the orbits that emerge there lie 5.7 % and 1.2 % above the
+printed values. These two values seem to be misprints: with the same constants all others agree to
+the last digit, except the third doubling, which rounds to 9.37. Between T1 and H1 steady sliding
+and a stable orbit coexist, as the source says; the unstable orbit between them separates their
+basins. The three stable motions at 3.8 m/s, found by runs of 400 s: {attractors}. Of the starts of
 the second mass in the last picture, the first one resting at its place in steady sliding, lead to
 them: {shares}.
 
