@@ -34,17 +34,17 @@ _CONSTRAINTS: Mapping[str, type] = {
 _MOST_NODES = 16  # of a proposed interface
 # Elements that are read as others, with the effect on frequencies (benchmarks/calculix.py).
 _OTHERWISE = {
-    r"C3D8R\w*": "bricks {} with one point become second-order hexahedra, or bricks with "
-                 "incompatible modes with degree = 1, which are stiffer than hourglass control on "
-                 "coarse meshes, by 2 % in frequency for the Brake-Reuss beam.",
-    r"C3D8I\w*": "bricks {} become second-order hexahedra, of nearly the same frequencies on fine "
-                 "meshes; degree = 1 in [body] takes them with their incompatible modes.",
-    r"C3D20R\w*": "bricks {} with reduced integration become hexahedra of 27 nodes; frequencies "
-                  "of a block with three across its thickness agree to 0.1 %.",
-    r"C3D1[35]\w*": "cells {} are cut into quadratic tetrahedra, which raises frequencies of a "
-                    "thin blade by 0.03 to 0.4 %.",
-    r"C3D[56]\w*": "cells {} are cut into tetrahedra, quadratic ones that are softer, by 10 "
-                   "% in frequency for a block with three across its thickness.",
+    r"C3D8R\w*": "bricks {} (one point) become second-order hexahedra. With degree = 1 they "
+                 "become bricks with incompatible modes, which are stiffer than hourglass control "
+                 "on coarse meshes: by 2 % in frequency for the Brake-Reuss beam.",
+    r"C3D8I\w*": "bricks {} become second-order hexahedra, with nearly the same frequencies on "
+                 "fine meshes. With degree = 1 in [body] they keep their incompatible modes.",
+    r"C3D20R\w*": "bricks {} (reduced integration) become hexahedra with 27 nodes. Frequencies of "
+                  "a block with three bricks through the thickness agree to 0.1 %.",
+    r"C3D1[35]\w*": "cells {} are cut into quadratic tetrahedra. This raises frequencies of a thin "
+                    "blade by 0.03 to 0.4 %.",
+    r"C3D[56]\w*": "cells {} are cut into quadratic tetrahedra, which are softer: by 10 % in "
+                   "frequency for a block with three cells through the thickness.",
 }
 # Functions that read loads and supports, by the suffix of the file.
 _CONTENTS: Mapping[str, Callable[[Path], DeckContents]] = {
@@ -140,14 +140,15 @@ class Imported:
                     *([f"Bodies without an interface are left out: {listed(left, len(left))}."]
                       if left else []),
                     *self.notes, *loads.notes,
-                    *([f"Loads and supports of the deck: {', '.join(self.contents.loads)}. Those "
-                       f"of supports at zero, forces at single points, pressure, and gravity and "
-                       f"rotation of whole bodies are taken; give others as fixed in [body] and in "
-                       f"[load]."]
+                    *([f"Loads and supports of the deck: {', '.join(self.contents.loads)}. This "
+                       f"study takes supports at zero, forces at single points, pressure, and "
+                       f"gravity and rotation of whole bodies. Add others as fixed in [body] and "
+                       f"in [load]."]
                       if self.contents.loads else []),
-                    *(["The laws of contact are a stiff normal contact and a coefficient of 0.3; "
-                       "put in your own."] if bodies else
-                      ["No contact: name a boundary in [basis] as contact, and give the laws."])]
+                    *(["Replace the contact laws: they are placeholders, a stiff normal contact "
+                       "and a friction coefficient of 0.3."] if bodies else
+                      ["No contact: set contact in [basis] to a boundary, and add [normal] and "
+                       "[friction]."])]
         head = "".join(f"# {line}\n" for text in comments for line in text.splitlines())
         return f"{head}\n{tomli_w.dumps(tables)}"
 
@@ -200,8 +201,8 @@ class Imported:
                         "signal": value * (self.scale if moment else 1.0)})
                     break
             else:
-                found.notes.append(f"The force on {given} is left out: it is no single point of "
-                                   f"the bodies.")
+                found.notes.append(f"The force on {given} is left out: {given} is not a single "
+                                   f"point of the bodies.")
         distributed = self.contents.distributed
         for surface, value in distributed.pressures:
             held = [(body, name) for body in bodies for name in self.meshes[body].boundaries
@@ -211,14 +212,14 @@ class Imported:
                     "boundary": f"{_name(body)}." * several + name,
                     "pressure": value / self.scale**2})
             if not held:
-                found.notes.append(f"The pressure on {surface} is left out: it is no boundary of "
-                                   f"the bodies.")
+                found.notes.append(f"The pressure on {surface} is left out: {surface} is not a "
+                                   f"boundary of the bodies.")
         total = np.zeros(3)
         for name, acceleration in distributed.gravity:
             if self._whole(name, bodies):
                 total += self.scale * np.array(acceleration)
             else:
-                found.notes.append(f"Gravity on {name} is left out: it must act on all cells.")
+                found.notes.append(f"Gravity on {name} is left out: gravity must act on all cells.")
         if total.any():
             d = self.meshes[bodies[0]].dimension
             found.table["gravity"] = total[:d].tolist()
@@ -226,8 +227,8 @@ class Imported:
                 found.named[body].add("gravity")
         for name, *_ in distributed.rotations:
             if not any(self._rotation(body) for body in bodies):
-                found.notes.append(f"Centrifugal force on {name} is left out: it must act on all "
-                                   f"cells.")
+                found.notes.append(f"Centrifugal force on {name} is left out: this force must act "
+                                   f"on all cells.")
         for what in dict.fromkeys(distributed.unread):
             found.notes.append(f"{what} is left out: only {distributed.kinds} are read.")
         return found
@@ -243,8 +244,8 @@ class Imported:
             # Nodes by their numbers are in groups of their own.
             numbered = given.isdigit() and any(name.startswith("BOUNDARY ") for name in taken)
             if not words & taken and not numbered and {*components.split()} & {*axes}:
-                yield (f"The support of {given} is left out: it is no group of the bodies, or "
-                       f"touches a face of an interface.")
+                yield (f"The support of {given} is left out: {given} is not a group of the bodies, "
+                       f"or touches a face of an interface.")
 
     def _rotation(self, body: str) -> dict[str, object] | None:
         """Table of the rotation of a body by centrifugal force on all its cells."""
@@ -330,7 +331,7 @@ def imported(path: str | Path, scale: float = 1.0) -> Imported:
             notes += [f"{sentence[:1].upper()}{sentence[1:]}"
                       for sentence in implausible_body(who[name], body)]
     if contents.elements:
-        notes += [f"The deck gives {who[name]} no material; the study has steel, correct it there."
+        notes += [f"The deck gives {who[name]} no material. The study takes steel: correct [body]."
                   for name, mesh in meshes.items() if not mesh.materials]
     notes += [f"{number} {sentence.format(kind)}" for kind, number in contents.elements.items()
               for types, sentence in _OTHERWISE.items() if re.fullmatch(types, kind)]
@@ -341,7 +342,7 @@ def imported(path: str | Path, scale: float = 1.0) -> Imported:
                 warnings.simplefilter("ignore", ModelWarning)
                 pair_faces(bodies, face, other, nodes=_contact_nodes(meshes, face, other))
         except FecontactError as error:
-            notes.append(f"{face} and {other} are no interface: {error}")
+            notes.append(f"{face} and {other} do not become an interface: {error}")
             continue
         interfaces.append((face, other))
     return Imported(path, scale, meshes, contents, tuple(interfaces), tuple(dict.fromkeys(notes)),

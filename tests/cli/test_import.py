@@ -64,7 +64,7 @@ def test_two_parts_on_each_other(cli, place):
                    "study.toml is written; next: fecontact mesh study.toml"):
         assert wanted in lines, wanted
     assert any(line.startswith("skipped") and "1 *OUTPUT" in line for line in lines)
-    assert "18 bricks C3D8R with one point become second-order hexahedra" in " ".join(err.split())
+    assert "18 bricks C3D8R (one point) become second-order hexahedra" in " ".join(err.split())
     study = Study.read("study.toml")
     assert set(study.bodies) == {"A", "B"}
     assert (study.interfaces["contact-1"].face, study.interfaces["contact-1"].other) == (

@@ -113,7 +113,7 @@ def test_sections_of_unknown_sets_and_elements_without_one_are_said(tmp_path):
                                          r"first at \(0\.5, 0\.5, 1\.5\); give"):
         ElasticBody(mesh)
     bare = imported(written(tmp_path, "c.inp", NODES + BRICK))
-    assert "The deck gives the body no material; the study has steel, correct it there." in (
+    assert "The deck gives the body no material. The study takes steel: correct [body]." in (
         bare.notes)
     assert imported(written(tmp_path, "d.inp", text)).notes == ()
 

@@ -152,10 +152,10 @@ def test_mixed_meshes_are_cut_into_tetrahedra(tmp_path, form, seed):
 
 
 @pytest.mark.parametrize(("corners", "order", "kind", "note"), [
-    (6, 1, "C3D6", "64 cells C3D6 are cut into tetrahedra, quadratic ones that are softer, by"),
-    (6, 2, "C3D15", "64 cells C3D15 are cut into quadratic tetrahedra, which raises frequencies"),
-    (8, 1, "C3D8R", "32 bricks C3D8R with one point become second-order hexahedra, or bricks with"),
-    (8, 1, "C3D8I", "32 bricks C3D8I become second-order hexahedra, of nearly the same"),
+    (6, 1, "C3D6", "64 cells C3D6 are cut into quadratic tetrahedra, which are softer: by"),
+    (6, 2, "C3D15", "64 cells C3D15 are cut into quadratic tetrahedra. This raises frequencies"),
+    (8, 1, "C3D8R", "32 bricks C3D8R (one point) become second-order hexahedra. With"),
+    (8, 1, "C3D8I", "32 bricks C3D8I become second-order hexahedra, with nearly the same"),
     (8, 1, "C3D8", None),
 ])
 def test_an_import_tells_elements_that_are_read_as_others(tmp_path, corners, order, kind, note):
