@@ -4,8 +4,8 @@ Each deck is solved twice by ``ccx`` (Debian: calculix-ccx) in a temporary folde
 frequencies; ``read_mesh`` reads it too. Ten-node tetrahedra and eight-node bricks, also those with
 incompatible modes, have equal stiffness in both. CalculiX integrates the mass of tetrahedra at
 fewer points, and gives bricks with incompatible modes another mass. Other elements are read as
-others: bricks C3D8R with incompatible modes, C3D20 and C3D20R with 27 nodes, wedges cut into
-tetrahedra; their frequencies alone are compared.
+others: bricks C3D8R with incompatible modes, C3D20 and C3D20R with 27 nodes, wedges C3D15 with 18;
+CalculiX integrates C3D6 at two points. Of these frequencies alone are compared.
 
 Public decks, which are no part of this package, follow if their files are given: the blade of
 NASA's rotor 37 (one part of fifteen-node wedges, free, beside CalculiX), and the Brake-Reuss beam,
@@ -103,7 +103,7 @@ def cases(size: float) -> Iterator[Case]:
     force = (("x", 300.0), ("y", 100.0), ("z", -200.0))
     for element in ELEMENTS_OF:
         yield Case(f"block of {element}", part("A", 0.0, size, element, 1), "A_tip", force,
-                   1 if element.startswith("C3D8") else 2, element in SAME)
+                   1 if element.startswith(("C3D6", "C3D8")) else 2, element in SAME)
     one = part("A", 0.0, size, "C3D10", 1)
     pair = one + part("B", 0.1, 0.8 * size, "C3D10", 30001)
     yield Case("tied blocks", f"{pair}*TIE, NAME=T, POSITION TOLERANCE=1e-4\nB_left, A_right\n",

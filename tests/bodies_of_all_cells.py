@@ -2,7 +2,7 @@
 
 import numpy as np
 from meshes_for_tests import rectangle
-from solid_blocks import block_body
+from solid_blocks import block_body, mixed_mesh
 
 from fecontact import ElasticBody, Material, generate
 from fecontact.fem import Ring
@@ -23,6 +23,12 @@ def ring(element):
                        MATERIAL)
 
 
+def mixed(degree, **options):
+    """A solid of distorted hexahedra, wedges, pyramids and tetrahedra."""
+    mesh = mixed_mesh((1, 2, 2), bend=lambda at: at + 0.01 * np.sin(50.0 * at[:, ::-1]))
+    return ElasticBody(mesh, MATERIAL, degree=degree, **options)
+
+
 BODIES = {
     "triangles": lambda: plane(True, 1), "triangles, quadratic": lambda: plane(True, 2),
     "quadrilaterals": lambda: plane(False, 1, "strain"),
@@ -31,4 +37,5 @@ BODIES = {
     "tetrahedra, curved": lambda: ring("tetrahedron"),
     "hexahedra": lambda: block_body((2, 1, 1), material=MATERIAL, degree=1),
     "hexahedra, curved": lambda: ring("hexahedron"),
+    "mixed": lambda: mixed(1), "mixed, quadratic": lambda: mixed(2),
 }

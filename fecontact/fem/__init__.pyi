@@ -1,7 +1,8 @@
 from .attachments import PointMass, PointSpring
 from .constraints import Coupling, LinearEquation, Term, Tie
 from .cyclic_symmetry import CyclicSymmetry, SectorNodes
-from .elements.cell_kinds import CellKind
+from .element_block import ElementBlock
+from .elements.cell_kinds import CellBlock, CellKind
 from .elimination import Elimination
 from .fields import BodyFields, stress_of
 from .material import AnisotropicMaterial
@@ -17,12 +18,14 @@ from .supports import HingeSupport
 __all__ = [
     "AnisotropicMaterial",
     "BodyFields",
+    "CellBlock",
     "CellKind",
     "Coupling",
     "CurveAxes",
     "CyclicSymmetry",
     "Cylinder",
     "CylindricalAxes",
+    "ElementBlock",
     "Elimination",
     "HingeSupport",
     "LapStrip",

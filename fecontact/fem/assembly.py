@@ -18,6 +18,7 @@ cell is a solid one without the third derivatives; K has this form in plane stre
 lateral constant for lambda.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,9 @@ from fecontact.core.records import (
     Vector,
 )
 from fecontact.core.types import Array, Integers
+from fecontact.fem.element_block import ElementBlock
+from fecontact.fem.elements.cell_kinds import CellKind, padded, shape_functions
+from fecontact.fem.elements.quadrature import rule
 
 # Largest difference between the edges of a cell whose map counts as affine, relative to them.
 _AFFINE = 1e-13
@@ -44,17 +48,16 @@ _MOST = np.iinfo(np.int32).max
 
 
 def assembled(
-    basis: Any, lateral: float | Array, shear: float | Array, density: float | Array,
-    anisotropic: tuple[Array, Integers] | None = None,
+    blocks: Sequence[ElementBlock], lateral: float | Array, shear: float | Array,
+    density: float | Array, anisotropic: tuple[Array, Integers] | None = None,
 ) -> tuple[Any, Any]:
     """Stiffness and mass of one displacement component, both exactly symmetric.
 
     Parameters
     ----------
-    basis : skfem.Basis
-        Scalar Lagrange elements (N nodes) on triangles, quadrilaterals, tetrahedra or hexahedra,
-        straight or curved. Its quadrature is used in the cells whose map is not affine; the others
-        are exact.
+    blocks : sequence of ElementBlock
+        Elements of each kind with N nodes in all, straight or curved. Their quadrature is used in
+        cells whose map is not affine; the others are exact.
     lateral, shear : float or (c,) array
         Lame's constants lambda and mu of a solid or in plane strain [Pa]; in plane stress
         ``nu E / (1 - nu^2)`` and mu; of all cells or of each.
@@ -79,41 +82,53 @@ def assembled(
     """
     import scipy.sparse as sp
 
-    dofs = np.ascontiguousarray(basis.element_dofs.T, dtype=np.int64)
-    dimension, size = basis.mesh.dim(), int(basis.N)
-    indptr, indices, slots = pattern(dofs, size)
-    blocks, mass = np.zeros((len(indices), dimension, dimension)), np.zeros(len(indices))
-    nodes, corners, element = _geometry(basis)
-    constants = np.empty((len(dofs), 3))
+    size, dimension = blocks[0].places.shape
+    indptr, indices, slots = pattern([block.nodes for block in blocks], size)
+    entries, mass = np.zeros((len(indices), dimension, dimension)), np.zeros(len(indices))
+    places = np.zeros((size, 3))
+    places[:, :dimension] = blocks[0].places
+    constants = np.empty((sum(len(block.nodes) for block in blocks), 3))
     for column, value in enumerate((lateral, shear, density)):
         constants[:, column] = value
-    tensors, which_tensor = anisotropic or (np.empty((0, 6, 6)), np.full(len(dofs), -1))
-    affine = _affine_cells(nodes, corners, dimension)
-    if affine.any():
-        which = np.flatnonzero(affine)
-        inverse, scale = _inverse_jacobians(nodes, corners[which], dimension)
-        gradients, masses = _reference_integrals(basis.elem)
-        _add_affine(which, inverse, scale, gradients, masses, constants, tensors,
-                    which_tensor, slots, blocks, mass)
-    if not affine.all():
-        at, weights = basis.X, np.ascontiguousarray(basis.W)
-        values, slopes = _shapes(basis.elem, at)
-        _add_quadrature(np.flatnonzero(~affine), nodes, corners, _shapes(element, at)[1], values,
-                        slopes, weights, constants, tensors, which_tensor, slots, blocks, mass)
-    return (sp.bsr_array((blocks, indices, indptr), shape=(dimension * size,) * 2),
+    tensors, which_tensor = anisotropic or (np.empty((0, 6, 6)), np.full(len(constants), -1))
+    for block, own in zip(blocks, slots, strict=True):
+        material = np.ascontiguousarray(constants[block.numbers]), tensors, np.ascontiguousarray(
+            which_tensor[block.numbers])
+        corners = np.ascontiguousarray(block.nodes[:, : block.geometry])
+        affine = _affine_cells(places, corners, block.kind)
+        if affine.any():
+            which = np.flatnonzero(affine)
+            inverse, scale = _inverse_jacobians(places, corners[which], block.kind)
+            _add_affine(which, inverse, scale, *_reference_integrals(block), *material, own,
+                        entries, mass)
+        if not affine.all():
+            values, slopes = _shapes(dimension, block.nodes.shape[1], block.local)
+            stretch = _shapes(dimension, block.geometry, block.local)[1]
+            _add_quadrature(np.flatnonzero(~affine), places, corners, stretch, values, slopes,
+                            np.array(block.weights), *material, own, entries, mass)
+    return (sp.bsr_array((entries, indices, indptr), shape=(dimension * size,) * 2),
             sp.csr_array((mass, indices, indptr), shape=(size, size)))
 
 
-def pattern(dofs: Integers, size: int) -> tuple[Any, Any, Any]:
+def pattern(members: Sequence[Integers], size: int) -> tuple[Any, Any, list[Any]]:
     """Sparsity of a matrix between nodes that share a cell.
+
+    Parameters
+    ----------
+    members : sequence of (c, k) integer arrays
+        Nodes of the cells of each kind.
+    size : int
+        Number N of nodes.
 
     Returns
     -------
     indptr (N + 1,), indices : integer arrays
         By rows, sorted.
-    slots : (c, k, k) integer array
-        Index of the entry between two of the k nodes of each cell.
+    slots : list of (c, k, k) integer arrays
+        Index of the entry between two of the k nodes of each cell, by kind.
     """
+    # Repeated nodes of a row find the same entries.
+    dofs = np.array(padded(members), dtype=np.int64, order="C")
     count, width = dofs.shape
     starts = np.zeros(size + 1, dtype=np.int64)
     np.cumsum(np.bincount(dofs.ravel(), minlength=size), out=starts[1:])
@@ -129,7 +144,10 @@ def pattern(dofs: Integers, size: int) -> tuple[Any, Any, Any]:
     slots = np.empty((count, width, width), dtype=np.int32)
     seen[:] = -1
     _rows(dofs, starts, around, seen, indptr, indices, slots)
-    return indptr.astype(np.int32), indices, slots
+    ends = np.cumsum([len(one) for one in members])[:-1]
+    return indptr.astype(np.int32), indices, [
+        np.ascontiguousarray(part[:, : one.shape[1], : one.shape[1]])
+        for part, one in zip(np.split(slots, ends), members, strict=True)]
 
 
 def subtract(stiffness: Any, dofs: Integers, matrices: Array) -> None:
@@ -201,80 +219,54 @@ def _rows(
                         slots[cell, own, j] = seen[dofs[cell, j]]
 
 
-def _geometry(basis: Any) -> tuple[Array, Integers, Any]:
-    """Nodes (n, 3) of the map of the cells, those of each cell (c, g), and its element."""
-    mesh = basis.mesh
-    if hasattr(basis.mapping, "elem"):
-        places, cells, element = mesh.doflocs, mesh.dofs.element_dofs, basis.mapping.elem
-    else:
-        places, cells, element = mesh.p, mesh.t, mesh.elem()
-    nodes = np.zeros((places.shape[1], 3))
-    nodes[:, : mesh.dim()] = places.T
-    return nodes, np.ascontiguousarray(cells.T, dtype=np.int64), element
+def _ends(kind: CellKind) -> list[int]:
+    """Nodes at the origin of the reference cell and at the ends of its axes."""
+    corners = [tuple(place) for place in kind.places[: kind.corners]]
+    axes = np.eye(kind.dimension, dtype=int)
+    return [corners.index((0,) * kind.dimension), *(corners.index(tuple(axis)) for axis in axes)]
 
 
-def _edges(element_nodes: int, dimension: int) -> Integers:
-    """Nodes at the ends of the axes of the reference cell, whose corner 0 is at the origin."""
-    if dimension == 2:
-        return np.array((1, 2) if element_nodes in (3, 6) else (1, 3))
-    return np.array((1, 2, 3))
-
-
-def _reference_places(element_nodes: int, dimension: int) -> Array:
-    """Places (g, d) of the nodes of the map of a cell in the reference cell."""
-    import skfem
-
-    kinds = {(3, 2): skfem.ElementTriP1, (6, 2): skfem.ElementTriP2, (4, 2): skfem.ElementQuad1,
-             (9, 2): skfem.ElementQuad2, (4, 3): skfem.ElementTetP1, (10, 3): skfem.ElementTetP2,
-             (8, 3): skfem.ElementHex1, (27, 3): skfem.ElementHex2}
-    return np.asarray(kinds[element_nodes, dimension]().doflocs)
-
-
-def _affine_cells(nodes: Array, corners: Integers, dimension: int) -> Any:
+def _affine_cells(nodes: Array, corners: Integers, kind: CellKind) -> Any:
     """Boolean mask (c,) of the cells that are affine images of the reference cell."""
-    if corners.shape[1] == dimension + 1:
+    if kind.simplex and corners.shape[1] == kind.corners:
         return np.ones(len(corners), dtype=bool)
-    places = _reference_places(corners.shape[1], dimension)
-    origin = nodes[corners[:, 0]]
-    edges = nodes[corners[:, _edges(corners.shape[1], dimension)]] - origin[:, None]
+    first, *others = _ends(kind)
+    origin = nodes[corners[:, first]]
+    edges = nodes[corners[:, others]] - origin[:, None]
     size = np.abs(edges).max(axis=(1, 2))
     affine = np.ones(len(corners), dtype=bool)
-    for node, place in zip(corners.T, places, strict=True):
+    for node, place in zip(corners.T, np.array(kind.places, float), strict=False):
         expected = origin + np.einsum("a,cap->cp", place, edges)
         affine &= np.abs(nodes[node] - expected).max(axis=1) <= _AFFINE * size
     return affine
 
 
 def _inverse_jacobians(
-    nodes: Array, corners: Integers, dimension: int
+    nodes: Array, corners: Integers, kind: CellKind
 ) -> tuple[Array, Array]:
     """Derivatives (c, 3, 3) of the reference coordinates and volumes (c,) of affine cells."""
-    ends = corners[:, _edges(corners.shape[1], dimension)]
-    edges = (nodes[ends] - nodes[corners[:, :1]])[:, :, :dimension]
+    (first, *others), dimension = _ends(kind), kind.dimension
+    edges = (nodes[corners[:, others]] - nodes[corners[:, [first]]])[:, :, :dimension]
     jacobian = np.moveaxis(edges, 1, 2)
     inverse = np.zeros((len(corners), 3, 3))
     inverse[:, :dimension, :dimension] = np.linalg.inv(jacobian)
     return inverse, np.abs(np.linalg.det(jacobian))
 
 
-def _shapes(element: Any, at: Array) -> tuple[Array, Array]:
-    """Values (q, k) and slopes (q, k, 3) of shape functions at reference points (d, q)."""
-    count = len(element.doflocs)
-    values, slopes = np.empty((at.shape[1], count)), np.zeros((at.shape[1], count, 3))
-    for i in range(count):
-        value, slope = element.lbasis(at, i)
-        values[:, i] = value
-        slopes[:, i, : len(at)] = np.asarray(slope).T
-    return values, slopes
+def _shapes(dimension: int, count: int, at: Array) -> tuple[Array, Array]:
+    """Values (q, k) and slopes (q, k, 3) of shape functions at reference points (q, d)."""
+    values, slopes = shape_functions(dimension, count, at)
+    found = np.zeros((*values.shape, 3))
+    found[:, :, :dimension] = slopes
+    return np.ascontiguousarray(values), found
 
 
-def _reference_integrals(element: Any) -> tuple[Array, Array]:
+def _reference_integrals(block: ElementBlock) -> tuple[Array, Array]:
     """Integrals of the products of slopes (k, k, 3, 3) and values (k, k) of shape functions."""
-    from skfem.quadrature import get_quadrature
-
-    # Exact for quadratic functions; per direction where the cell is a square or a cube.
-    at, weights = get_quadrature(element.refdom, 4)
-    values, slopes = _shapes(element, at)
+    kind = block.kind
+    # Exact for quadratic functions; per direction where the cell is no simplex.
+    at, weights = rule(kind.dimension, kind.corners, 4)
+    values, slopes = _shapes(kind.dimension, block.nodes.shape[1], at)
     return (np.einsum("q,qia,qjb->ijab", weights, slopes, slopes),
             np.einsum("q,qi,qj->ij", weights, values, values))
 

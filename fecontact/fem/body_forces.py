@@ -59,7 +59,7 @@ def _face_forces(body: ElasticBody, facets: Integers) -> Array:
     forces = np.zeros((len(body.nodes), 3, 3))
     for load, direction in enumerate((normals, tangents[:, :, 0], tangents[:, :, 1])):
         np.add.at(forces[:, :, load], surface.facets,
-                  np.einsum("kg,gn,kgx->knx", weights, values, direction))
+                  np.einsum("kg,kgn,kgx->knx", weights, values, direction))
     return forces.reshape(-1, 3)
 
 

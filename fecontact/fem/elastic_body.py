@@ -1,6 +1,6 @@
 """The elastic body: mesh, material and supports as stiffness and mass."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, get_args
@@ -37,10 +37,13 @@ from fecontact.fem.constraints import (
     counted,
     reference_points,
 )
-from fecontact.fem.elements.cell_kinds import numbered_rows
+from fecontact.fem.element_block import ElementBlock
+from fecontact.fem.elements.cell_geometry import centres_of
+from fecontact.fem.elements.cell_kinds import HEXAHEDRON, blocks_of, padded, row_numbers
+from fecontact.fem.elements.quadrature import rule_of
 from fecontact.fem.elimination import Elimination, eliminated
 from fecontact.fem.equations import Unknowns
-from fecontact.fem.incompatible_modes import in_parts, reductions
+from fecontact.fem.incompatible_modes import reductions
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
 from fecontact.fem.mesh import Bricks, Mesh
 from fecontact.fem.reference_motions import displacement_rows, reference_motions
@@ -48,13 +51,7 @@ from fecontact.fem.supports import HingeSupport, check_supports, fixed_dofs, hin
 
 _MATERIALS = (Material, AnisotropicMaterial)
 # Memory per unknown for modes [bytes], by dimension and number of corners.
-_BYTES = {(2, 3): 7e3, (2, 4): 9.5e3, (3, 4): 7.5e3, (3, 8): 1.2e4}
-# Order of quadrature by dimension, number of corners and degree: exact for the mass of straight
-# triangles and tetrahedra, parallelograms and parallelepipeds; for trilinear cells of degree 1 too.
-_ORDER = {(2, 3, 1): 4, (2, 3, 2): 4, (2, 4, 1): 4, (2, 4, 2): 4,
-          (3, 4, 1): 2, (3, 4, 2): 4, (3, 8, 1): 5, (3, 8, 2): 5}
-# With curved cells the products of shape functions meet determinants of higher order.
-_CURVED_ORDER = {(2, 3): 6, (2, 4): 6, (3, 4): 6, (3, 8): 6}
+_BYTES = {(2, 3): 7e3, (2, 4): 9.5e3, (3, 4): 7.5e3, (3, 5): 9e3, (3, 6): 1e4, (3, 8): 1.2e4}
 
 
 @read_only_arrays
@@ -70,7 +67,7 @@ class ElasticBody(Summarised):
     Parameters
     ----------
     mesh : Mesh
-        Triangles or quadrilaterals; tetrahedra or hexahedra for a solid.
+        Triangles or quadrilaterals; for a solid tetrahedra, pyramids, wedges or hexahedra.
     material : Material, AnisotropicMaterial or mapping of name to material, optional
         One material, or that of each group of cells of the mesh, which together hold each cell
         once; by default those of the mesh, or steel if it has none.
@@ -134,10 +131,10 @@ class ElasticBody(Summarised):
         if self.bricks is None:
             object.__setattr__(self, "bricks", self.mesh.bricks)
         require_choice("ElasticBody", "bricks", self.bricks, get_args(Bricks))
-        kind, degree = self.mesh.kind, int(self.degree)
-        plain = "triangles" if self.dimension == 2 else "tetrahedra"
-        require_memory("ElasticBody: the number of cells", len(self.mesh.cells),
-                       kind.unknowns(degree) * _BYTES[kind.dimension, kind.corners],
+        plain, count = "triangles" if self.dimension == 2 else "tetrahedra", len(self.mesh.cells)
+        needed = sum(len(block.nodes) * block.kind.unknowns(int(self.degree))
+                     * _BYTES[self.dimension, block.kind.corners] for block in self.mesh.blocks)
+        require_memory("ElasticBody: the number of cells", count, needed / count,
                        f", by a larger element_size, or {plain} or degree = 1")
         _ = self.anisotropic
         if self.constraints is not None:
@@ -160,7 +157,7 @@ class ElasticBody(Summarised):
         named = of.items() if isinstance(of, Mapping) else [("", one) for one in self.materials]
         curved = f", {len(mesh.curved_cells)} curved" if len(mesh.curved_cells) else ""
         return [
-            ("mesh", f"{len(mesh.cells)} {mesh.kind.name}{curved}, {len(mesh.nodes)} nodes, degree "
+            ("mesh", f"{mesh.cells_in_words}{curved}, {len(mesh.nodes)} nodes, degree "
              f"{self.degree}{', incompatible modes' if self.has_incompatible_modes else ''}"),
             *((axis, span(values, "m")) for axis, values in zip("xyz", mesh.nodes.T, strict=False)),
             ("thickness", f"{self.thickness:.4g} m, plane {self.plane}") if self.dimension == 2
@@ -174,8 +171,8 @@ class ElasticBody(Summarised):
     @property
     def has_incompatible_modes(self) -> bool:
         """True for eight-node bricks with incompatible modes."""
-        return (self.dimension, self.mesh.kind.corners, self.degree) == (3, 8, 1) and (
-            self.bricks == "incompatible")
+        return (self.dimension, self.degree, self.bricks) == (3, 1, "incompatible") and (
+            HEXAHEDRON.name in self.mesh.cell_counts)
 
     @property
     def dimension(self) -> int:
@@ -229,47 +226,48 @@ class ElasticBody(Summarised):
             found[groups[name]] = number
         if (found < 0).any():
             first = np.flatnonzero(found < 0)[0]
-            place = self.mesh.nodes[self.mesh.cells[first]].mean(axis=0)
-            where = ", ".join(f"{x:g}" for x in place)
+            where = ", ".join(f"{x:g}" for x in centres_of(self.mesh.nodes, self.mesh.cells)[first])
             raise InputError(f"ElasticBody: material leaves {np.count_nonzero(found < 0)} of "
                              f"{len(found)} cells without a material, the first at ({where}); give "
                              f"the groups of these cells too.")
         return found
 
     @cached_property
-    def basis(self) -> Any:
-        """Scalar scikit-fem basis of one displacement component."""
-        import skfem
+    def blocks(self) -> tuple[ElementBlock, ...]:
+        """Elements of each kind, with their rule of quadrature."""
+        found = []
+        for number, block in enumerate(self.mesh.blocks):
+            kind = block.kind
+            members = (block.ordered if self.degree == 1
+                       else self.mesh.second_order.members[number])
+            found.append(ElementBlock(
+                kind, block.numbers, np.ascontiguousarray(members), self.nodes,
+                members.shape[1] if self.curved else kind.corners,
+                *rule_of(kind, self.degree, self.curved)))
+        return tuple(found)
 
-        kind = self.mesh.kind
-        which = kind.dimension, kind.corners
-        meshes = {(2, 3): (skfem.MeshTri1, skfem.MeshTri2), (2, 4): (skfem.MeshQuad1,
-                                                                     skfem.MeshQuad2),
-                  (3, 4): (skfem.MeshTet1, skfem.MeshTet2), (3, 8): (skfem.MeshHex1,
-                                                                     skfem.MeshHex2)}
-        elements = {(2, 3): (skfem.ElementTriP1, skfem.ElementTriP2),
-                    (2, 4): (skfem.ElementQuad1, skfem.ElementQuad2),
-                    (3, 4): (skfem.ElementTetP1, skfem.ElementTetP2),
-                    (3, 8): (skfem.ElementHex1, skfem.ElementHex2)}
-        element = elements[which][self.degree - 1]()
-        cells = self.mesh.cells if kind.corners < 8 else self.mesh.cells[:, list(kind.order)]
-        straight = meshes[which][0](self.mesh.nodes.T.copy(), cells.T.copy())
-        if not self.curved:
-            return skfem.Basis(straight, element, intorder=_ORDER[(*which, self.degree)])
-        # The straight mesh numbers the nodes; its triangles may start at another corner.
-        members = skfem.Dofs(straight, element).element_dofs.T
-        places = self.mesh.second_order_places()
-        if kind.corners == 3:
-            places = _turned(places, self.mesh.cells, straight.t.T)
-        doflocs = np.empty((self.mesh.dimension, members.max() + 1))
-        doflocs[:, members] = np.moveaxis(places, 2, 0)
-        curved = meshes[which][1](doflocs, straight.t)
-        return skfem.Basis(curved, element, intorder=_CURVED_ORDER[which])
+    def parts(self, cells: Integers | None = None) -> Iterator[ElementBlock]:
+        """Elements of all or the given cells, in parts of one kind whose matrices fit in memory."""
+        for block in self.blocks:
+            chosen = block if cells is None else block.only(np.isin(block.numbers, cells))
+            yield from chosen.parts()
+
+    @cached_property
+    def elements(self) -> Integers:
+        """Displacement nodes (M, k) of each element, in the order of ``CellKind.places``.
+
+        Rows of elements with fewer nodes than others are filled by their last one.
+        """
+        width = max(block.nodes.shape[1] for block in self.blocks)
+        found = np.empty((len(self.mesh.cells), width), np.int64)
+        for block in self.blocks:
+            found[block.numbers] = padded([block.nodes], width)
+        return found
 
     @cached_property
     def nodes(self) -> Array:
         """Reference places (N, d) of the displacement nodes [m]."""
-        return np.ascontiguousarray(self.basis.doflocs.T)
+        return self.mesh.nodes if self.degree == 1 else self.mesh.second_order.places
 
     @cached_property
     def stiffness(self) -> Any:
@@ -284,26 +282,11 @@ class ElasticBody(Summarised):
     @property
     def _element_stiffness(self) -> Any:
         import scipy.sparse as sp
-        from skfem import BilinearForm
 
-        if self.dimension == 3:
-            rows = self.stiffness_blocks.tocsr()
-            return sp.csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)
-        if not self.is_uniform:
+        if self.dimension == 2:
             return sp.csc_array(self.thickness * self._assembled[0])
-        # Three scalar forms of 9 x 9 pairs are much faster than one vector form of 18 x 18 pairs,
-        # most of whose products are zero.
-        gradients = [
-            BilinearForm(lambda u, v, w, a=a, b=b: v.grad[a] * u.grad[b]).assemble(self.basis)
-            for a, b in ((0, 0), (1, 1), (0, 1))
-        ]
-        xx, yy, xy = (matrix.tocsr() for matrix in gradients)
-        direct, lateral, shear = self.elasticity[0]
-        blocks = [[direct * xx + shear * yy, lateral * xy + shear * xy.T],
-                  [lateral * xy.T + shear * xy, direct * yy + shear * xx]]
-        K = sum(sp.kron(blocks[i][j], sp.csr_array(([1.0], ([i], [j])), shape=(2, 2)))
-                for i in range(2) for j in range(2))
-        return sp.csc_array(0.5 * self.thickness * (K + K.T))
+        rows = self.stiffness_blocks.tocsr()
+        return sp.csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)
 
     @property
     def stiffness_blocks(self) -> Any:
@@ -314,25 +297,21 @@ class ElasticBody(Summarised):
     def _assembled(self) -> tuple[Any, Any]:
         """Stiffness and mass of one component of a solid, or of a plane body 1 m thick."""
         _, lateral, shear = self.elasticity.T
-        K, M = assembled(self.basis, lateral, shear, self.densities, self.anisotropic)
+        K, M = assembled(self.blocks, lateral, shear, self.densities, self.anisotropic)
         if self.has_incompatible_modes:
-            for cells in in_parts(np.arange(len(self.mesh.cells))):
-                lower = reductions(self, cells)
-                subtract(K, self.basis.element_dofs.T[cells], np.swapaxes(lower, 1, 2) @ lower)
+            for part in self.parts():
+                if part.kind == HEXAHEDRON:
+                    lower = reductions(self, part)
+                    subtract(K, part.nodes, np.swapaxes(lower, 1, 2) @ lower)
         return K, M
 
     @cached_property
     def component_mass(self) -> Any:
         """Mass of one displacement component in the elements, sparse (N, N) by rows [kg]."""
         import scipy.sparse as sp
-        from skfem import BilinearForm
 
-        if self.dimension == 3:
-            return self._assembled[1]
-        if not self.is_uniform:
-            return sp.csr_array(self.thickness * self._assembled[1])
-        scalar = BilinearForm(lambda u, v, w: u * v).assemble(self.basis)
-        return sp.csr_array(0.5 * self.densities[0] * self.thickness * (scalar + scalar.T))
+        M = self._assembled[1]
+        return M if self.dimension == 3 else sp.csr_array(self.thickness * M)
 
     @cached_property
     def mass(self) -> Any:
@@ -345,7 +324,7 @@ class ElasticBody(Summarised):
     @cached_property
     def gradients(self) -> tuple[Any, ...]:
         """Derivatives in x, y (, z) at the nodes, sparse (N, N): means of the adjacent elements."""
-        return _nodal_gradients(self.basis)
+        return _nodal_gradients(self.blocks)
 
     @cached_property
     def material_gradients(self) -> list[tuple[Array, tuple[Any, ...]]]:
@@ -353,7 +332,7 @@ class ElasticBody(Summarised):
         if self.is_uniform:
             return [(self.elasticity[0], self.gradients)]
         return [(_elasticity(one, self.dimension, self.plane),
-                 _nodal_gradients(self.basis, self.cell_materials == number))
+                 _nodal_gradients(self.blocks, self.cell_materials == number))
                 for number, one in enumerate(self.materials) if isinstance(one, Material)]
 
     @property
@@ -384,7 +363,7 @@ class ElasticBody(Summarised):
     def cell_centres(self, cells: Integers) -> Array:
         """Mean places (n, 3) of the corners of cells [m]; z is zero in a plane body."""
         centres = np.zeros((len(cells), 3))
-        centres[:, : self.dimension] = self.mesh.nodes[self.mesh.cells[cells]].mean(axis=1)
+        centres[:, : self.dimension] = centres_of(self.mesh.nodes, self.mesh.cells[cells])
         return centres
 
     @cached_property
@@ -508,9 +487,8 @@ class ElasticBody(Summarised):
     def pieces(self) -> tuple[int, Integers]:
         """Number of pieces that share no node, and the piece (N,) of each displacement node."""
         count, piece = self.mesh.pieces
-        members = self.basis.element_dofs.T
         found = np.empty(len(self.nodes), np.int64)
-        found[members] = piece[self.basis.mesh.t[0]][:, None]
+        found[self.elements] = piece[self.mesh.cells[:, :1]]
         return count, found
 
     def _joined_pieces(self) -> int:
@@ -544,34 +522,30 @@ class ElasticBody(Summarised):
 
         Edges: start, (middle,) end. Faces: corners, then of quadratic elements the middles between
         successive corners, then the centre of four-sided ones: 3 or 6 of triangles, 4 or 9 of
-        quadrilaterals.
+        quadrilaterals; rows of triangles beside quadrilaterals are filled by their last node.
         """
         if self.dimension == 2 or self.degree == 1:
             return self.edge_nodes(facets) if self.dimension == 2 else np.asarray(facets)
-        count = facets.shape[1]
-        parts = [facets, *(self.edge_nodes(facets[:, [i, (i + 1) % count]])[:, 1:2]
-                           for i in range(count))]
-        if count == 4:
-            known = np.sort(self.basis.mesh.facets.T.astype(np.int64), axis=1)
-            _, number, _ = numbered_rows(np.concatenate([known, np.sort(facets, axis=1)]))
-            row = np.empty(number.max() + 1, np.int64)
-            row[number[:len(known)]] = np.arange(len(known))
-            before = len(self.mesh.nodes) + self.basis.mesh.edges.shape[1]
-            parts.append(before + row[number[len(known):], None])
-        return np.concatenate(parts, axis=1)
+        found = np.empty((len(facets), {3: 6, 4: 9}[facets.shape[1]]), np.int64)
+        for which, some in blocks_of(facets):
+            count = some.shape[1]
+            parts = [some, *(self.edge_nodes(some[:, [i, (i + 1) % count]])[:, 1:2]
+                             for i in range(count))]
+            if count == 4:
+                first = len(self.mesh.nodes) + len(self.mesh.edges[0])
+                faces = self.mesh.second_order.faces
+                parts.append(first + row_numbers(faces, np.sort(some, axis=1))[:, None])
+            found[which] = padded([np.concatenate(parts, axis=1)], found.shape[1])
+        return found
 
     def edge_nodes(self, edges: Integers) -> Integers:
         """Displacement nodes (k, degree + 1) of mesh edges (k, 2): start, (middle,) end."""
         if self.degree == 1:
             return np.asarray(edges)
-        mesh = self.basis.mesh
-        facets = (mesh.facets if self.dimension == 2 else np.sort(mesh.edges, axis=0)).T
-        facets = facets.astype(np.int64)
-        size = len(self.mesh.nodes)
-        order = np.argsort(facets[:, 0] * size + facets[:, 1])
-        keys = (facets[:, 0] * size + facets[:, 1])[order]
+        size, known = len(self.mesh.nodes), self.mesh.edges[0]
         ends = np.sort(edges, axis=1)
-        middle = size + order[np.searchsorted(keys, ends[:, 0] * size + ends[:, 1])]
+        middle = size + np.searchsorted(known[:, 0] * size + known[:, 1],
+                                        ends[:, 0] * size + ends[:, 1])
         return np.column_stack([edges[:, 0], middle, edges[:, 1]])
 
 
@@ -586,35 +560,26 @@ def _elasticity(material: AnyMaterial, dimension: int, plane: str) -> Array:
     return np.array([lateral + 2.0 * shear, lateral, shear])
 
 
-def _turned(places: Array, cells: Integers, corners: Integers) -> Array:
-    """Second-order places (M, 6, 2) of triangles whose corners are taken in another order."""
-    at = (cells[:, None, :] == corners[:, :, None]).argmax(axis=2)
-    # Edges 0-1, 1-2, 0-2 lie opposite the corners 2, 0, 1.
-    opposite = np.array([2, 0, 1])
-    edge = np.argsort(opposite)[at[:, opposite]]
-    return np.take_along_axis(places, np.concatenate([at, 3 + edge], axis=1)[:, :, None], axis=1)
-
-
-def _nodal_gradients(basis: Any, chosen: Any = True) -> tuple[Any, ...]:
+def _nodal_gradients(blocks: Sequence[ElementBlock], chosen: Any = None) -> tuple[Any, ...]:
     """Derivatives in x, y (, z) at the nodes, sparse (N, N).
 
-    Each is the area-weighted mean of the gradients of the adjacent elements at the node, to which
+    Each is the volume-weighted mean of the gradients of the adjacent elements at the node, to which
     those that are not ``chosen`` (M,) add nothing.
     """
     import scipy.sparse as sp
 
-    local = basis.elem.doflocs.T
-    dofs = basis.element_dofs.T
-    area = basis.dx.sum(axis=1)
-    count, size = basis.doflocs.shape[1], dofs.shape[1]
-    slopes = np.stack([basis.elem.gbasis(basis.mapping, local, i)[0].grad for i in range(size)])
-    # slopes: (function, direction, element, node)
-    slopes = np.moveaxis(slopes, (0, 1, 2, 3), (3, 0, 1, 2)) * (area * chosen)[None, :, None, None]
-    row = np.broadcast_to(dofs[:, :, None], slopes.shape[1:]).ravel()
-    column = np.broadcast_to(dofs[:, None, :], slopes.shape[1:]).ravel()
-    around = np.bincount(dofs.ravel(), np.repeat(area, size), minlength=count)
-    return tuple(
-        sp.csr_array(sp.coo_array((slope.ravel() / around[row], (row, column)),
-                                  shape=(count, count)))
-        for slope in slopes
-    )
+    count, d = blocks[0].places.shape
+    around = np.zeros(count)
+    slopes, rows, columns = [], [], []
+    for block in blocks:
+        nodes, volumes = block.nodes, block.volumes
+        size = nodes.shape[1]
+        around += np.bincount(nodes.ravel(), np.repeat(volumes, size), minlength=count)
+        own = volumes if chosen is None else volumes * chosen[block.numbers]
+        gradients = block.gradients_at(block.at_nodes)[0] * own[:, None, None, None]
+        slopes.append(gradients.reshape(-1, d))
+        rows.append(np.repeat(nodes, size, axis=1).ravel())
+        columns.append(np.tile(nodes, size).ravel())
+    row, column, slope = (np.concatenate(one) for one in (rows, columns, slopes))
+    return tuple(sp.csr_array(sp.coo_array((one / around[row], (row, column)),
+                                           shape=(count, count))) for one in slope.T)

@@ -12,11 +12,19 @@ from fecontact.core.errors import InputError, require_choice
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity, span
-from fecontact.fem.cell_gradients import PAIRS
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.elements.cell_geometry import facets_of, oriented_solids
-from fecontact.fem.elements.cell_kinds import CELL_KINDS, numbered_rows, shape_functions
+from fecontact.fem.element_block import PAIRS
+from fecontact.fem.elements.cell_geometry import oriented_solids, sides_of
+from fecontact.fem.elements.cell_kinds import (
+    HEXAHEDRON,
+    blocks_of,
+    numbered_rows,
+    padded,
+    shape_functions,
+    unordered,
+)
 from fecontact.fem.elements.refinement import PARTS
+from fecontact.fem.faces.surface import drawn_facets
 from fecontact.fem.incompatible_modes import mode_gradients
 from fecontact.fem.interpolation import element_kind, interpolation
 from fecontact.fem.material import Material
@@ -39,7 +47,8 @@ class BodyFields(Summarised):
     nodes : (N, 2) array, of a solid (N, 3)
         Reference places of the displacement nodes [m].
     elements : (E, k) integer array
-        Nodes of each element: corners, then middles of edges, of faces, of the element.
+        Nodes of each element: corners, then middles of edges, of faces, of the element; rows of
+        elements with fewer nodes than others are filled by their last one.
     displacement : (N, 2) array, of a solid (N, 3)
         In x, y (, z) [m].
     stress : (N, 4) array, of a solid (N, 6)
@@ -67,7 +76,7 @@ class BodyFields(Summarised):
 
     @cached_property
     def cells(self) -> Integers:
-        """First-order cells (M, 3) or (M, 4), of a solid (M, 4) or (M, 8), between the nodes."""
+        """First-order cells (M, k) between the nodes, rows as those of :class:`~fecontact.Mesh`."""
         return linear_cells(self.nodes, self.elements)
 
     @cached_property
@@ -75,9 +84,9 @@ class BodyFields(Summarised):
         """Edges (k, 2) or faces (k, 3) or (k, 4) of these cells on the outline."""
         cells = self.cells
         if self.nodes.shape[1] == 3:
-            faces = facets_of(cells, CELL_KINDS[3, cells.shape[1]])
-            _, number, count = numbered_rows(np.sort(faces, axis=1))
-            return np.asarray(faces[count[number] == 1])
+            faces, _ = sides_of(cells, 3)
+            _, number, count = numbered_rows(unordered(faces))
+            return drawn_facets(faces[count[number] == 1])[0]
         sides = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2))
         edges, count = np.unique(sides, axis=0, return_counts=True)
         return np.asarray(edges[count == 1])
@@ -111,18 +120,18 @@ class BodyFields(Summarised):
 
     def _gradients(self) -> Array:
         """Displacement gradients (N, d, d) at the nodes, means over the adjacent elements."""
-        (count, d), members = self.nodes.shape, self.elements
-        width = members.shape[1]
-        kind = element_kind(d, width)
-        local = np.array(kind.places[:width], dtype=float)
-        _, slopes = shape_functions(d, width, local)
-        jacobian = np.einsum("nkj,eki->enij", slopes, self.nodes[members])
-        grad = np.einsum("nkj,eki->enij", slopes, self.displacement[members]) @ (
-            np.linalg.inv(jacobian))
-        size = np.abs(np.linalg.det(jacobian)).mean(axis=1)
+        count, d = self.nodes.shape
         found, around = np.zeros((count, d, d)), np.zeros(count)
-        np.add.at(found, members, size[:, None, None, None] * grad)
-        np.add.at(around, members, size[:, None])
+        for _, members in blocks_of(self.elements):
+            width = members.shape[1]
+            local = np.array(element_kind(d, width).places[:width], dtype=float)
+            _, slopes = shape_functions(d, width, local)
+            jacobian = np.einsum("nkj,eki->enij", slopes, self.nodes[members])
+            grad = np.einsum("nkj,eki->enij", slopes, self.displacement[members]) @ (
+                np.linalg.inv(jacobian))
+            size = np.abs(np.linalg.det(jacobian)).mean(axis=1)
+            np.add.at(found, members, size[:, None, None, None] * grad)
+            np.add.at(around, members, size[:, None])
         return found / around[:, None, None]
 
     def at(self, place: Sequence[float]) -> tuple[Array, Array]:
@@ -136,32 +145,21 @@ class BodyFields(Summarised):
         return weights[0] @ self.displacement[which], weights[0] @ self.stress[which]
 
 
-def body_elements(body: ElasticBody) -> Integers:
-    """Nodes (E, k) of each element of a body, in the order of ``CellKind.places``."""
-    # 64-bit indices, as in files.
-    return np.ascontiguousarray(body.basis.element_dofs.T.astype(np.int64))
-
-
 def of_one_kind(cells: Sequence[Integers], dimension: int) -> list[Integers]:
-    """First-order cells of several bodies: as simplices where their kinds differ."""
+    """First-order cells of several bodies in rows of one length; plane ones as triangles."""
     if len({array.shape[1] for array in cells}) == 1:
         return list(cells)
-    return [_simplices(array, dimension) for array in cells]
-
-
-def _simplices(cells: Integers, dimension: int) -> Integers:
-    """Triangles or tetrahedra in the place of quadrilaterals or hexahedra."""
-    if cells.shape[1] == dimension + 1:
-        return cells
-    parts = ((0, 1, 2), (0, 2, 3)) if dimension == 2 else (
-        (0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
-    return np.concatenate([cells[:, list(part)] for part in parts])
+    if dimension == 3:
+        width = max(array.shape[1] for array in cells)
+        return [padded([array], width) for array in cells]
+    return [array if array.shape[1] == 3 else np.concatenate(
+        [array[:, [0, 1, 2]], array[:, [0, 2, 3]]]) for array in cells]
 
 
 def linear_cells(nodes: Array, elements: Integers) -> Integers:
     """First-order cells between all nodes of elements, with positive orientation.
 
-    Cells of solids have their corners in the order of meshes, those of elements in scikit-fem's.
+    Cells of solids have their corners in the order of meshes, rows filled by their last one.
     """
     if nodes.shape[1] == 3:
         return _solid_cells(nodes, elements)
@@ -181,12 +179,15 @@ def linear_cells(nodes: Array, elements: Integers) -> Integers:
 
 
 def _solid_cells(nodes: Array, elements: Integers) -> Integers:
-    kind = element_kind(3, elements.shape[1])
-    if elements.shape[1] == kind.corners:
-        inverse = np.argsort(kind.order)
-        return np.ascontiguousarray(elements[:, inverse])
-    cells = np.concatenate([elements[:, list(part)] for part in PARTS[3, kind.corners]])
-    return oriented_solids(nodes, cells, kind)
+    found = []
+    for _, rows in blocks_of(elements):
+        kind = element_kind(3, rows.shape[1])
+        if rows.shape[1] == kind.corners:
+            found.append(rows[:, np.argsort(kind.order)])
+        else:
+            found += [rows[:, list(part)] for part in PARTS[3, kind.corners]]
+    cells = padded(found)
+    return cells if elements.shape[1] <= 8 else oriented_solids(nodes, cells)
 
 
 def stress_of(
@@ -219,8 +220,7 @@ def stress_of(
         For material axes of a plane body of which none is normal to its plane.
     """
     require_choice("stress_of", "axes", axes, get_args(StressAxes))
-    chosen = np.flatnonzero(
-        (body.anisotropic[1] >= 0) | body.has_incompatible_modes | finite)
+    chosen = np.flatnonzero((body.anisotropic[1] >= 0) | body.has_incompatible_modes | finite)
     parts = [_stress_by_cells(body, displacements, axes, chosen, finite, factors)] if len(
         chosen) else []
     if len(chosen) == len(body.mesh.cells):
@@ -245,33 +245,35 @@ def _stress_by_cells(
     """Part of the chosen cells in the stresses, means over all elements at a node."""
     import scipy.sparse as sp
 
-    basis, d = body.basis, body.dimension
+    d = body.dimension
     components, used = (4, [0, 1, 3]) if d == 2 else (6, list(range(6)))
-    size = basis.dx.sum(axis=1)
-    members = basis.element_dofs.T
-    count, width = len(body.nodes), members.shape[1]
-    around = np.bincount(members.ravel(), np.repeat(size, width), minlength=count)
+    count, around = len(body.nodes), np.zeros(len(body.nodes))
     fields = displacements.reshape(count, d, -1)
     total = np.zeros((count, components * fields.shape[2]))
-    local = basis.elem.doflocs.T
-    slopes = np.stack([basis.elem.gbasis(basis.mapping, local, i)[0].grad for i in range(width)])
-    blocks = 1 + len(chosen) * width * fields.shape[2] // _AT_ONCE
-    for cells in np.array_split(chosen, blocks):
-        # grad (e, n, i, j, m): derivative of displacement i in direction j at node n of the cell
-        grad = np.einsum("kjen,ekim->enijm", slopes[:, :, cells], fields[members[cells]])
-        if body.has_incompatible_modes:
-            grad += mode_gradients(body, cells, displacements, local.T, factors)
-        strains = np.stack([_strain(grad, i, j, finite) for i, j in PAIRS[d]], axis=2)
-        of_strain = body.cell_stiffness(cells)[:, :components, used]
-        if d == 2 and body.plane == "stress":
-            of_strain[:, 2] = 0.0
-        if axes == "material":
-            of_strain = _to_material_axes(body, cells, components) @ of_strain
-        stress = np.einsum("ers,ensm->enrm", of_strain, strains) * size[cells, None, None, None]
-        rows = members[cells].ravel()
-        gather = sp.csr_array((1.0 / around[rows], (rows, np.arange(len(rows)))),
-                              shape=(count, len(rows)))
-        total += gather @ stress.reshape(len(rows), -1)
+    for block in body.blocks:
+        np.add.at(around, block.nodes, block.volumes[:, None])
+    for block in body.blocks:
+        local, volumes, width = block.at_nodes, block.volumes, block.nodes.shape[1]
+        rows = np.flatnonzero(np.isin(block.numbers, chosen))
+        parts = 1 + len(rows) * width * max(fields.shape[2], width) // _AT_ONCE
+        for some in np.array_split(rows, parts):
+            part = block.only(some)
+            # grad (e, n, i, j, m): derivative of displacement i in direction j at node n
+            grad = np.einsum("enkj,ekim->enijm", part.gradients_at(local)[0], fields[part.nodes])
+            if body.has_incompatible_modes and block.kind == HEXAHEDRON:
+                grad += mode_gradients(body, part, displacements, local, factors)
+            strains = np.stack([_strain(grad, i, j, finite) for i, j in PAIRS[d]], axis=2)
+            of_strain = body.cell_stiffness(part.numbers)[:, :components, used]
+            if d == 2 and body.plane == "stress":
+                of_strain[:, 2] = 0.0
+            if axes == "material":
+                of_strain = _to_material_axes(body, part.numbers, components) @ of_strain
+            stress = np.einsum("ers,ensm->enrm", of_strain, strains)
+            stress *= volumes[some, None, None, None]
+            at = part.nodes.ravel()
+            gather = sp.csr_array((1.0 / around[at], (at, np.arange(len(at)))),
+                                  shape=(count, len(at)))
+            total += gather @ stress.reshape(len(at), total.shape[1])
     return total.reshape(count, components, -1)
 
 

@@ -32,8 +32,8 @@ from fecontact.core.compiled import kernel
 from fecontact.core.records import Array4, Block, IntegerMatrix, Matrix, ShortBlock
 from fecontact.core.types import Array, Integers
 from fecontact.fem.assembly import pattern
-from fecontact.fem.cell_gradients import cell_gradients
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.elements.cell_kinds import HEXAHEDRON
 from fecontact.fem.elimination import selects
 from fecontact.fem.fields import stress_of
 from fecontact.fem.finite_rotations import FiniteRotations
@@ -93,25 +93,28 @@ class FiniteStrainModel:
     geometric: Any = None
 
     @cached_property
-    def _cells(self) -> tuple[Array, Array, Integers, Array]:
-        """Gradients (e, q, k, d), volumes (e, q), nodes (e, k) and stiffness (e, s, s) of cells."""
+    def _blocks(self) -> list[tuple[Array, Array, Integers, Array]]:
+        """Gradients (e, q, k, d), volumes (e, q), nodes (e, k) and stiffness (e, s, s) by kind."""
         body = self.body
-        gradients, volumes = cell_gradients(body)
-        members = np.ascontiguousarray(body.basis.element_dofs.T, dtype=np.int64)
-        if body.has_incompatible_modes:
-            count = len(members)
-            bubbles = bubble_gradients(body, np.arange(count))
-            gradients = np.ascontiguousarray(np.concatenate([gradients, bubbles], axis=2))
-            own = len(body.nodes) + np.arange(3 * count).reshape(count, 3)
-            members = np.ascontiguousarray(np.concatenate([members, own], axis=1))
-        used = USED[body.dimension]
-        stiffness = np.ascontiguousarray(body.cell_stiffness()[:, used][:, :, used])
-        return gradients, volumes * body.thickness, members, stiffness
+        used, found = USED[body.dimension], []
+        for block in body.blocks:
+            (gradients, volumes), members = block.gradients(), block.nodes
+            if body.has_incompatible_modes and block.kind == HEXAHEDRON:
+                count = len(members)
+                gradients = np.ascontiguousarray(np.concatenate(
+                    [gradients, bubble_gradients(block)], axis=2))
+                own = len(body.nodes) + np.arange(3 * count).reshape(count, 3)
+                members = np.ascontiguousarray(np.concatenate([members, own], axis=1))
+            stiffness = body.cell_stiffness(block.numbers)[:, used][:, :, used]
+            found.append((gradients, volumes * body.thickness, members,
+                          np.ascontiguousarray(stiffness)))
+        return found
 
     @property
     def nodes(self) -> int:
         """Number of nodes, those of incompatible modes included."""
-        extra = 3 * len(self.body.mesh.cells) if self.body.has_incompatible_modes else 0
+        bricks = self.body.mesh.cell_counts.get(HEXAHEDRON.name, 0)
+        extra = 3 * bricks if self.body.has_incompatible_modes else 0
         return len(self.body.nodes) + extra
 
     @cached_property
@@ -126,7 +129,7 @@ class FiniteStrainModel:
 
     @cached_property
     def _pattern(self) -> tuple[Any, Any, Any]:
-        return pattern(self._cells[2], self.nodes)
+        return pattern([members for _, _, members, _ in self._blocks], self.nodes)
 
     @cached_property
     def _springs(self) -> Any:
@@ -185,8 +188,9 @@ class FiniteStrainModel:
         indptr, indices, slots = self._pattern
         blocks = np.zeros((len(indices) if tangent else 0, d, d))
         found = np.zeros((2, 1))
-        _add_cells(*self._cells, np.ascontiguousarray(u.reshape(-1, d)), slots, blocks, force,
-                   found)
+        moved = np.ascontiguousarray(u.reshape(-1, d))
+        for block, own in zip(self._blocks, slots, strict=True):
+            _add_cells(*block, moved, own, blocks, force, found)
         energy, total, K = float(found[0, 0]), force.ravel(), None
         if tangent:
             K = sp.bsr_array((blocks, indices, indptr), shape=(u.size, u.size)).tocsc()

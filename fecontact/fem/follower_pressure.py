@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 from fecontact.fem.body_forces import boundary_facets
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import shape_functions
-from fecontact.fem.faces.surface import quadrature
+from fecontact.fem.faces.surface import functions_by, quadrature
 
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
@@ -47,7 +47,7 @@ def follower_pressure(
         if not pressure:
             continue
         facets = boundary_facets(body, name)
-        own, slopes = (_edges if d == 2 else _faces)(places[facets])
+        own, slopes = _edges(places[facets]) if d == 2 else _faces(facets, places[facets])
         scale = pressure * (body.thickness if d == 2 else 1.0)
         np.add.at(force, facets, scale * own)
         at = d * facets[:, :, None] + np.arange(d)
@@ -71,17 +71,15 @@ def _edges(places: Array) -> tuple[Array, Array]:
             np.broadcast_to(each, (len(places), *each.shape)))
 
 
-def _faces(places: Array) -> tuple[Array, Array]:
+def _faces(facets: Integers, places: Array) -> tuple[Array, Array]:
     """Forces (k, n, 3) of a unit pressure on faces (k, n, 3), and derivatives (k, n, 3, n, 3)."""
-    count = places.shape[1]
-    local, weights = quadrature(count)
-    values, slopes = shape_functions(2, count, local)
-    along = np.einsum("gna,knx->akgx", slopes, places)
-    forces = -np.einsum("g,gi,kgx->kix", weights, values, np.cross(along[0], along[1]))
+    values, slopes, weights = functions_by(quadrature, facets)
+    along = np.einsum("kgna,knx->akgx", slopes, places)
+    forces = -np.einsum("kg,kgi,kgx->kix", weights, values, np.cross(along[0], along[1]))
     # cross[x, y, z]: component x of e_y times e_z.
     cross = np.zeros((3, 3, 3))
     for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         cross[x, y, z], cross[x, z, y] = 1.0, -1.0
-    moved = (np.einsum("gj,xyz,kgz->kgxjy", slopes[..., 0], cross, along[1])
-             + np.einsum("gj,xzy,kgz->kgxjy", slopes[..., 1], cross, along[0]))
-    return forces, -np.einsum("g,gi,kgxjy->kixjy", weights, values, moved)
+    moved = (np.einsum("kgj,xyz,kgz->kgxjy", slopes[..., 0], cross, along[1])
+             + np.einsum("kgj,xzy,kgz->kgxjy", slopes[..., 1], cross, along[0]))
+    return forces, -np.einsum("kg,kgi,kgxjy->kixjy", weights, values, moved)

@@ -17,16 +17,30 @@ from fecontact.fem.attachments import Attachment, check_attachments, counted_att
 from fecontact.fem.constraints import Constraint, check_constraints, counted
 from fecontact.fem.elements.cell_geometry import (
     curved_volumes,
-    facets_of,
     oriented_solids,
     require_apart,
     require_conforming,
     require_no_overlap,
     second_order_places,
+    sides_of,
     solid_volumes,
 )
-from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind, numbered_rows
-from fecontact.fem.elements.refinement import at_second_order, refined
+from fecontact.fem.elements.cell_kinds import (
+    CELL_KINDS,
+    CellBlock,
+    blocks_of,
+    numbered_rows,
+    padded,
+    row_numbers,
+    unordered,
+    widths,
+)
+from fecontact.fem.elements.refinement import (
+    SecondOrder,
+    at_second_order,
+    refined,
+    second_order_nodes,
+)
 from fecontact.fem.elements.structured import structured
 from fecontact.fem.material import AnyMaterial
 
@@ -43,9 +57,10 @@ class _Checked:
     ----------
     nodes, cells : arrays
         Nodes and cells of the mesh; read-only.
-    kind : CellKind
-    facets : (M f, n) array
-        Sides of each cell in turn, so that inner ones occur twice.
+    blocks : tuple of CellBlock
+        Cells of each kind.
+    facets, owner : arrays
+        Sides (F, n) of each cell in turn, so that inner ones occur twice, and their cells (F,).
     number, count : arrays
         Number of each of them without its orientation, and number of cells at each.
     """
@@ -57,13 +72,22 @@ class _Checked:
             raise MeshError(f"Mesh nodes must have shape (N, 2), or (N, 3) for a solid, not "
                             f"{nodes.shape}.")
         dimension = nodes.shape[1]
-        if cells.ndim != 2 or (dimension, cells.shape[1]) not in CELL_KINDS or not len(cells):
+        known = [corners for of, corners in CELL_KINDS if of == dimension]
+        if cells.ndim != 2 or cells.shape[1] not in known or not len(cells):
             raise MeshError(
                 f"Mesh cells must have shape (M, 3) for triangles or (M, 4) for quadrilaterals "
                 f"with M > 0, not {cells.shape}." if dimension == 2 else
-                f"Mesh cells of a solid must have shape (M, 4) for tetrahedra or (M, 8) for "
-                f"hexahedra with M > 0, not {cells.shape}."
+                f"Mesh cells of a solid must have shape (M, 4) for tetrahedra, (M, 5) for "
+                f"pyramids, (M, 6) for wedges or (M, 8) for hexahedra with M > 0, or rows of "
+                f"several kinds filled by their last corner, not {cells.shape}."
             )
+        size = widths(cells)
+        poor = ~np.isin(size, known if dimension == 3 else cells.shape[1])
+        if poor.any():
+            raise MeshError(
+                f"{np.count_nonzero(poor)} mesh cells have no "
+                f"{'area' if dimension == 2 else 'volume'}: they repeat corners, the first is cell "
+                f"{np.flatnonzero(poor)[0]}.")
         if not np.isfinite(nodes).all():
             raise MeshError("Mesh nodes hold values that are not finite.")
         if cells.min() < 0 or cells.max() >= len(nodes):
@@ -71,12 +95,14 @@ class _Checked:
         unused = np.count_nonzero(np.bincount(cells.ravel(), minlength=len(nodes)) == 0)
         if unused:
             raise MeshError(f"{unused} mesh nodes belong to no cell; remove them.")
-        self.kind = kind = CELL_KINDS[dimension, cells.shape[1]]
+        cells = cells[:, : size.max()]
         self.nodes = nodes
-        self.cells = (_oriented(nodes, cells) if dimension == 2
-                      else oriented_solids(nodes, cells, kind))
-        self.facets = facets_of(self.cells, kind)
-        _, self.number, self.count = numbered_rows(np.sort(self.facets, axis=1))
+        self.cells = (_oriented if dimension == 2 else oriented_solids)(nodes, cells)
+        self.blocks = tuple(
+            CellBlock(CELL_KINDS[dimension, rows.shape[1]], np.arange(len(cells))[which], rows)
+            for which, rows in blocks_of(self.cells))
+        self.facets, self.owner = sides_of(self.cells, dimension)
+        _, self.number, self.count = numbered_rows(unordered(self.facets))
         self._require_sound()
         for array in (self.nodes, self.cells):
             array.setflags(write=False)
@@ -94,7 +120,7 @@ class _Checked:
             )
         require_apart(facets, number, count, self.nodes)
         require_conforming(facets[count[number] == 1], self.nodes)
-        require_no_overlap(self.nodes, self.cells, self.kind, np.flatnonzero(count[number] == 1))
+        require_no_overlap(self.nodes, self.cells, np.unique(self.owner[count[number] == 1]))
 
 
 # Of existing meshes: a further mesh of the same nodes and cells is not checked again.
@@ -106,16 +132,17 @@ _CHECKED: "WeakValueDictionary[tuple[int, int], _Checked]" = WeakValueDictionary
 class Mesh(Summarised):
     """A mesh of a plane body or of a solid, with named boundaries and points.
 
-    Plane cells are triangles or quadrilaterals, counter-clockwise; cells of solids are tetrahedra
-    or hexahedra, their corners as Gmsh, VTK and Abaqus number them. Cells of the opposite
-    orientation are turned.
+    Plane cells are triangles or quadrilaterals, counter-clockwise; cells of solids are tetrahedra,
+    pyramids, wedges or hexahedra, their corners as Gmsh, VTK and Abaqus number them. Cells of the
+    opposite orientation are turned. Solids may have cells of several kinds: rows of ``cells`` are
+    then as long as the longest, filled by the last corner of the cell, and so are rows of faces.
 
     Parameters
     ----------
     nodes : (N, 2) or (N, 3) array
         Corners of the cells [m]. In the plane x is tangential to the ground and y normal to it,
         into the body; in space z is normal to it.
-    cells : (M, 3) or (M, 4), of solids (M, 4) or (M, 8) integer array
+    cells : (M, 3) or (M, 4), of solids (M, 4), (M, 5), (M, 6) or (M, 8) integer array
         Corner nodes of each cell.
     boundaries : mapping of name to (k, 2), of solids (k, 3) or (k, 4) integer array
         Edges or faces by their nodes; each must be that of exactly one cell. Faces of solids are
@@ -203,11 +230,11 @@ class Mesh(Summarised):
             self.nodes, self.cells)
         object.__setattr__(self, "_checked", checked)
         nodes, cells = checked.nodes, checked.cells
-        dimension, kind = nodes.shape[1], checked.kind
+        dimension = nodes.shape[1]
         require_kind("Mesh", Mapping, boundaries=self.boundaries, points=self.points)
         for name in (*self.boundaries, *self.points):
             require_kind("Mesh: boundaries and points", str, name=name)
-        boundaries = {name: _facets(name, facets, kind)
+        boundaries = {name: _facets(name, facets, checked)
                       for name, facets in self.boundaries.items()}
         points = {name: np.unique(as_integers(which, f"The nodes of mesh point '{name}'"))
                   for name, which in self.points.items()}
@@ -231,7 +258,7 @@ class Mesh(Summarised):
             array.setflags(write=False)
         if len(curved):
             self.edge_numbers(curved, "curved_edges")
-            curved_volumes(self.second_order_places(self.curved_cells), kind)
+            self._curved_volumes()
         require_kind("Mesh", Sequence, constraints=self.constraints)
         check_constraints(self.constraints, boundaries, points, dimension, len(nodes))
         object.__setattr__(self, "constraints", tuple(self.constraints))
@@ -270,9 +297,27 @@ class Mesh(Summarised):
         return int(self.nodes.shape[1])
 
     @property
-    def kind(self) -> CellKind:
-        """Kind of the cells, with the numbering of their sides and edges."""
-        return CELL_KINDS[self.dimension, self.cells.shape[1]]
+    def blocks(self) -> tuple[CellBlock, ...]:
+        """Cells of each kind, with the numbering of their sides and edges."""
+        return self._checked.blocks
+
+    @cached_property
+    def elements(self) -> Integers:
+        """Corners (M, k) of each cell in the order of ``CellKind.places``."""
+        found = np.array(self.cells)
+        for block in self.blocks:
+            found[block.numbers] = padded([block.ordered], found.shape[1])
+        return found
+
+    @property
+    def cell_counts(self) -> dict[str, int]:
+        """Number of cells of each kind, such as ``{"hexahedra": 160}``."""
+        return {block.kind.name: len(block.nodes) for block in self.blocks}
+
+    @property
+    def cells_in_words(self) -> str:
+        """Number of cells of each kind in words, such as '12 wedges and 3 hexahedra'."""
+        return " and ".join(f"{number} {name}" for name, number in self.cell_counts.items())
 
     @cached_property
     def outline(self) -> Integers:
@@ -289,6 +334,11 @@ class Mesh(Summarised):
         return self._checked.facets
 
     @property
+    def _facet_cells(self) -> Integers:
+        """Cell of each of ``_facets``."""
+        return self._checked.owner
+
+    @property
     def _facet_number(self) -> Integers:
         """Number of each of ``_facets`` without its orientation."""
         return self._checked.number
@@ -300,16 +350,13 @@ class Mesh(Summarised):
 
     def _on_outline(self, name: str, facets: Integers) -> Integers:
         """The sides of a boundary, those of a solid as in the outline."""
-        outline = np.sort(self.outline, axis=1)
-        _, number, _ = numbered_rows(np.concatenate([outline, np.sort(facets, axis=1)]))
-        row = np.full(number.max() + 1, -1)
-        row[number[:len(outline)]] = np.arange(len(outline))
-        rows = row[number[len(outline):]]
+        rows = row_numbers(unordered(self.outline), unordered(facets))
         what = "edges" if self.dimension == 2 else "faces"
         if (rows < 0).any():
-            inner = np.sort(facets[rows < 0], axis=1)
-            first = (f"joins nodes {inner[0][0]} and {inner[0][1]}" if self.dimension == 2
-                     else f"has the nodes {', '.join(map(str, inner[0]))}")
+            inner = facets[rows < 0]
+            ends = [str(node) for node in np.unique(inner[0])]
+            first = (f"joins nodes {' and '.join(ends)}" if self.dimension == 2
+                     else f"has the nodes {', '.join(ends)}")
             raise MeshError(
                 f"Boundary '{name}' has {len(inner)} {what} that are not on the outline of the "
                 f"mesh, the first {first}."
@@ -333,10 +380,20 @@ class Mesh(Summarised):
 
     @cached_property
     def edges(self) -> tuple[Integers, Integers]:
-        """Distinct edges (E, 2), and the edges (M, e) of each cell in the order of its kind."""
-        ends = np.sort(self.cells[:, np.array(self.kind.edges)].reshape(-1, 2), axis=1)
-        distinct, number, _ = numbered_rows(ends)
-        return distinct, number.reshape(len(self.cells), -1)
+        """Distinct edges (E, 2), and the edges (M, e) of each cell in the order of its kind.
+
+        Rows of cells with fewer edges than others are filled by their last one.
+        """
+        each = [block.nodes[:, np.array(block.kind.edges)] for block in self.blocks]
+        ends = np.concatenate([one.reshape(-1, 2) for one in each])
+        distinct, number, _ = numbered_rows(np.sort(ends, axis=1))
+        found = np.empty((len(self.cells), max(one.shape[1] for one in each)), np.int64)
+        first = 0
+        for block, one in zip(self.blocks, each, strict=True):
+            rows = number[first : first + one.shape[0] * one.shape[1]].reshape(one.shape[:2])
+            found[block.numbers] = padded([rows], found.shape[1])
+            first += rows.size
+        return distinct, found
 
     def edge_numbers(self, ends: Integers, name: str) -> Integers:
         """Numbers in ``edges`` of pairs of nodes; MeshError, with ``name``, for other pairs."""
@@ -366,23 +423,37 @@ class Mesh(Summarised):
         curved[self.edge_numbers(self.curved_edges, "curved_edges")] = True
         return np.flatnonzero(curved[self.edges[1]].any(axis=1))
 
-    def second_order_places(self, cells: Integers | None = None) -> Array:
-        """Second-order nodes (M, k, d) of all or the given cells [m], in the order of the kind."""
-        chosen = np.arange(len(self.cells)) if cells is None else cells
-        return second_order_places(self.nodes, self.cells[chosen], self.kind,
-                                   self.edge_middles[self.edges[1][chosen]])
+    def second_order_places(self, block: CellBlock) -> Array:
+        """Second-order nodes (m, k, d) of cells of one kind [m], in the order of the kind."""
+        edges = self.edges[1][block.numbers][:, : len(block.kind.edges)]
+        return second_order_places(self.nodes, block.nodes, block.kind, self.edge_middles[edges])
+
+    @cached_property
+    def second_order(self) -> SecondOrder:
+        """Second-order nodes, which elements of degree 2 and the refined mesh have."""
+        return second_order_nodes(self)
+
+    def _curved_volumes(self) -> tuple[Integers, Array]:
+        """Numbers of the curved cells, and their volumes or areas; MeshError for folded ones."""
+        numbers, volumes = [np.empty(0, np.int64)], [np.empty(0)]
+        for block in self.blocks:
+            chosen = block.only(np.isin(block.numbers, self.curved_cells))
+            if len(chosen.numbers):
+                numbers.append(chosen.numbers)
+                volumes.append(curved_volumes(self.second_order_places(chosen), block.kind))
+        return np.concatenate(numbers), np.concatenate(volumes)
 
     def refined(self) -> "Mesh":
         """The mesh with every plane cell cut into four, or every solid cell into eight.
+
+        Pyramids are cut into six pyramids and four tetrahedra.
 
         Named boundaries and points are kept. Nodes keep their numbers; the middles of the edges
         follow, then those of four-sided faces and the centres of quadrilaterals and hexahedra.
         Curved edges stay on their parabolas.
         """
-        nodes, cells, boundaries, curved, middles = refined(self)
-        # The first parts of all cells come first, then the second ones.
-        parts = len(self.cells) * np.arange(len(cells) // len(self.cells))
-        groups = {name: np.add.outer(parts, group).ravel()
+        (nodes, cells, boundaries, curved, middles), owner = refined(self)
+        groups = {name: np.flatnonzero(np.isin(owner, group))
                   for name, group in self.cell_groups.items()}
         constraints = [one.refined(self.middle_node) for one in self.constraints]
         return Mesh(nodes, cells, boundaries, self.points, curved, middles, constraints, groups,
@@ -455,7 +526,8 @@ class Mesh(Summarised):
         """Counts, size and named groups."""
         solid = self.dimension == 3
         return [
-            ("nodes", f"{len(self.nodes)}"), (self.kind.name, f"{len(self.cells)}"),
+            ("nodes", f"{len(self.nodes)}"),
+            *((name, f"{number}") for name, number in self.cell_counts.items()),
             *((axis, span(values, "m")) for axis, values in zip("xyz", self.nodes.T,
                                                                 strict=False)),
             ("volume", f"{self.volume:.4g} m³") if solid else ("area", f"{self.area:.4g} m²"),
@@ -473,9 +545,8 @@ class Mesh(Summarised):
         if self.dimension == 3:
             raise MeshError("A solid has a volume; area is that of a plane body.")
         area = _signed_area(self.nodes, self.cells)
-        if len(self.curved_cells):
-            area[self.curved_cells] = curved_volumes(
-                self.second_order_places(self.curved_cells), self.kind)
+        curved, areas = self._curved_volumes()
+        area[curved] = areas
         return float(area.sum())
 
     @property
@@ -483,10 +554,11 @@ class Mesh(Summarised):
         """Volume of a solid [m^3]; MeshError for a plane body."""
         if self.dimension == 2:
             raise MeshError("A plane body has an area; volume is that of a solid.")
-        volume = solid_volumes(self.nodes, self.cells, self.kind)
-        if len(self.curved_cells):
-            volume[self.curved_cells] = curved_volumes(
-                self.second_order_places(self.curved_cells), self.kind)
+        volume = np.empty(len(self.cells))
+        for block in self.blocks:
+            volume[block.numbers] = solid_volumes(self.nodes, block.nodes, block.kind)
+        curved, volumes = self._curved_volumes()
+        volume[curved] = volumes
         return float(volume.sum())
 
     @property
@@ -523,14 +595,17 @@ def _turn_in_space(degrees: Array) -> Array:
     return turn
 
 
-def _facets(name: str, facets: ArrayLike, kind: CellKind) -> Integers:
-    what, corners = (("edges", "pairs") if kind.dimension == 2 else ("faces", "rows"),
-                     len(kind.facets[0]))
+def _facets(name: str, facets: ArrayLike, checked: _Checked) -> Integers:
+    width = checked.facets.shape[1]
+    what = ("edges", "pairs") if width == 2 else ("faces", "rows")
     array = np.array(as_integers(facets, f"The {what[0]} of mesh boundary '{name}'"))
-    if array.size and (array.ndim != 2 or array.shape[1] != corners):
-        raise MeshError(f"Boundary '{name}' must have shape (k, {corners}), {what[1]} of nodes, "
+    if array.ndim == 2 and array.shape[1] < width and any(
+            len(side) == array.shape[1] for block in checked.blocks for side in block.kind.facets):
+        array = padded([array], width)
+    if array.size and (array.ndim != 2 or array.shape[1] != width):
+        raise MeshError(f"Boundary '{name}' must have shape (k, {width}), {what[1]} of nodes, "
                         f"not {array.shape}.")
-    return array.reshape(-1, corners)
+    return array.reshape(-1, width)
 
 
 def _oriented(nodes: Array, cells: Integers) -> Integers:

@@ -115,7 +115,7 @@ def place_rows(body: ElasticBody, place: Place, name: str) -> Rows:
     if distance.min() < 1e-9 * mesh.extent:
         return node_rows(body, int(np.argmin(distance)))
     return Rows(rotating_rows(len(body.nodes), *interpolation(
-        body.nodes, body.basis.element_dofs.T, centre, f"Point {name}")), centre)
+        body.nodes, body.elements, centre, f"Point {name}")), centre)
 
 
 def rotating_rows(count: int, nodes: Integers, weights: Array) -> Any:
@@ -270,14 +270,12 @@ def _patch_in_space(body: ElasticBody, centre: Array, radius: float) -> Rows | N
     surface = surface.only((np.maximum(away, 0.0)**2).sum(axis=1) < radius**2)
     if not len(surface.facets):
         return None
-    local, share = _fine_parts(surface.facets.shape[1])
-    values, places, _, areas = surface.at(local)
-    weights = areas * share
+    values, places, _, weights = surface.at(_fine_parts)
     inside = ((places - centre) ** 2).sum(axis=2) <= radius**2
     if not inside.any():
         return None
     which, sample = np.nonzero(inside)
-    return Rows(*sampled_rows(len(body.nodes), surface.facets[which], values[sample],
+    return Rows(*sampled_rows(len(body.nodes), surface.facets[which], values[which, sample],
                               places[which, sample], weights[which, sample]))
 
 

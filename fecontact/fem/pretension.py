@@ -17,7 +17,8 @@ from fecontact.core.errors import InputError, MeshError, choices, nearest, shown
 from fecontact.core.types import Array, Coordinates, Integers
 from fecontact.core.units import Unit
 from fecontact.fem.constraints import Tie
-from fecontact.fem.elements.cell_kinds import numbered_rows
+from fecontact.fem.elements.cell_geometry import centres_of
+from fecontact.fem.elements.cell_kinds import row_numbers, unordered
 from fecontact.fem.mesh import Mesh
 
 
@@ -112,11 +113,7 @@ def cut_along(
         raise MeshError(f"{what} needs the name '{min(taken)}', which the mesh has already; rename "
                         f"one of them.")
     sides, (number, count) = _sides(mesh)
-    sorted_facets = np.sort(np.asarray(facets), axis=1)
-    label = numbered_rows(np.concatenate([np.sort(mesh._facets, axis=1), sorted_facets]))[1]
-    known = np.full(int(label.max()) + 1, -1)
-    known[label[: len(number)]] = number
-    cut = np.unique(known[label[len(number):]])
+    cut = np.unique(_numbers(mesh, np.asarray(facets)))
     if cut[0] < 0 or (count[cut] != 2).any():
         raise MeshError(f"{what} has {np.count_nonzero(count[cut[cut >= 0]] != 2) or 1} sides that "
                         f"do not lie between two cells; give faces inside the bolt.")
@@ -175,13 +172,13 @@ def _mean_normal(mesh: Mesh, rows: Integers) -> Array:
 
 
 def _centres(mesh: Mesh) -> Array:
-    return np.asarray(mesh.nodes[mesh.cells].mean(axis=1))
+    return centres_of(mesh.nodes, mesh.cells)
 
 
 def _sides(mesh: Mesh) -> tuple[Integers, tuple[Integers, Integers]]:
     """Cell of each side of a cell, and the number of each side and how often each occurs."""
     number, count = mesh._facet_number, mesh._cells_at_facets
-    return np.arange(len(number)) // len(mesh.kind.facets), (number, count)
+    return mesh._facet_cells, (number, count)
 
 
 def _first_rows(number: Integers) -> Integers:
@@ -199,12 +196,9 @@ def _cells_at(cells: Integers, number: Integers) -> Integers:
 
 
 def _numbers(mesh: Mesh, facets: Integers) -> Integers:
-    """Numbers of sides (k, n) of the mesh."""
-    rows = np.concatenate([np.sort(mesh._facets, axis=1), np.sort(facets, axis=1)])
-    label = numbered_rows(rows)[1]
-    known = np.empty(int(label.max()) + 1, np.int64)
-    known[label[: len(mesh._facets)]] = mesh._facet_number
-    return known[label[len(mesh._facets):]]
+    """Numbers of sides (k, n) of the mesh, -1 for others."""
+    first = _first_rows(mesh._facet_number)
+    return row_numbers(unordered(mesh._facets[first]), unordered(facets))
 
 
 def _high_cells(
@@ -216,7 +210,7 @@ def _high_cells(
 
     touching = np.asarray(np.isin(mesh.cells, nodes).any(axis=1), bool)
     joined = np.setdiff1d(np.arange(int(number.max()) + 1), cut)
-    links = _cells_at(np.arange(len(number)) // len(mesh.kind.facets), number)[joined]
+    links = _cells_at(mesh._facet_cells, number)[joined]
     links = links[touching[links].all(axis=1)]
     graph = coo_array((np.ones(len(links)), tuple(links.T)), shape=(len(mesh.cells),) * 2)
     label = connected_components(graph, directed=False)[1]

@@ -16,10 +16,7 @@ import numpy as np
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
-from fecontact.fem.cell_gradients import cell_gradients
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.elements.cell_kinds import shape_functions
-from fecontact.fem.incompatible_modes import in_parts
 
 # Part of the angle over which a facet reaches that its normal may lean along the circumference.
 _LEAN, _ROUNDING = 0.6, 0.02
@@ -38,17 +35,15 @@ def convective_matrices(body: ElasticBody, S: Array, centre: Array) -> tuple[Any
     import scipy.sparse as sp
 
     require_revolution(body, S, centre)
-    members, size = body.basis.element_dofs.T, len(body.nodes)
-    values, _ = shape_functions(body.dimension, members.shape[1],
-                                np.ascontiguousarray(body.basis.X.T))
+    size = len(body.nodes)
     found = [sp.csr_array((size, size)), sp.csr_array((size, size))]
-    for cells in in_parts(np.arange(len(members))):
-        gradients, volumes = cell_gradients(body, cells)
-        flow = (np.einsum("qk,ekd->eqd", values, body.nodes[members[cells]]) - centre) @ S.T
+    for part in body.parts():
+        (gradients, volumes), values, nodes = part.gradients(), part.values, part.nodes
+        flow = (np.einsum("qk,ekd->eqd", values, body.nodes[nodes]) - centre) @ S.T
         along = np.einsum("eqkd,eqd->eqk", gradients, flow)
-        weights = volumes * (body.densities[body.cell_materials[cells]] * body.thickness)[:, None]
-        rows = np.repeat(members[cells], members.shape[1], axis=1)
-        columns = np.tile(members[cells], (1, members.shape[1]))
+        weights = volumes * (body.densities[part.numbers] * body.thickness)[:, None]
+        rows = np.repeat(nodes, nodes.shape[1], axis=1)
+        columns = np.tile(nodes, (1, nodes.shape[1]))
         for number, left in enumerate((np.broadcast_to(values, along.shape), along)):
             block = np.einsum("eqi,eqj,eq->eij", left, along, weights)
             found[number] = found[number] + sp.csr_array(sp.coo_array(

@@ -15,11 +15,12 @@ from fecontact.core.records import (
     ShortBlock,
     Vector,
 )
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array
 from fecontact.fem.assembly import pattern
-from fecontact.fem.cell_gradients import PAIRS, cell_gradients
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.incompatible_modes import in_parts, mode_gradients
+from fecontact.fem.element_block import PAIRS, ElementBlock
+from fecontact.fem.elements.cell_kinds import HEXAHEDRON
+from fecontact.fem.incompatible_modes import mode_gradients
 from fecontact.fem.thermal import thermal_stress
 
 # Numbers of the components of a strain among xx, yy, zz, xy, yz, xz, by dimension.
@@ -37,34 +38,36 @@ def stress_stiffness(
     """
     import scipy.sparse as sp
 
-    members = np.ascontiguousarray(body.basis.element_dofs.T, dtype=np.int64)
-    indptr, indices, slots = pattern(members, len(body.nodes))
+    indptr, indices, slots = pattern([block.nodes for block in body.blocks], len(body.nodes))
     entries = np.zeros(len(indices))
-    for cells in in_parts(np.arange(len(members))):
-        gradients, volumes = cell_gradients(body, cells)
-        stress = cell_stress(body, displacement, cells, gradients)
-        if temperatures is not None:
-            held = thermal_stress(body, temperatures, cells)
-            stress = stress - held[..., None, None] * np.eye(body.dimension)
-        _add(gradients, volumes * body.thickness, stress, slots[cells], entries)
+    for block, own in zip(body.blocks, slots, strict=True):
+        first = 0
+        for part in block.parts():
+            gradients, volumes = part.gradients()
+            stress = cell_stress(body, displacement, part, gradients)
+            if temperatures is not None:
+                held = thermal_stress(body, temperatures, part)
+                stress = stress - held[..., None, None] * np.eye(body.dimension)
+            _add(gradients, volumes * body.thickness, stress,
+                 own[first : first + len(part.nodes)], entries)
+            first += len(part.nodes)
     one = sp.csr_array((entries, indices, indptr), shape=(len(body.nodes),) * 2)
     return sp.csc_array(sp.kron(one, sp.eye_array(body.dimension)))
 
 
 def cell_stress(
-    body: ElasticBody, displacement: Array, cells: Integers, gradients: Array
+    body: ElasticBody, displacement: Array, part: ElementBlock, gradients: Array
 ) -> Array:
-    """Stress tensors (e, q, d, d) in cells [Pa], where their functions have the gradients given."""
+    """Stress tensors (e, q, d, d) in elements [Pa] with the ``gradients`` of their functions."""
     d = body.dimension
-    moved = displacement.reshape(-1, d)[body.basis.element_dofs.T[cells]]
+    moved = displacement.reshape(-1, d)[part.nodes]
     # Subtract a node: rigid displacements may be much larger than differences.
     slopes = np.einsum("eki,eqkj->eqij", moved - moved[:, :1], gradients)
-    if body.has_incompatible_modes:
-        local = np.ascontiguousarray(body.basis.X.T)
-        slopes += mode_gradients(body, cells, displacement, local)[..., 0]
+    if body.has_incompatible_modes and part.kind == HEXAHEDRON:
+        slopes += mode_gradients(body, part, displacement, part.local)[..., 0]
     strain = np.stack([slopes[..., i, j] if i == j else slopes[..., i, j] + slopes[..., j, i]
                        for i, j in PAIRS[d]], axis=-1)
-    of_strain = body.cell_stiffness(cells)[:, USED[d]][:, :, USED[d]]
+    of_strain = body.cell_stiffness(part.numbers)[:, USED[d]][:, :, USED[d]]
     values = np.einsum("ers,eqs->eqr", of_strain, strain)
     stress = np.empty(slopes.shape)
     for component, (i, j) in enumerate(PAIRS[d]):

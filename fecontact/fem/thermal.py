@@ -16,12 +16,10 @@ import numpy as np
 
 from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError
-from fecontact.core.types import Array, ArrayLike, Integers
-from fecontact.fem.cell_gradients import cell_gradients
+from fecontact.core.types import Array, ArrayLike
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.elements.cell_kinds import shape_functions
-from fecontact.fem.elements.refinement import in_cells
-from fecontact.fem.incompatible_modes import in_parts
+from fecontact.fem.element_block import ElementBlock
+from fecontact.fem.elements.refinement import at_second_order
 from fecontact.fem.material import Material
 
 Temperature = float | ArrayLike | Callable[..., Any]
@@ -73,10 +71,8 @@ def _of_mesh(body: ElasticBody, word: str) -> Array:
         raise InputError("temperature = 'mesh' is for meshes of decks with *TEMPERATURE or "
                          "*INITIAL CONDITIONS, TYPE=TEMPERATURE; this one holds none, give "
                          "numbers.")
-    members = body.basis.element_dofs.T
-    found = np.zeros(len(body.nodes))
-    found[members] = in_cells(body.mesh, body.mesh.temperature)[:, : members.shape[1]]
-    return found
+    values = body.mesh.temperature
+    return values[: len(body.nodes)] if body.degree == 1 else at_second_order(body.mesh, values)
 
 
 def thermal_moduli(body: ElasticBody) -> Array:
@@ -87,27 +83,19 @@ def thermal_moduli(body: ElasticBody) -> Array:
     return np.asarray(expansions[body.cell_materials] * (direct + across * lateral))
 
 
-def _at_points(body: ElasticBody, temperatures: Array, cells: Integers) -> Array:
-    """Temperatures (e, q) at the points of quadrature of cells."""
-    members = body.basis.element_dofs.T[cells]
-    values, _ = shape_functions(body.dimension, members.shape[1],
-                                np.ascontiguousarray(body.basis.X.T))
-    return np.einsum("qk,ek->eq", values, temperatures[members])
-
-
-def thermal_stress(body: ElasticBody, temperatures: Array, cells: Integers) -> Array:
-    """Pressure (e, q) at the points of quadrature of cells that are held [Pa]."""
-    return thermal_moduli(body)[cells][:, None] * _at_points(body, temperatures, cells)
+def thermal_stress(body: ElasticBody, temperatures: Array, part: ElementBlock) -> Array:
+    """Pressure (e, q) at the points of quadrature of elements that are held [Pa]."""
+    at_points = np.einsum("qk,ek->eq", part.values, temperatures[part.nodes])
+    return np.asarray(thermal_moduli(body)[part.numbers][:, None] * at_points)
 
 
 def thermal_forces(body: ElasticBody, temperatures: Array) -> Array:
     """Nodal forces (d N,) of temperatures (N,), in balance with themselves [N]."""
-    members = body.basis.element_dofs.T
     found = np.zeros((len(body.nodes), body.dimension))
-    for cells in in_parts(np.arange(len(members))):
-        gradients, volumes = cell_gradients(body, cells)
-        pressure = thermal_stress(body, temperatures, cells) * volumes * body.thickness
-        np.add.at(found, members[cells], np.einsum("eq,eqkd->ekd", pressure, gradients))
+    for part in body.parts():
+        gradients, volumes = part.gradients()
+        pressure = thermal_stress(body, temperatures, part) * volumes * body.thickness
+        np.add.at(found, part.nodes, np.einsum("eq,eqkd->ekd", pressure, gradients))
     return found.ravel()
 
 
@@ -116,10 +104,13 @@ def held_stress(body: ElasticBody, temperatures: Array) -> Array:
 
     The mean over the adjacent elements; what the body's strain adds is not in it.
     """
-    members, areas = body.basis.element_dofs.T, body.basis.dx.sum(axis=1)
-    size = members.shape[1]
-    moduli = np.bincount(members.ravel(), np.repeat(areas * thermal_moduli(body), size))
-    pressure = moduli / np.bincount(members.ravel(), np.repeat(areas, size)) * temperatures
+    moduli, around = np.zeros(len(temperatures)), np.zeros(len(temperatures))
+    of_cells = thermal_moduli(body)
+    for block in body.blocks:
+        volumes = block.volumes[:, None]
+        np.add.at(moduli, block.nodes, volumes * of_cells[block.numbers][:, None])
+        np.add.at(around, block.nodes, volumes)
+    pressure = moduli / around * temperatures
     found = np.zeros((len(temperatures), 4 if body.dimension == 2 else 6))
     found[:, : 2 if body.dimension == 2 and body.plane == "stress" else 3] = -pressure[:, None]
     return found

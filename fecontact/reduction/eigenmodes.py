@@ -328,7 +328,7 @@ def frequencies_of(body: ElasticBody, shapes: Array, stress: Any = None) -> Arra
     return np.sqrt(squares)
 
 
-def strain_energies(body: ElasticBody, shapes: Array, cells: Any = slice(None)) -> Array:
+def strain_energies(body: ElasticBody, shapes: Array, cells: Integers | None = None) -> Array:
     """Strain energies (m,) [J] of displacement fields (d N, m), from the strains in the elements.
 
     ``cells`` are the cells whose energy counts; by default all, and the springs of the body.
@@ -336,23 +336,20 @@ def strain_energies(body: ElasticBody, shapes: Array, cells: Any = slice(None)) 
     The product with K would lose as many digits as the stiffest cells exceed the body as a whole,
     which may be all for a slender body with strongly graded cells.
     """
-    if isinstance(cells, slice) and body.added:
+    if cells is None and body.added:
         rows, stiffness, _ = body.springs
         return 0.5 * stiffness @ (rows @ shapes) ** 2 + strain_energies(
             body, shapes, np.arange(len(body.mesh.cells)))
     if body.dimension == 3:
         return solid_strain_energies(body, shapes, cells)
-    basis = body.basis
-    slopes = np.ascontiguousarray(
-        np.array([function[0].grad for function in basis.basis])[:, :, cells])
-    functions, _, elements, points = slopes.shape
-    energies = np.empty(shapes.shape[1])
+    energies = np.zeros(shapes.shape[1])
     tensors, which_tensor = body.anisotropic
-    _strain_energies(slopes.reshape(2 * functions, elements, points),
-                     np.ascontiguousarray(basis.dx[cells]),
-                     np.ascontiguousarray(basis.element_dofs.T[cells], dtype=np.int64),
-                     np.ascontiguousarray(shapes), body.elasticity[cells], tensors,
-                     which_tensor[cells], energies)
+    elasticity, fields = body.elasticity, np.ascontiguousarray(shapes)
+    for part in body.parts(cells):
+        gradients, areas = part.gradients()
+        slopes = np.ascontiguousarray(np.moveaxis(gradients, (2, 3), (0, 1)))
+        _strain_energies(slopes.reshape(-1, *areas.shape), areas, np.array(part.nodes), fields,
+                         elasticity[part.numbers], tensors, which_tensor[part.numbers], energies)
     return energies * body.thickness
 
 
@@ -361,11 +358,10 @@ def _strain_energies(
     slopes: Block, dx: Matrix, nodes: IntegerMatrix, shapes: Matrix, elasticity: Matrix,
     tensors: Block, which_tensor: IntegerVector, energies: Vector,
 ) -> None:
-    """Fill energies (m,) per thickness; slopes (2 k, e, q) of k shape functions in x and y."""
+    """Add energies (m,) per thickness; slopes (2 k, e, q) of k shape functions in x and y."""
     elements, points = dx.shape
     corners, modes = nodes.shape[1], len(energies)
     strains = np.empty((3, modes))
-    energies[:] = 0.0
     for e in range(elements):
         direct, lateral, shear = elasticity[e]
         tensor = which_tensor[e]

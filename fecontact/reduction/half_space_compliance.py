@@ -227,7 +227,7 @@ def _region(
     chosen = chosen[tree.query(places[chosen, :2])[0] <= depth]
     free = (3 * chosen[:, None] + np.arange(3)).ravel()
     used = np.unique(body.stiffness.tocsr()[free].indices)
-    cells = np.isin(body.basis.element_dofs.T, chosen).any(axis=1)
+    cells = np.isin(body.elements, chosen).any(axis=1)
     found = [body.materials[number] for number in np.unique(body.cell_materials[cells])]
     if len(found) != 1 or not isinstance(found[0], Material):
         kind = "an anisotropic material" if len(found) == 1 else "several materials"

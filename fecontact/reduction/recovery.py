@@ -11,7 +11,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.fields import body_elements, linear_cells, stress_of
+from fecontact.fem.fields import linear_cells, stress_of
 from fecontact.reduction.matrix_files import AssembledMatrix
 from fecontact.reduction.mode_shapes import ModeShapes
 from fecontact.reduction.reduce_body import first_order
@@ -150,7 +150,7 @@ class Recovery:
         """Shapes over the body of modes (d, m); ``rows`` (r P, d) are those of the points."""
         body = self.body
         moved = np.asarray(self.matrix @ shapes)
-        elements = body_elements(body)
+        elements = body.elements
         return ModeShapes(
             nodes=body.nodes, cells=linear_cells(body.nodes, elements),
             outline=first_order(body, body.mesh.outline),

@@ -21,10 +21,10 @@ from fecontact.core.types import Array, Integers
 from fecontact.fem.body_forces import boundary_forces, inertia_forces
 from fecontact.fem.contact_face import ContactNodes, contact_groups
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.elements.cell_kinds import numbered_rows
+from fecontact.fem.elements.cell_kinds import row_numbers, unordered
 from fecontact.fem.faces.contact_patches import Count
 from fecontact.fem.faces.surface import linear_facets
-from fecontact.fem.fields import BodyFields, body_elements, linear_cells, stress_of
+from fecontact.fem.fields import BodyFields, linear_cells, stress_of
 from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.fem.points import Place, Rows, place_rows
 from fecontact.fem.rotation import Rotation
@@ -189,7 +189,7 @@ def modal_basis(
     names = tuple(body.mesh.boundaries)
     forces = np.stack([inertia_forces(body), *(boundary_forces(body, name) for name in names)])
     rows = np.asarray(forces.transpose(0, 2, 1) @ shapes)
-    elements = body_elements(body)
+    elements = body.elements
     turning = None if rotation is None else modal_rotation(
         body, system, rotation, shapes, None if condensed is None else condensed.modes)
     springs, _, dashpots = body.springs
@@ -495,7 +495,7 @@ def first_order(body: ElasticBody, facets: Integers) -> Integers:
     """First-order edges (k, 2), or facets of a solid, between the displacement nodes of some."""
     sides = body.facet_nodes(facets)
     if body.dimension == 3:
-        return linear_facets(sides)
+        return linear_facets(sides)[0]
     return np.concatenate([sides[:, i : i + 2] for i in range(sides.shape[1] - 1)])
 
 
@@ -503,10 +503,7 @@ def _nodes_of_outline(body: ElasticBody, face: ContactNodes) -> Integers:
     """Contact node of each first-order facet of the outline, -1 for none."""
     sides = body.mesh.outline
     groups = [body.mesh.boundaries[name] for name, _ in face.groups]
-    number = numbered_rows(np.sort(np.concatenate([sides, *groups]), axis=1))[1]
-    row = np.empty(int(number.max()) + 1, dtype=np.int64)
-    row[number[: len(sides)]] = np.arange(len(sides))
     found = np.full(len(sides), -1)
     if face.owner is not None:
-        found[row[number[len(sides) :]]] = face.owner
-    return np.tile(found, len(linear_facets(body.facet_nodes(sides[:1]))))
+        found[row_numbers(unordered(sides), unordered(np.concatenate(groups)))] = face.owner
+    return np.asarray(found[linear_facets(body.facet_nodes(sides))[1]])

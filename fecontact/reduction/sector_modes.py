@@ -18,7 +18,7 @@ from fecontact.fem.cyclic_symmetry import (
     sector_nodes,
 )
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.fields import body_elements, linear_cells
+from fecontact.fem.fields import linear_cells
 from fecontact.fem.rotation import Rotation
 from fecontact.reduction.eigenmodes import FreeSystem, free_modes, frequencies_of
 from fecontact.reduction.reduce_body import first_order
@@ -189,7 +189,7 @@ def sector_modes(
                                   alike(body, symmetry, nodes))
     return SectorModes(
         symmetry, tuple(chosen), frequencies / (2.0 * np.pi), shapes, body.nodes,
-        body_elements(body), _open_outline(body, symmetry), nodes, turning)
+        body.elements, _open_outline(body, symmetry), nodes, turning)
 
 
 def chosen_diameters(

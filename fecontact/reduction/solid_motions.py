@@ -1,6 +1,5 @@
 """Rigid motions that supports and constraints allow, and strain energies of motions of solids."""
 
-from typing import Any
 
 import numpy as np
 
@@ -13,11 +12,11 @@ from fecontact.core.records import (
     Matrix,
     Vector,
 )
-from fecontact.core.types import Array
-from fecontact.fem.cell_gradients import cell_gradients
+from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.elements.cell_kinds import HEXAHEDRON
 from fecontact.fem.elimination import least_squares
-from fecontact.fem.incompatible_modes import in_parts, reductions
+from fecontact.fem.incompatible_modes import reductions
 
 # Motions of supports, relative to that of the body, that count as none.
 _STILL = 1e-9
@@ -85,19 +84,21 @@ def allowed_motions(body: ElasticBody, centre: Array) -> Array:
     return np.asarray(G @ (unknowns @ found))
 
 
-def solid_strain_energies(body: ElasticBody, shapes: Array, cells: Any = slice(None)) -> Array:
-    """Strain energies (m,) [J] of displacements (3 N, m), from the strains in the ``cells``."""
-    members = body.basis.element_dofs.T.astype(np.int64)
+def solid_strain_energies(
+    body: ElasticBody, shapes: Array, cells: Integers | None = None
+) -> Array:
+    """Strain energies (m,) [J] of displacements (3 N, m), from the strains in all or some cells."""
     constants, (tensors, which_tensor) = body.elasticity, body.anisotropic
     fields = np.ascontiguousarray(shapes, dtype=float).reshape(len(body.nodes), 3, -1)
     energies = np.zeros(shapes.shape[1])
-    for part in in_parts(np.arange(len(body.mesh.cells))[cells]):
-        _add_strain_energies(*cell_gradients(body, part), members[part], fields, constants[part],
-                             tensors, which_tensor[part], energies)
-        if body.has_incompatible_modes:
-            moved = fields[members[part]]
+    for part in body.parts(cells):
+        _add_strain_energies(*part.gradients(), np.array(part.nodes), fields,
+                             constants[part.numbers], tensors, which_tensor[part.numbers],
+                             energies)
+        if body.has_incompatible_modes and part.kind == HEXAHEDRON:
+            moved = fields[part.nodes]
             # Subtract a node: rigid displacements may be much larger than differences.
-            moved = (moved - moved[:, :1]).reshape(len(part), 24, -1)
+            moved = (moved - moved[:, :1]).reshape(len(part.nodes), 24, -1)
             energies -= 0.5 * ((reductions(body, part) @ moved) ** 2).sum(axis=(0, 1))
     return energies
 

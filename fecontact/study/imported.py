@@ -41,10 +41,12 @@ _OTHERWISE = {
                  "fine meshes. With degree = 1 in [body] they keep their incompatible modes.",
     r"C3D20R\w*": "bricks {} (reduced integration) become hexahedra with 27 nodes. Frequencies of "
                   "a block with three bricks through the thickness agree to 0.1 %.",
-    r"C3D1[35]\w*": "cells {} are cut into quadratic tetrahedra. This raises frequencies of a thin "
-                    "blade by 0.03 to 0.4 %.",
-    r"C3D[56]\w*": "cells {} are cut into quadratic tetrahedra, which are softer: by 10 % in "
-                   "frequency for a block with three cells through the thickness.",
+    r"C3D15\w*": "wedges {} get nodes in the middles of their four-sided faces. Frequencies of a "
+                 "thin blade agree to 0.03 %.",
+    r"C3D13\w*": "pyramids {} get a node in the middle of their base.",
+    r"C3D6\w*": "wedges {} become second-order wedges. With degree = 1 they stay first-order ones.",
+    r"C3D5\w*": "pyramids {} become second-order pyramids. With degree = 1 they stay first-order "
+                "ones.",
 }
 # Functions that read loads and supports, by the suffix of the file.
 _CONTENTS: Mapping[str, Callable[[Path], DeckContents]] = {
@@ -87,7 +89,7 @@ class Imported:
         for name, mesh in self.meshes.items():
             size = " × ".join(quantity(float(side), "m") for side in np.ptp(mesh.nodes, axis=0))
             yield (f"body {name}" if self.has_parts else name,
-                   f"{len(mesh.cells)} {mesh.kind.name}, {len(mesh.nodes)} nodes, {size}")
+                   f"{mesh.cells_in_words}, {len(mesh.nodes)} nodes, {size}")
             for group, one in mesh.materials.items():
                 yield f"  material of {group}", one.description
             for boundary, facets in mesh.boundaries.items():

@@ -38,7 +38,7 @@ def lines(numbers):
 def part(mesh, name, first=1):
     """Nodes and ten-node tetrahedra from ``first``, surfaces and node sets of its boundaries."""
     body = ElasticBody(mesh)
-    members = body.basis.element_dofs.T
+    members = body.elements
     text = f"*NODE, NSET={name}\n" + "".join(
         f"{first + k}, {', '.join(map(repr, place))}\n"
         for k, place in enumerate(body.nodes.tolist()))

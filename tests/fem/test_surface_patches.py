@@ -216,7 +216,9 @@ def test_several_faces_are_groups_and_bad_ones_are_named():
 def test_first_order_facets_cover_the_surface_with_its_orientation(tetrahedra):
     body = block_body((2, 1, 1), tetrahedra=tetrahedra)
     whole = Surface(body.nodes, body.facet_nodes(body.mesh.outline))
-    parts = Surface(body.nodes, linear_facets(whole.facets))
+    facets, owner = linear_facets(whole.facets)
+    assert (owner[: len(whole.facets)] == np.arange(len(whole.facets))).all()
+    parts = Surface(body.nodes, facets)
     assert parts.areas.sum() == pytest.approx(whole.areas.sum(), rel=1e-13)
     assert parts.area_vectors.reshape(4, -1, 3).sum(axis=0) == pytest.approx(
         whole.area_vectors, abs=1e-16)

@@ -1,13 +1,43 @@
-"""Wedges, pyramids and mixed meshes, cut into tetrahedra."""
+"""Wedges, pyramids and meshes of several kinds of cells."""
+
+import math
 
 import meshio
 import numpy as np
 import pytest
-from solid_blocks import block_mesh
+from solid_blocks import block_mesh, mixed_mesh
 
-from fecontact import ElasticBody, MeshError, modal_basis, read_mesh
-from fecontact.fem.mesh_files.cut_cells import PYRAMID, SHAPES, WEDGE, cut_into_tetrahedra
+from fecontact import (
+    ElasticBody,
+    Material,
+    Mesh,
+    MeshError,
+    modal_basis,
+    read_mesh,
+    write_mesh,
+)
+from fecontact.fem import BodyFields, Tie, stress_of
+from fecontact.fem.body_forces import boundary_facets, boundary_forces
+from fecontact.fem.contact_face import contact_groups
+from fecontact.fem.elements.cell_kinds import (
+    CELL_KINDS,
+    HEXAHEDRON,
+    PYRAMID,
+    TETRAHEDRON,
+    WEDGE,
+    blocks_of,
+    padded,
+    shape_functions,
+)
+from fecontact.fem.elements.quadrature import rule
+from fecontact.fem.equations import facets_of_boundary
+from fecontact.fem.faces.contact_patches import face_surface
+from fecontact.fem.faces.moving_feet import DeformedFace
+from fecontact.fem.faces.surface import Surface, triangular
+from fecontact.fem.follower_pressure import follower_pressure
+from fecontact.output.files.contact_facets import contact_facets
 from fecontact.reduction import eigenfrequencies_hz
+from fecontact.reduction.solvers.solid_solver import aspect_ratios
 from fecontact.study.imported import imported
 
 SIZE = (0.2, 0.03, 0.02)
@@ -46,54 +76,289 @@ def deck(path, nodes, *blocks, extra=""):
     return path
 
 
-def area(mesh, facets):
-    a, b, c = np.moveaxis(mesh.nodes[facets], 1, 0)
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2.0
+KINDS = pytest.mark.parametrize("kind", [TETRAHEDRON, PYRAMID, WEDGE, HEXAHEDRON],
+                                ids=lambda kind: kind.name)
+DEGREES = pytest.mark.parametrize("degree", [1, 2])
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_bar_of_wedges_has_the_volume_faces_and_frequencies_of_hexahedra(tmp_path, order):
-    nodes, cells = wedges((8, 2, 1))
-    if order == 2:
-        nodes, cells = second_order(nodes, cells, WEDGE)
-    # Triangles are at the ends, S1 at x = 0; below are S3 ... S5.
-    low = [(k + 1, side) for k, row in enumerate(cells)
-           for side, face in ((3, (0, 1, 4, 3)), (4, (1, 2, 5, 4)), (5, (2, 0, 3, 5)))
-           if (nodes[row[list(face)], 2] == 0.0).all()]
-    first = np.flatnonzero((nodes[cells[:, :3], 0] == 0.0).all(axis=1)) + 1
-    surfaces = ("*SURFACE, NAME=left\n" + "".join(f"{k}, S1\n" for k in first)
-                + "*SURFACE, NAME=low\n" + "".join(f"{k}, S{side}\n" for k, side in low))
-    mesh = read_mesh(deck(tmp_path / "a.inp", nodes, cells, extra=surfaces))
-    assert mesh.kind.name == "tetrahedra"
-    assert len(mesh.cells) == 3 * len(cells)
-    assert len(mesh.curved_edges) == 0
-    assert mesh.volume == pytest.approx(np.prod(SIZE), rel=1e-12)
-    assert area(mesh, mesh.boundary("left")) == pytest.approx(SIZE[1] * SIZE[2], rel=1e-12)
-    assert area(mesh, mesh.boundary("low")) == pytest.approx(SIZE[0] * SIZE[1], rel=1e-12)
-    hexahedra = ElasticBody(block_mesh((8, 2, 1), SIZE), fixed={"left": "xyz"})
-    assert eigenfrequencies_hz(ElasticBody(mesh, fixed={"left": "xyz"}), 5) == pytest.approx(
-        eigenfrequencies_hz(hexahedra, 5), rel=2e-2)
-    basis = modal_basis(ElasticBody(mesh, fixed={"left": "xyz"}), 4, contact="low",
-                        contact_nodes=3)
-    assert basis.tributary.sum() == pytest.approx(SIZE[0] * SIZE[1], rel=1e-12)
+def bend(places):
+    return places + 0.006 * np.sin(60.0 * places[:, ::-1])
 
 
-def test_frequencies_of_fifteen_node_wedges_are_about_those_of_calculix(tmp_path):
-    """The free bar of 32 wedges C3D15 in CalculiX 2.20, steel: *FREQUENCY."""
+def linear(places):
+    """A displacement with constant strain, and a rotation."""
+    return places @ np.array([[0.3, -0.2, 0.5], [0.1, 0.4, -0.6], [-0.7, 0.2, 0.1]]).T + 0.05
+
+
+@KINDS
+@DEGREES
+def test_shape_functions_are_one_at_their_node_and_hold_polynomials(kind, degree):
+    places = np.array(kind.places[: kind.count(degree)], float)
+    values, _ = shape_functions(3, len(places), places)
+    assert values == pytest.approx(np.eye(len(places)), abs=1e-14)
+    local, weights = rule(3, kind.corners, 4)
+    at, slopes = shape_functions(3, len(places), local)
+    for powers in np.ndindex(3, 3, 3):
+        if sum(powers) <= degree:
+            assert at @ np.prod(places**powers, axis=1) == pytest.approx(
+                np.prod(local**powers, axis=1), abs=1e-13)
+    step = 1e-6 * np.eye(3)
+    differences = [(shape_functions(3, len(places), local + one)[0]
+                    - shape_functions(3, len(places), local - one)[0]) / 2e-6 for one in step]
+    assert slopes == pytest.approx(np.stack(differences, axis=-1), abs=1e-7)
+    assert weights.sum() == pytest.approx({4: 1.0 / 6.0, 5: 1.0 / 3.0, 6: 0.5, 8: 1.0}[
+        kind.corners], rel=1e-14)
+
+
+@KINDS
+@DEGREES
+def test_faces_have_the_functions_of_triangles_or_quadrilaterals(kind, degree):
+    """Elements of all kinds fit together: on a face others' nodes have no part."""
+    (nodes,) = (np.array(kind.places[: kind.corners], float)[np.argsort(kind.order)],)
+    body = ElasticBody(Mesh(nodes, [np.arange(kind.corners)]), degree=degree)
+    (block,) = body.blocks
+    for face in body.mesh.outline:
+        ((_, own),) = blocks_of(body.facet_nodes(face[None]))
+        local, _ = rule(2, 3, 4)
+        flat, _ = shape_functions(2, own.shape[1], local)
+        values, _ = shape_functions(3, block.nodes.shape[1], flat @ body.nodes[own[0]])
+        whole = np.zeros((len(local), len(body.nodes)))
+        whole[:, block.nodes[0]] = values
+        assert whole[:, own[0]] == pytest.approx(flat, abs=1e-13)
+        assert np.delete(whole, own[0], axis=1) == pytest.approx(0.0, abs=1e-13)
+
+
+@pytest.mark.parametrize("powers", [(2, 1, 1), (0, 4, 0), (1, 1, 3), (2, 2, 0)])
+def test_rules_of_wedges_and_pyramids_are_exact(powers):
+    """int x^a y^b z^c: over a pyramid B(a + b + 3, c + 1) / ((a + 1) (b + 1))."""
+    a, b, c = powers
+    local, weights = rule(3, 5, 5)
+    beta = math.gamma(a + b + 3) * math.gamma(c + 1) / math.gamma(a + b + c + 4)
+    assert weights @ np.prod(local**powers, axis=1) == pytest.approx(
+        beta / ((a + 1) * (b + 1)), rel=1e-13)
+    local, weights = rule(3, 6, 5)
+    assert weights @ np.prod(local**powers, axis=1) == pytest.approx(
+        math.factorial(a) * math.factorial(b) / math.factorial(a + b + 2) / (c + 1), rel=1e-13)
+
+
+@DEGREES
+@pytest.mark.parametrize("bricks", ["full", "incompatible"])
+def test_constant_strain_in_a_distorted_mixed_mesh(degree, bricks):
+    """Patch test: no forces inside, the exact work, and the exact stress at all nodes."""
+    mesh = mixed_mesh((2, 3, 3), bend=bend)
+    assert min(mesh.cell_counts.values()) > 10
+    body = ElasticBody(mesh, degree=degree, bricks=bricks)
+    u = linear(body.nodes)
+    forces = (body.stiffness @ u.ravel()).reshape(-1, 3)
+    inside = np.ones(len(u), bool)
+    inside[np.unique(body.facet_nodes(mesh.outline))] = False
+    assert np.count_nonzero(inside) > 20
+    assert np.abs(forces[inside]).max() < 1e-10 * np.abs(forces).max()
+    gradient = np.array([[0.3, -0.2, 0.5], [0.1, 0.4, -0.6], [-0.7, 0.2, 0.1]])
+    _, lateral, shear = body.elasticity[0]
+    strain = 0.5 * (gradient + gradient.T)
+    stress = lateral * np.trace(strain) * np.eye(3) + 2.0 * shear * strain
+    assert u.ravel() @ forces.ravel() == pytest.approx(
+        (stress * strain).sum() * mesh.volume, rel=1e-11)
+    components = stress[[0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
+    found = stress_of(body, u.reshape(-1, 1))[..., 0]
+    assert found == pytest.approx(np.broadcast_to(components, found.shape), rel=1e-9)
+
+
+def test_bending_is_exact_at_second_order():
+    """Energy of u = (x z, 0, -x^2 / 2), whose strain is xx = z: E h^3 L B / 24, if nu = 0."""
+    size = (0.2, 0.1, 0.05)
+    body = ElasticBody(mixed_mesh((1, 2, 2), size), Material(2e11, 0.0, 7850.0))
+    x, _, z = body.nodes.T
+    u = np.stack([x * z, 0.0 * x, -0.5 * x**2], axis=1).ravel()
+    assert 0.5 * u @ (body.stiffness @ u) == pytest.approx(
+        2e11 * size[0] * size[1] * size[2] ** 3 / 6.0, rel=1e-11)
+    assert stress_of(body, u.reshape(-1, 1))[:, 0, 0] == pytest.approx(2e11 * z, abs=1.0)
+
+
+@DEGREES
+def test_a_mixed_body_has_its_mass_and_six_rigid_motions(degree):
+    body = ElasticBody(mixed_mesh((1, 2, 2), bend=bend), degree=degree)
+    assert body.mesh.volume == pytest.approx(1e-3, rel=1e-12)
+    assert body.component_mass.sum() == pytest.approx(7.85, rel=1e-12)
+    x, y, _ = body.nodes.T
+    inertia = x @ (body.component_mass @ x) + y @ (body.component_mass @ y)
+    assert inertia == pytest.approx(7.85 * (0.2**2 + 0.1**2) / 3.0, rel=1e-3 if degree == 1 else (
+        1e-12))
+    frequencies = eigenfrequencies_hz(body, 8)
+    assert (frequencies[:6] == 0.0).all()
+    assert frequencies[6] > 1000.0
+
+
+@pytest.mark.parametrize(("degree", "order"), [(1, 2), (2, 4)])
+def test_frequencies_converge_as_the_order_of_the_elements(degree, order):
+    """A box with sliding faces: shear waves c_s / 2 |(l / a, m / b, n / c)|."""
+    size = (1.0, 0.8, 0.7)
+    slide = {"left": "x", "right": "x", "front": "y", "back": "y", "contact": "z", "top": "z"}
+    steel = Material()
+    speed = np.sqrt(steel.youngs_modulus / (2.0 * (1.0 + steel.poisson_ratio) * steel.density))
+    exact = 0.5 * speed * np.hypot(1.0 / size[0], 1.0 / size[1])
+    errors = []
+    for count in (1, 2):
+        mesh = mixed_mesh((count, 3 * count, 3 * count), size)
+        found = eigenfrequencies_hz(ElasticBody(mesh, steel, degree=degree, fixed=slide), 1)[0]
+        errors.append(found / exact - 1.0)
+    assert 0.0 < errors[1] < errors[0]
+    assert np.log2(errors[0] / errors[1]) > order - 0.5
+
+
+def test_the_iterative_solver_finds_the_frequencies_of_the_direct_one():
+    body = ElasticBody(mixed_mesh((1, 3, 3), bend=bend), fixed={"left": "xyz"})
+    assert np.ptp(aspect_ratios(body)) > 0.0
+    assert eigenfrequencies_hz(body, 4, eigensolver="iterative") == pytest.approx(
+        eigenfrequencies_hz(body, 4, eigensolver="direct"), rel=1e-7)
+
+
+@DEGREES
+def test_pressure_on_a_face_of_both_shapes_has_exact_force_and_moments(degree):
+    """On z = 0, 0.2 x 0.1 m, of four quadrilaterals, triangles of wedges and of tetrahedra."""
+    body = ElasticBody(mixed_mesh((1, 2, 2)), degree=degree)
+    surface = face_surface(body, "contact")
+    assert sorted(rows.shape[1] for _, rows in blocks_of(surface.facets)) == (
+        [3, 4] if degree == 1 else [6, 9])
+    assert surface.areas.sum() == pytest.approx(0.02, rel=1e-13)
+    forces = surface.pressure_forces().reshape(-1, 3)
+    assert forces.sum(axis=0) == pytest.approx([0.0, 0.0, 0.02], abs=1e-16)
+    assert np.cross(body.nodes, forces).sum(axis=0) == pytest.approx(
+        [0.02 * 0.05, -0.02 * 0.1, 0.0], abs=1e-16)
+    follower, _ = follower_pressure(body, {"contact": 1.0}, np.zeros(body.nodes.shape))
+    assert follower == pytest.approx(forces.ravel(), abs=1e-16)
+    assert boundary_forces(body, "contact")[:, 0] == pytest.approx(forces.ravel(), abs=1e-16)
+
+
+@DEGREES
+@pytest.mark.parametrize("count", [5, "all"])
+def test_contact_nodes_on_a_face_of_both_shapes(degree, count):
+    """They take the whole area, and move as a linear displacement at their centre."""
+    body = ElasticBody(mixed_mesh((1, 2, 2)), degree=degree)
+    found = contact_groups(body, "contact", count)
+    assert found.tributary.sum() == pytest.approx(0.02, rel=1e-13)
+    moved = (found.matrix @ linear(body.nodes).ravel()).reshape(-1, 6)
+    assert moved[:, :3] == pytest.approx(linear(found.positions), abs=1e-13)
+    basis = modal_basis(body, 8, contact="contact", contact_nodes=count)
+    shapes = basis.mode_shapes
+    # Facets of the outline are triangles, those of a contact node have its area.
+    parts = Surface(shapes.nodes, shapes.outline)
+    own = np.bincount(shapes.outline_nodes + 1, parts.areas)[1:]
+    assert own == pytest.approx(basis.tributary, rel=1e-12)
+    assert (contact_facets(basis).at_cells(shapes.cells, len(shapes.nodes)) >= 0).any()
+
+
+@DEGREES
+def test_places_follow_faces_of_both_shapes(degree):
+    """As those of ties and of feet: linear displacements are exact, also beside the face."""
+    body = ElasticBody(mixed_mesh((1, 2, 2)), degree=degree)
+    face = facets_of_boundary(body, "contact")
+    rng = np.random.default_rng(5)
+    flat = rng.uniform((0.0, 0.0), (0.2, 0.1), (60, 2))
+    on_face = np.column_stack([flat, np.zeros(60)])
+    facet, local, distance = face.closest(on_face)
+    assert distance == pytest.approx(0.0, abs=1e-12)
+    assert {*triangular(face.nodes[facet]).tolist()} == {True, False}
+    weights = face.following(on_face, facet, local)
+    assert np.einsum("sndc,snc->sd", weights, linear(body.nodes)[face.nodes[facet]]) == (
+        pytest.approx(linear(on_face), abs=1e-12))
+    beside = on_face - [0.0, 0.0, 1e-3]
+    feet = DeformedFace(boundary_facets(body, "contact")).feet(beside, body.nodes)
+    assert feet.valid.all()
+    assert feet.places == pytest.approx(on_face, abs=1e-12)
+    assert feet.gaps == pytest.approx(1e-3, rel=1e-9)
+    again = DeformedFace(boundary_facets(body, "contact")).feet(beside, body.nodes, feet.facet)
+    assert (again.facet == feet.facet).all()
+
+
+def test_ties_to_a_face_of_both_shapes_hold_constant_strain():
+    """The face of a block of other cells follows it; linear displacements meet the tie."""
+    lower, upper = mixed_mesh((1, 2, 2)), block_mesh((3, 3, 2)).placed((0.0, 0.0, 0.05))
+    mesh = Mesh(np.concatenate([lower.nodes, upper.nodes]),
+                padded([lower.cells, upper.cells + len(lower.nodes)]), {
+                    "low": lower.boundaries["top"],
+                    "high": upper.boundaries["contact"] + len(lower.nodes)})
+    body = ElasticBody(mesh, constraints=[Tie("high", "low")])
+    E = body.expansion.toarray()
+    assert E.shape[0] - E.shape[1] == 3 * 7 * 7
+    u = linear(body.nodes).ravel()
+    assert E @ np.linalg.lstsq(E, u)[0] == pytest.approx(u, abs=1e-12)
+    assert eigenfrequencies_hz(body, 7)[6] > 1000.0
+
+
+def test_displacements_are_interpolated_in_all_kinds_of_cells():
+    body = ElasticBody(mixed_mesh((1, 2, 2), bend=bend))
+    u = linear(body.nodes)
+    fields = BodyFields(body.nodes, body.elements, u, stress_of(body, u.reshape(-1, 1))[..., 0])
+    for place in np.random.default_rng(1).uniform((0.0, 0.0, 0.0), (0.2, 0.1, 0.05), (40, 3)):
+        moved, stress = fields.at(place)
+        assert moved == pytest.approx(linear(place[None])[0], abs=1e-11)
+        assert stress == pytest.approx(fields.stress[0], rel=1e-8)
+    area = Surface(fields.nodes, fields.outline).areas.sum()
+    assert area == pytest.approx(2.0 * (0.2 * 0.1 + 0.2 * 0.05 + 0.1 * 0.05), rel=1e-12)
+    assert Mesh(fields.nodes, fields.cells).volume == pytest.approx(1e-3, rel=1e-12)
+
+
+def test_refined_meshes_keep_volume_faces_groups_and_curves():
+    mesh = mixed_mesh((1, 1, 2), bend=bend)
+    whole = np.arange(len(mesh.cells))
+    mesh = Mesh(mesh.nodes, mesh.cells, mesh.boundaries, cell_groups={
+        "first": whole[:3], "others": whole[3:]}, materials={"first": Material(density=1000.0),
+                                                            "others": Material()})
+    fine = mesh.refined()
+    assert fine.volume == pytest.approx(mesh.volume, rel=1e-12)
+    assert ElasticBody(fine).total_mass == pytest.approx(ElasticBody(mesh).total_mass, rel=1e-12)
+    for name in mesh.boundaries:
+        coarse, parts = (Surface(one.nodes, one.boundaries[name]) for one in (mesh, fine))
+        assert len(parts.facets) == 4 * len(coarse.facets)
+        assert parts.area_vectors.sum(axis=0) == pytest.approx(
+            coarse.area_vectors.sum(axis=0), abs=1e-14)
+    assert fine.refined().volume == pytest.approx(mesh.volume, rel=1e-12)
+
+
+@pytest.mark.parametrize("curved", [False, True])
+@pytest.mark.parametrize("form", ["a.msh", "b.msh"])
+def test_written_mixed_meshes_are_read_again(tmp_path, curved, form):
+    mesh = mixed_mesh((1, 2, 2), bend=bend)
+    if curved:
+        edges = mesh.edges[0]
+        edges = edges[(mesh.nodes[edges][:, :, 2] == 0.05).all(axis=1)]
+        middles = mesh.nodes[edges].mean(axis=1) + np.array([0.0, 0.0, 0.004])
+        mesh = Mesh(mesh.nodes, mesh.cells, mesh.boundaries, mesh.points, edges, middles)
+        assert mesh.volume > 1.02e-3
+    path = tmp_path / form
+    write_mesh(mesh, path)
+    again = read_mesh(path)
+    assert again.volume == pytest.approx(mesh.volume, rel=1e-12)
+    assert again.cell_counts == mesh.cell_counts
+    for name in mesh.boundaries:
+        one, other = (np.sort(where.nodes[where.boundaries[name]].sum(axis=(1, 2)))
+                      for where in (mesh, again))
+        assert other == pytest.approx(one, rel=1e-12)
+    if not curved:
+        fine = meshio.read(path)
+        assert sum(len(block.data) for block in fine.cells if block.dim == 3) == len(mesh.cells)
+
+
+def test_faces_of_four_sides_do_not_meet_triangles():
+    cube = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1),
+                     (0, 1, 1), (0.5, 0.5, 2.0)], float)
+    with pytest.raises(MeshError, match=r"1 four-sided faces .* first at \(0\.5, 0\.5, 1\); put "
+                                        "pyramids between"):
+        Mesh(cube, padded([np.arange(8)[None], np.array([[4, 5, 6, 8], [4, 6, 7, 8]])]))
+
+
+# Free bars of 8 x 2 x 1 cells in CalculiX 2.20, steel: elastic modes of *FREQUENCY [Hz].
+@pytest.mark.parametrize(("order", "expected", "tolerance"), [
+    (2, (2576.396, 3710.544, 6762.118, 7166.114), 1e-3)])
+def test_frequencies_of_wedges_are_those_of_calculix(tmp_path, order, expected, tolerance):
+    """Its wedges C3D15 have no nodes in the middles of faces, these have."""
     nodes, cells = second_order(*wedges((8, 2, 1)), WEDGE)
-    found = eigenfrequencies_hz(ElasticBody(read_mesh(deck(tmp_path / "a.inp", nodes, cells))), 10)
-    assert found[6:8] == pytest.approx((2576.396, 3710.544), rel=5e-3)
-    assert found[8:] == pytest.approx((6762.118, 7166.114), rel=1.5e-2)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_cells_are_cut_alike_on_both_sides_of_a_face_for_any_numbers(tmp_path, seed):
-    nodes, cells = wedges((3, 2, 2))
-    order = np.random.default_rng(seed).permutation(len(nodes))
-    mesh = read_mesh(deck(tmp_path / "a.inp", nodes[order], np.argsort(order)[cells]))
-    assert mesh.volume == pytest.approx(np.prod(SIZE), rel=1e-12)
-    x, y, z = SIZE
-    assert area(mesh, mesh.outline) == pytest.approx(2.0 * (x * y + y * z + z * x), rel=1e-12)
+    mesh = read_mesh(deck(tmp_path / "a.inp", nodes, cells))
+    assert mesh.cell_counts == {"wedges": 32}
+    found = eigenfrequencies_hz(ElasticBody(mesh, degree=order), 10)[6:]
+    assert found == pytest.approx(expected, rel=tolerance)
 
 
 def test_second_order_wedges_follow_curved_faces(tmp_path):
@@ -108,12 +373,12 @@ def test_second_order_wedges_follow_curved_faces(tmp_path):
     curved = read_mesh(deck(tmp_path / "a.inp", *second_order(nodes, cells, WEDGE, bend)))
     assert straight.volume < 0.96 * exact
     assert curved.volume == pytest.approx(exact, rel=1e-3)
-    # Diagonals of the curved faces are curved too.
-    ends = curved.curved_edges
-    assert len(ends) > np.count_nonzero(np.ptp(curved.nodes[ends][:, :, 2], axis=1) == 0.0)
-    radius = np.linalg.norm(curved.curved_middles[:, :2], axis=1)
-    outer = (np.linalg.norm(curved.nodes[ends][:, :, :2], axis=2) > 1.999).all(axis=1)
-    assert radius[outer] == pytest.approx(2.0, rel=2e-3)
+    outline = ElasticBody(curved).facet_nodes(curved.outline)
+    radius = np.linalg.norm(ElasticBody(curved).nodes[outline][:, :, :2], axis=2)
+    outer = radius[(radius > 1.95).all(axis=1)]
+    assert outer == pytest.approx(2.0, rel=5e-3)
+    assert ElasticBody(curved).component_mass.sum() == pytest.approx(7850.0 * curved.volume,
+                                                                     rel=1e-12)
 
 
 # A cube with a pyramid on top, a wedge at its right side and a tetrahedron at the wedge's end.
@@ -125,7 +390,7 @@ MIXED = [("hexahedron", [[0, 1, 2, 3, 4, 5, 6, 7]]), ("pyramid", [[4, 5, 6, 7, 8
 
 @pytest.mark.parametrize("seed", [None, 0, 1])
 @pytest.mark.parametrize("form", ["a.vtu", "a.msh", "a.inp", "second order"])
-def test_mixed_meshes_are_cut_into_tetrahedra(tmp_path, form, seed):
+def test_mixed_files_are_read_as_they_are(tmp_path, form, seed):
     order = (np.arange(len(PLACES)) if seed is None
              else np.random.default_rng(seed).permutation(len(PLACES)))
     blocks = [(kind, np.argsort(order)[np.array(cells)]) for kind, cells in MIXED]
@@ -133,7 +398,7 @@ def test_mixed_meshes_are_cut_into_tetrahedra(tmp_path, form, seed):
     if form == "second order":
         done = []
         for _, cells in blocks:
-            pairs = cells[:, np.array(SHAPES[cells.shape[1]].edges)].reshape(-1, 2)
+            pairs = cells[:, np.array(CELL_KINDS[3, cells.shape[1]].edges)].reshape(-1, 2)
             done.append(np.concatenate([cells, len(nodes) + np.arange(len(pairs))[None]], axis=1))
             nodes = np.concatenate([nodes, nodes[pairs].mean(axis=1)])
         path = deck(tmp_path / "a.inp", nodes, *done)
@@ -144,16 +409,15 @@ def test_mixed_meshes_are_cut_into_tetrahedra(tmp_path, form, seed):
         meshio.write(path, meshio.Mesh(nodes, blocks), **(
             {"file_format": "gmsh22", "binary": False} if form == "a.msh" else {}))
     mesh = read_mesh(path)
-    assert mesh.kind.name == "tetrahedra"
-    assert len(mesh.cells) == 6 + 2 + 3 + 1
+    assert mesh.cell_counts == {"tetrahedra": 1, "pyramids": 1, "wedges": 1, "hexahedra": 1}
     assert mesh.volume == pytest.approx(1.0 + 1.0 / 3.0 + 0.5 + 1.0 / 6.0, rel=1e-12)
-    assert len(mesh.outline) == 2 * 4 + 4 + (2 * 2 + 1) + 3
+    assert len(mesh.outline) == 4 + 4 + 3 + 3
     assert len(mesh.curved_edges) == 0
 
 
 @pytest.mark.parametrize(("corners", "order", "kind", "note"), [
-    (6, 1, "C3D6", "64 cells C3D6 are cut into quadratic tetrahedra, which are softer: by"),
-    (6, 2, "C3D15", "64 cells C3D15 are cut into quadratic tetrahedra. This raises frequencies"),
+    (6, 1, "C3D6", "64 wedges C3D6 become second-order wedges. With degree = 1 they stay first"),
+    (6, 2, "C3D15", "64 wedges C3D15 get nodes in the middles of their four-sided faces. Freq"),
     (8, 1, "C3D8R", "32 bricks C3D8R (one point) become second-order hexahedra. With"),
     (8, 1, "C3D8I", "32 bricks C3D8I become second-order hexahedra, with nearly the same"),
     (8, 1, "C3D8", None),
@@ -179,9 +443,11 @@ def test_folded_wedges_and_pyramids_are_refused(tmp_path):
     used, folded = np.unique(cells[:1], return_inverse=True)
     folded = folded.reshape(1, 6)
     folded[0, [0, 3]] = folded[0, [3, 0]]
-    with pytest.raises(MeshError, match=r"1 wedges have no volume, or are folded or inverted, the "
-                                        r"first at \(0\.1, "):
+    with pytest.raises(MeshError, match=r"1 mesh cells have no volume, or are folded or inverted, "
+                                        r"the first is cell 0 at \(0\.1, "):
         read_mesh(deck(tmp_path / "a.inp", nodes[used], folded))
     places = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 0)], float)
-    with pytest.raises(MeshError, match=r"1 pyramids have no volume"):
-        cut_into_tetrahedra(places, np.arange(5), np.arange(5)[None], PYRAMID)
+    with pytest.raises(MeshError, match=r"1 mesh cells have no volume"):
+        Mesh(places, [np.arange(5)])
+    with pytest.raises(MeshError, match=r"they repeat corners, the first is cell 1"):
+        Mesh(np.vstack([places[:4], [(0.5, 0.5, 1.0)]]), [(0, 1, 2, 3, 4), (0, 1, 4, 4, 4)])

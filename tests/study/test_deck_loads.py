@@ -10,8 +10,7 @@ from ansys_archives import archive, material
 from solid_blocks import block_mesh
 
 from fecontact import InputError, MeshError, Study, read_mesh, static_solution
-from fecontact.fem.elements.cell_kinds import HEXAHEDRON
-from fecontact.fem.mesh_files.cut_cells import SHAPES
+from fecontact.fem.elements.cell_kinds import CELL_KINDS, HEXAHEDRON
 from fecontact.fem.mesh_files.deck_contents import COMPONENTS
 from fecontact.fem.mesh_files.nastran_loads import nastran_contents
 from fecontact.study.imported import imported
@@ -304,7 +303,7 @@ def test_sides_of_cells_by_two_of_their_points(corners, tmp_path):
     from fecontact.fem.mesh_files.nastran_loads import _side
 
     numbers = tuple(range(11, 11 + corners))
-    for facet in SHAPES[corners].facets:
+    for facet in CELL_KINDS[3, corners].facets:
         wanted = {numbers[k] for k in facet}
         first = numbers[facet[0]]
         other = (({*numbers} - wanted).pop() if corners == 4

@@ -21,7 +21,7 @@ from fecontact import (
 )
 from fecontact.analysis import buckling_loads, prestressed_modes
 from fecontact.fem import BodyFields
-from fecontact.fem.fields import body_elements, stress_of
+from fecontact.fem.fields import stress_of
 from fecontact.laws import JenkinsFriction, LinearContact
 from fecontact.reduction import eigenfrequencies_hz
 
@@ -88,7 +88,7 @@ def stretched(body, strain):
     """A uniform strain along x as a static state."""
     u = np.zeros(body.nodes.shape)
     u[:, 0] = strain * body.nodes[:, 0]
-    return BodyFields(body.nodes, body_elements(body), u, stress_of(body, u.reshape(-1, 1))[..., 0])
+    return BodyFields(body.nodes, body.elements, u, stress_of(body, u.reshape(-1, 1))[..., 0])
 
 
 @pytest.mark.parametrize("space", [False, True])

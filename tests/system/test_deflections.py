@@ -17,7 +17,7 @@ from fecontact import (
     PointLoad,
 )
 from fecontact.analysis import DeflectionSteps, deflection_path
-from fecontact.fem.fields import BodyFields, body_elements
+from fecontact.fem.fields import BodyFields
 from fecontact.fem.finite_strain import FiniteStrainModel
 from fecontact.fem.load_steps import follow
 
@@ -59,7 +59,7 @@ def test_true_stress_of_a_uniform_deformation():
     body = ElasticBody(grid(np.linspace(0.0, 2.0, 4), np.linspace(0.0, 1.0, 3)), thickness=0.1)
     F = np.array([[0.3, -1.2], [1.1, 0.4]])
     S = np.array([[3.0, 0.5], [0.5, -1.0]])
-    fields = BodyFields(body.nodes, body_elements(body), body.nodes @ (F - np.eye(2)).T,
+    fields = BodyFields(body.nodes, body.elements, body.nodes @ (F - np.eye(2)).T,
                         np.tile([3.0, -1.0, 2.0, 0.5], (len(body.nodes), 1)))
     J = np.linalg.det(F)
     (xx, xy), (_, yy) = F @ S @ F.T / J

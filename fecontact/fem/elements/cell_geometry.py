@@ -1,12 +1,22 @@
 """Geometry of cells: orientation, volume, sides in common, second-order places of curved cells."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
 from fecontact.core.errors import MeshError
 from fecontact.core.types import Array, Integers
-from fecontact.fem.elements.cell_kinds import CellKind, numbered_rows, shape_functions
+from fecontact.fem.elements.cell_kinds import (
+    CELL_KINDS,
+    CellKind,
+    blocks_of,
+    numbered_rows,
+    padded,
+    shape_functions,
+    widths,
+)
+from fecontact.fem.elements.quadrature import rule
 
 _FLAT = 1e-12  # volume of a degenerate cell, relative to the cube of its size
 _ON_EDGE = 1e-5  # distance of a node on an edge, per length: coordinates in single precision
@@ -14,31 +24,33 @@ _ON_EDGE = 1e-5  # distance of a node on an edge, per length: coordinates in sin
 # relative to its centre.
 _AT_ONCE, _WITHIN = 4000, 0.1
 _CELLS = 50_000  # whose corners are looked at together
-# Gauss points from 0 to 1, exact for determinants of second-order cells: degree 5 a direction.
-_GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
-_GAUSS, _WEIGHTS = 0.5 * (1.0 + _GAUSS), 0.5 * _WEIGHTS
 
 
-def oriented_solids(nodes: Array, cells: Integers, kind: CellKind) -> Integers:
+def oriented_solids(nodes: Array, cells: Integers) -> Integers:
     """Cells of space with positive volume, those of the opposite orientation renumbered.
 
     Raises
     ------
     MeshError
-        For cells without volume, or hexahedra folded at a corner.
+        For cells without volume, or folded at a corner.
     """
-    smallest, largest = _corner_volumes(nodes, cells, kind)
-    cells = np.where((largest < 0.0)[:, None], cells[:, list(kind.mirrored)], cells)
-    smallest = np.where(largest < 0.0, -largest, smallest)
-    size = np.linalg.norm(np.ptp(nodes[cells], axis=1), axis=1)
-    bad = smallest <= _FLAT * size**3
-    if bad.any():
-        first = int(np.flatnonzero(bad)[0])
-        x, y, z = nodes[cells[first]].mean(axis=0)
-        what = "have no volume" if kind.simplex else "have no volume, or are folded or inverted"
-        raise MeshError(f"{np.count_nonzero(bad)} mesh cells {what}, the first is cell {first} at "
+    found, flat = np.array(cells), np.zeros(len(cells), bool)
+    for which, rows in blocks_of(cells):
+        kind = CELL_KINDS[3, rows.shape[1]]
+        smallest, largest = _corner_volumes(nodes, rows, kind)
+        rows = np.where((largest < 0.0)[:, None], rows[:, list(kind.mirrored)], rows)
+        found[which] = padded([rows], cells.shape[1])
+        smallest = np.where(largest < 0.0, -largest, smallest)
+        size = np.linalg.norm(np.ptp(nodes[rows], axis=1), axis=1)
+        flat[which] = smallest <= _FLAT * size**3
+    if flat.any():
+        first = int(np.flatnonzero(flat)[0])
+        x, y, z = centres_of(nodes, cells)[first]
+        solid = widths(cells)[first] > 4
+        what = "have no volume, or are folded or inverted" if solid else "have no volume"
+        raise MeshError(f"{np.count_nonzero(flat)} mesh cells {what}, the first is cell {first} at "
                         f"({x:g}, {y:g}, {z:g}).")
-    return cells
+    return found
 
 
 def _corner_volumes(nodes: Array, cells: Integers, kind: CellKind) -> tuple[Array, Array]:
@@ -59,16 +71,34 @@ def solid_volumes(nodes: Array, cells: Integers, kind: CellKind) -> Array:
     corners = nodes[cells[:, list(kind.order)]]
     if kind.simplex:
         return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0)
-    # Determinants of trilinear cells are quadratic in each direction: two points are exact.
-    points = 0.5 + np.array([-1.0, 1.0]) / np.sqrt(12.0)
-    local = np.stack(np.meshgrid(points, points, points), axis=-1).reshape(-1, 3)
-    _, slopes = shape_functions(3, 8, local)
-    return np.asarray(np.linalg.det(np.einsum("pkj,mki->mpij", slopes, corners)).mean(axis=1))
+    # Determinants of trilinear cells are quadratic in each direction.
+    local, weights = rule(3, kind.corners, 2)
+    _, slopes = shape_functions(3, kind.corners, local)
+    return np.asarray(np.linalg.det(np.einsum("pkj,mki->mpij", slopes, corners)) @ weights)
 
 
-def facets_of(cells: Integers, kind: CellKind) -> Integers:
-    """Sides (M f, n) of each cell in turn, so that inner ones occur twice."""
-    return cells[:, np.array(kind.facets)].reshape(-1, len(kind.facets[0]))
+def sides_of(cells: Integers, dimension: int) -> tuple[Integers, Integers]:
+    """Sides (F, n) of each cell in turn, so that inner ones occur twice, and their cells (F,).
+
+    Rows of cells, and of triangles beside quadrilaterals, are filled by their last corner.
+    """
+    blocks = blocks_of(cells)
+    size = max(len(side) for _, rows in blocks for side in CELL_KINDS[
+        dimension, rows.shape[1]].facets)
+    sides, owner = [], []
+    for which, rows in blocks:
+        table = _filled(CELL_KINDS[dimension, rows.shape[1]].facets, size)
+        sides.append(rows[:, table].reshape(-1, size))
+        owner.append(np.repeat(np.arange(len(cells))[which], len(table)))
+    if len(blocks) == 1:
+        return sides[0], owner[0]
+    order = np.argsort(np.concatenate(owner), kind="stable")
+    return np.concatenate(sides)[order], np.concatenate(owner)[order]
+
+
+def _filled(facets: Sequence[Sequence[int]], size: int) -> Integers:
+    """Facets of a cell (f, size), rows filled by their last corner."""
+    return np.array([[*facet, *[facet[-1]] * (size - len(facet))] for facet in facets])
 
 
 def require_apart(facets: Integers, number: Integers, count: Integers, nodes: Array) -> None:
@@ -76,36 +106,44 @@ def require_apart(facets: Integers, number: Integers, count: Integers, nodes: Ar
 
     ``facets`` are the outward faces or edges of all cells, ``number`` those without orientation.
     """
-    first = np.argmin(facets, axis=1)
-    rows, width = np.arange(len(facets)), facets.shape[1]
-    ahead = first if width == 2 else (
-        facets[rows, (first + 1) % width] < facets[rows, first - 1]).astype(np.int64)
+    ahead = np.empty(len(facets), np.int64)
+    for which, some in blocks_of(facets):
+        first = np.argmin(some, axis=1)
+        rows, width = np.arange(len(some)), some.shape[1]
+        ahead[which] = first if width == 2 else (
+            some[rows, (first + 1) % width] < some[rows, first - 1])
     twice = (count == 2) & (np.bincount(number, ahead, minlength=len(count)) != 1)
     if twice.any():
         place = nodes[facets[np.flatnonzero(twice[number])[0]]].mean(axis=0)
-        raise MeshError(f"{np.count_nonzero(twice)} {'edges' if width == 2 else 'faces'} have both "
+        sides = "edges" if facets.shape[1] == 2 else "faces"
+        raise MeshError(f"{np.count_nonzero(twice)} {sides} have both "
                         f"of their cells on one side, the first at "
                         f"({', '.join(f'{x:g}' for x in place)}): the mesh has inverted or "
                         f"overlapping elements; mesh the body anew.")
 
 
-def require_no_overlap(nodes: Array, cells: Integers, kind: CellKind, outline: Integers) -> None:
+def require_no_overlap(nodes: Array, cells: Integers, at_outline: Integers) -> None:
     """Raise :class:`MeshError` where a cell at the outline lies partly within another cell.
 
     Overlaps that leave the centre of a cell, and the places half way from there to its corners,
     outside other cells are not found: of curved faces that touch, the chords may overlap.
-    ``outline`` are the numbers of the sides that belong to one cell only, in the order of
-    :func:`facets_of`.
+    ``at_outline`` are the numbers of the cells with a side that belongs to them only.
     """
     from scipy.spatial import KDTree
 
-    centre, radius = np.empty((len(cells), kind.dimension)), np.empty(len(cells))
+    dimension = nodes.shape[1]
+    centre, radius = centres_of(nodes, cells), np.empty(len(cells))
     for first in range(0, len(cells), _CELLS):
         part = slice(first, first + _CELLS)
-        corners = nodes[cells[part]]
-        centre[part] = corners.mean(axis=1)
-        radius[part] = np.linalg.norm(corners - centre[part, None], axis=2).max(axis=1)
-    at_outline = np.unique(outline // len(kind.facets))
+        radius[part] = np.linalg.norm(nodes[cells[part]] - centre[part, None], axis=2).max(axis=1)
+    tables = {kind.corners: kind.facets for (of, _), kind in CELL_KINDS.items() if of == dimension}
+    size, shared = (how(len(side) for width in np.unique(widths(cells)).tolist()
+                        for side in tables[width]) for how in (max, min))
+    most = max(map(len, tables.values()))
+    sides_at = np.zeros((max(tables) + 1, most, size), np.int64)
+    for width, facets in tables.items():
+        if max(map(len, facets)) <= size:
+            sides_at[width] = _filled(facets, size)[np.minimum(np.arange(most), len(facets) - 1)]
     places = np.concatenate([centre[at_outline, None],
                              0.5 * (centre[at_outline, None] + nodes[cells[at_outline]])], axis=1)
     level = np.floor(np.log2(radius))
@@ -114,24 +152,34 @@ def require_no_overlap(nodes: Array, cells: Integers, kind: CellKind, outline: I
         tree = KDTree(centre[large])
         for first in range(0, len(at_outline), _AT_ONCE):
             some = places[first : first + _AT_ONCE]
-            near = tree.query_ball_point(some.reshape(-1, kind.dimension), radius[large].max())
+            near = tree.query_ball_point(some.reshape(-1, dimension), radius[large].max())
             sizes = np.array([len(found) for found in near])
             place = np.repeat(np.arange(len(near)), sizes)
             cell = large[np.concatenate([np.asarray(found, np.int64) for found in near])]
             own = at_outline[first + place // some.shape[1]]
-            at = some.reshape(-1, kind.dimension)[place]
+            at = some.reshape(-1, dimension)[place]
             held, of = np.unique(cell, return_inverse=True)
-            sides = nodes[cells[held][:, np.array(kind.facets)]]
+            sides = nodes[cells[held][np.arange(len(held))[:, None, None],
+                                      sides_at[widths(cells[held])]]]
             on_side, normal = sides.mean(axis=2), _side_normals(sides)
             inside = np.einsum("mfd,mfd->mf", on_side - centre[held, None], normal)
             depth = np.einsum("pfd,pfd->pf", on_side[of] - at[:, None], normal[of])
             within = (depth > _WITHIN * inside[of]).all(axis=1) & (own != cell)
             for a, b in zip(own[within], cell[within], strict=True):
                 # Two cells with a common side lie apart, see require_apart.
-                if len(np.intersect1d(cells[a], cells[b])) < len(kind.facets[0]):
+                if len(np.intersect1d(cells[a], cells[b])) < shared:
                     where = ", ".join(f"{x:g}" for x in centre[a])
                     raise MeshError(f"Mesh cells {a} and {b} overlap at ({where}); remove one of "
                                     f"them, or move the parts of the mesh apart.")
+
+
+def centres_of(nodes: Array, cells: Integers) -> Array:
+    """Mean places (M, d) of the corners of cells [m]."""
+    found = np.empty((len(cells), nodes.shape[1]))
+    for which, rows in blocks_of(cells):
+        for part in np.array_split(np.arange(len(cells))[which], 1 + len(rows) // _CELLS):
+            found[part] = nodes[cells[part, : rows.shape[1]]].mean(axis=1)
+    return found
 
 
 def _side_normals(sides: Array) -> Array:
@@ -151,8 +199,9 @@ def require_conforming(outline: Integers, nodes: Array) -> None:
     """
     from scipy.spatial import KDTree
 
+    _require_like_faces(outline, nodes)
     ends = np.sort(np.stack([outline, np.roll(outline, 1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    ends, _, _ = numbered_rows(ends)
+    ends, _, _ = numbered_rows(ends[ends[:, 0] != ends[:, 1]])
     on_outline = np.unique(ends)
     a, b = nodes[ends[:, 0]], nodes[ends[:, 1]]
     middles, radii = 0.5 * (a + b), 0.5 * (1.0 - _ON_EDGE) * np.linalg.norm(b - a, axis=1)
@@ -174,6 +223,22 @@ def require_conforming(outline: Integers, nodes: Array) -> None:
                             f"{'edges' if outline.shape[1] == 2 else 'faces'}.")
 
 
+def _require_like_faces(outline: Integers, nodes: Array) -> None:
+    """Raise :class:`MeshError` for a quadrilateral that meets triangles on its other side."""
+    faces = {rows.shape[1]: rows for _, rows in blocks_of(outline)}
+    if sorted(faces) != [3, 4]:
+        return
+    corners = np.array([[0, 1, 2], [1, 2, 3], [2, 3, 0], [3, 0, 1]])
+    halves = np.sort(faces[4][:, corners].reshape(-1, 3), axis=1)
+    number = numbered_rows(np.concatenate([np.sort(faces[3], axis=1), halves]))[1]
+    met = np.isin(number[len(faces[3]):], number[: len(faces[3])]).reshape(-1, 4).any(axis=1)
+    if met.any():
+        where = ", ".join(f"{x:g}" for x in nodes[faces[4][met][0]].mean(axis=0))
+        raise MeshError(f"{np.count_nonzero(met)} four-sided faces of cells meet triangles of "
+                        f"others, the first at ({where}); put pyramids between hexahedra or wedges "
+                        f"and tetrahedra.")
+
+
 def second_order_places(
     nodes: Array, cells: Integers, kind: CellKind, middles: Array
 ) -> Array:
@@ -185,15 +250,14 @@ def second_order_places(
     corners = nodes[cells[:, list(kind.order)]]
     places = [corners, middles]
     local = np.array(kind.places, float)
-    if not kind.simplex:
-        count, edges = kind.corners, len(kind.edges)
-        for middle in local[count + edges:]:
-            held = middle != 0.5
-            near = [(np.flatnonzero((local[a:b][:, held] == middle[held]).all(axis=1)))
-                    for a, b in ((0, count), (count, count + edges))]
-            share = 0.5 if len(near[1]) == 4 else 0.25
-            places.append((share * middles[:, near[1]].sum(axis=1)
-                           - 0.25 * corners[:, near[0]].sum(axis=1))[:, None])
+    edges = [{*edge} for edge in kind.edges]
+    groups = kind.four_sided + ([tuple(range(kind.corners))] if kind.has_centre else [])
+    assert len(local) == kind.corners + len(edges) + len(groups)
+    for group in groups:
+        inside = [number for number, edge in enumerate(edges) if edge <= {*group}]
+        share = 0.5 if len(group) == 4 else 0.25
+        places.append((share * middles[:, inside].sum(axis=1)
+                       - 0.25 * nodes[cells[:, list(group)]].sum(axis=1))[:, None])
     return np.concatenate(places, axis=1)
 
 
@@ -207,13 +271,8 @@ def curved_volumes(places: Array, kind: CellKind) -> Array:
     """
     count, dimension = len(kind.places), kind.dimension
     corners = np.array(kind.places, float)
-    points = np.stack(np.meshgrid(*[_GAUSS] * dimension, indexing="ij"), -1).reshape(-1, dimension)
-    weights = np.prod(np.meshgrid(*[_WEIGHTS] * dimension, indexing="ij"), axis=0).ravel()
-    if kind.simplex:  # collapse the square or cube: x1 = s1, x2 = s2 (1 - s1), ...
-        left = np.ones(len(points))
-        for axis in range(dimension):
-            points[:, axis], left, weights = (points[:, axis] * left,
-                                              left * (1.0 - points[:, axis]), weights * left)
+    # Exact for determinants of second-order cells but pyramids: degree 5 a direction.
+    points, weights = rule(dimension, kind.corners, 5)
     volume = np.zeros(len(places))
     smallest = np.full(len(places), np.inf)
     for local, weight in zip(np.concatenate([points, corners]),

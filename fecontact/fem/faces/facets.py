@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elements.cell_kinds import shape_functions
-from fecontact.fem.faces.surface import Surface
+from fecontact.fem.faces.surface import Surface, functions_at, triangular
 
 _NEAREST = 24  # facets among which the closest place is looked for
 _STEPS = 12
@@ -50,8 +51,8 @@ class Facets:
         local = np.zeros((len(places), places.shape[1] - 1))
         distance = np.full(len(places), np.inf)
         for other in order.T:
-            at = closest_local(corners[other], places)
-            values, _ = shape_functions(at.shape[1], self.nodes.shape[1], at)
+            at = closest_local(self.nodes[other], corners[other], places)
+            values, _ = functions_at(self.nodes[other], at)
             away = np.linalg.norm(places - np.einsum("sn,snx->sx", values, corners[other]), axis=1)
             closer = away < distance * (1.0 - 1e-9)
             facet, distance = np.where(closer, other, facet), np.where(closer, away, distance)
@@ -66,7 +67,7 @@ class Facets:
         """
         corners = self.places[self.nodes[facet]]
         d = places.shape[1]
-        values, slopes = shape_functions(d - 1, corners.shape[1], local)
+        values, slopes = functions_at(self.nodes[facet], local)
         along = np.einsum("sna,snx->sax", slopes, corners)
         # Rows are the reciprocal vectors.
         reciprocal = np.linalg.solve(along @ np.swapaxes(along, 1, 2), along)
@@ -81,13 +82,16 @@ class Facets:
         return np.asarray(values[..., None, None] * np.eye(d) - tilt)
 
 
-def closest_local(corners: Array, places: Array) -> Array:
-    """Local coordinates (s, d - 1) of the closest place of each facet (s, n, d) to a place."""
-    count, d = corners.shape[1:]
-    triangle = d == 3 and count in (3, 6)
-    local = np.full((len(places), d - 1), 1.0 / 3.0 if triangle else 0.5)
+def closest_local(nodes: Integers, corners: Array, places: Array) -> Array:
+    """Local coordinates (s, d - 1) of the closest place of each facet to a place.
+
+    ``nodes`` (s, n) are those of the facets, ``corners`` (s, n, d) their places.
+    """
+    d = corners.shape[2]
+    triangle = (triangular(nodes) if d == 3 else np.zeros(len(nodes), bool))[:, None]
+    local = np.where(triangle, 1.0 / 3.0, 0.5) + np.zeros((len(places), d - 1))
     for _ in range(_STEPS):
-        values, slopes = shape_functions(d - 1, count, local)
+        values, slopes = functions_at(nodes, local)
         away = places - np.einsum("sn,snx->sx", values, corners)
         along = np.einsum("snd,snx->sdx", slopes, corners)
         metric = along @ np.swapaxes(along, 1, 2)
@@ -98,10 +102,9 @@ def closest_local(corners: Array, places: Array) -> Array:
     return local
 
 
-def _inside(local: Array, triangle: bool) -> Array:
-    """The closest local coordinates within the reference facet."""
-    if triangle:
-        beyond = 0.5 * np.maximum(local.sum(axis=1, keepdims=True) - 1.0, 0.0)
-        local = np.clip(local - beyond, 0.0, 1.0)
-        return np.asarray(local / np.maximum(local.sum(axis=1, keepdims=True), 1.0))
-    return np.clip(local, 0.0, 1.0)
+def _inside(local: Array, triangle: Any) -> Array:
+    """The closest local coordinates within the reference facet; ``triangle`` (s, 1) is a mask."""
+    beyond = 0.5 * np.maximum(local.sum(axis=1, keepdims=True) - 1.0, 0.0)
+    within = np.clip(local - beyond, 0.0, 1.0)
+    within = within / np.maximum(within.sum(axis=1, keepdims=True), 1.0)
+    return np.where(triangle, within, np.clip(local, 0.0, 1.0))

@@ -26,8 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
-from fecontact.fem.elements.cell_kinds import shape_functions
 from fecontact.fem.faces.facets import Facets
+from fecontact.fem.faces.surface import functions_at, triangular
 
 # Part of a facet by which a foot may lie beside it, so that it does not change to and fro.
 _STAYS = 0.05
@@ -143,27 +143,30 @@ class DeformedFace:
         """
         d, distance = places.shape[1], np.zeros(len(places))
         facet = np.zeros(len(places), np.int64) if before is None else before.copy()
-        local = np.full((len(places), d - 1), self._middle)
+        local = np.where(self._triangles(facet)[:, None], 1.0 / 3.0, 0.5) + np.zeros(
+            (len(places), d - 1))
         lost = np.ones(len(places), bool)
         if before is not None:
             local = self._perpendicular(places, displaced, facet, local)
-            lost = self._offset(local) > _STAYS
+            lost = self._offset(facet, local) > _STAYS
         if lost.any():
             facet[lost], near, distance[lost] = Facets(displaced, self.facets).closest(places[lost])
             local[lost] = self._perpendicular(places[lost], displaced, facet[lost], near)
         feet = self._at(places, displaced, facet, local)
-        valid = self._offset(local) <= _STAYS
+        valid = self._offset(facet, local) <= _STAYS
         return replace(feet, valid=valid, gaps=np.where(valid, feet.gaps, distance))
 
-    @property
-    def _middle(self) -> float:
-        return 1.0 / 3.0 if self.facets.shape[1] in (3, 6) else 0.5
+    def _triangles(self, facet: Integers) -> NDArray[np.bool_]:
+        """Mask (n,) of the facets that are triangles."""
+        if self.facets.shape[1] < 3 or not len(facet):
+            return np.zeros(len(facet), bool)
+        return triangular(self.facets[facet])
 
-    def _offset(self, local: Array) -> Array:
+    def _offset(self, facet: Integers, local: Array) -> Array:
         """Distance of local coordinates outside their facets, relative to the facets' size."""
         far = np.maximum(-local, local - 1.0).max(axis=1)
-        if local.shape[1] == 2 and self.facets.shape[1] in (3, 6):
-            far = np.maximum(far, local.sum(axis=1) - 1.0)
+        triangles = self._triangles(facet)
+        far[triangles] = np.maximum(far, local.sum(axis=1) - 1.0)[triangles]
         return np.asarray(np.nan_to_num(far, nan=np.inf))
 
     def _perpendicular(
@@ -184,14 +187,14 @@ class DeformedFace:
 
     def _at(self, places: Array, displaced: Array, facet: Integers, local: Array) -> Feet:
         nodes = self.facets[facet]
-        d, k = displaced.shape[1], nodes.shape[1]
+        d = displaced.shape[1]
         corners = displaced[nodes]
-        values, slopes = shape_functions(d - 1, k, local)
+        values, slopes = functions_at(nodes, local)
         second_derivatives = np.empty((*slopes.shape, d - 1))
         for axis, half in enumerate(0.5 * np.eye(d - 1)):
             # Exact: functions are at most quadratic in each coordinate.
-            second_derivatives[..., axis] = (shape_functions(d - 1, k, local + half)[1]
-                                - shape_functions(d - 1, k, local - half)[1])
+            second_derivatives[..., axis] = (functions_at(nodes, local + half)[1]
+                                             - functions_at(nodes, local - half)[1])
         along = np.einsum("nka,nkx->nax", slopes, corners)
         normals = (np.cross(along[:, 0], along[:, 1]) if d == 3
                    else np.stack([along[:, 0, 1], -along[:, 0, 0]], axis=1))

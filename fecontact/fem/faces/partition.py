@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fecontact.core.types import Array, Integers
+from fecontact.fem.elements.cell_kinds import blocks_of
 from fecontact.fem.faces.frames import frames_of
 from fecontact.fem.faces.surface import Surface
 
@@ -67,11 +68,13 @@ def grid_partition(surface: Surface, along: int, across: int) -> Integers | None
 
 def _closes(surface: Surface) -> bool:
     """Whether a connected face closes around an axis, by its numbers of corners, edges, facets."""
-    count = 3 if surface.facets.shape[1] in (3, 6) else 4
-    corners = surface.facets[:, :count]
-    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
-    edges = np.unique(np.sort(ends, axis=1), axis=0)
-    return len(np.unique(corners)) - len(edges) + len(corners) == 0
+    nodes, ends = [], []
+    for _, rows in blocks_of(surface.facets):
+        corners = rows[:, : 3 if rows.shape[1] in (3, 6) else 4]
+        nodes.append(corners.ravel())
+        ends.append(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2))
+    edges = np.unique(np.sort(np.concatenate(ends), axis=1), axis=0)
+    return len(np.unique(np.concatenate(nodes))) - len(edges) + len(surface.facets) == 0
 
 
 def _is_grid(

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.elements.cell_kinds import shape_functions
 from fecontact.fem.faces.contact_patches import (
     Count,
     check_facets_down,
@@ -25,7 +24,7 @@ from fecontact.fem.faces.contact_patches import (
 )
 from fecontact.fem.faces.facets import closest_local
 from fecontact.fem.faces.frames import tangents_of
-from fecontact.fem.faces.surface import Patches, Surface
+from fecontact.fem.faces.surface import Patches, Surface, functions_at
 from fecontact.fem.pairing_report import PairingReport, closed_gaps
 from fecontact.fem.points import node_matrix
 
@@ -78,10 +77,9 @@ def closest_places(other: Surface, places: Array, looks: Array) -> Feet:
     from scipy.spatial import cKDTree
 
     count = len(places)
-    nodes = other.facets.shape[1]
     found = Feet(np.zeros(count, bool), np.zeros(count, bool), np.zeros(count, np.int64),
-                 np.zeros((count, nodes)), np.zeros((count, 3)), np.zeros((count, 3)),
-                 np.full(count, np.inf))
+                 np.zeros((count, other.facets.shape[1])), np.zeros((count, 3)),
+                 np.zeros((count, 3)), np.full(count, np.inf))
     near = min(_NEAREST, len(other.facets))
     order = cKDTree(other.centres).query(places, near)[1].reshape(count, near)
     size = np.sqrt(other.areas)
@@ -90,8 +88,9 @@ def closest_places(other: Surface, places: Array, looks: Array) -> Feet:
         if not len(left):
             break
         facet = order[left, rank]
-        local = closest_local(other.places[other.facets[facet]], places[left])
-        weights, foot, normal = _at(other.places[other.facets[facet]], local)
+        nodes = other.facets[facet]
+        corners = other.places[nodes]
+        weights, foot, normal = _at(nodes, corners, closest_local(nodes, corners, places[left]))
         away = places[left] - foot
         gap = (away * normal).sum(axis=1)
         beside = np.linalg.norm(away - gap[:, None] * normal, axis=1)
@@ -107,9 +106,9 @@ def closest_places(other: Surface, places: Array, looks: Array) -> Feet:
     return found
 
 
-def _at(corners: Array, local: Array) -> tuple[Array, Array, Array]:
+def _at(nodes: Integers, corners: Array, local: Array) -> tuple[Array, Array, Array]:
     """Shape functions (s, n), places and unit normals (s, 3) on facets (s, n, 3)."""
-    values, slopes = shape_functions(2, corners.shape[1], local)
+    values, slopes = functions_at(nodes, local)
     along = np.einsum("snd,snx->dsx", slopes, corners)
     normals = np.cross(along[0], along[1])
     return (values, np.einsum("sn,snx->sx", values, corners),

@@ -1,5 +1,6 @@
 """The surface of a solid as facets of its elements: areas, normals, mean motions of patches."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -8,11 +9,63 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
-from fecontact.fem.elements.cell_kinds import shape_functions
+from fecontact.fem.elements.cell_kinds import blocks_of, padded, shape_functions, widths
 
 # Points a direction: exact for moments of quadratic displacements over plane facets, and to about
 # 1e-8 over facets that span a tenth of a radius.
 _POINTS = 4
+
+
+# Local coordinates (g, 2) and weights (g,) of facets with so many nodes, of all equally many.
+Rule = Callable[[int], tuple[Array, Array]]
+
+
+def functions_by(rule: Rule, facets: Integers) -> tuple[Array, Array, Array]:
+    """Shape functions (k, g, n), their slopes (k, g, n, 2) and weights (k, g) of a rule.
+
+    The functions of nodes that fill a row are zero.
+    """
+    k, n = facets.shape
+    found: list[Array] = []
+    for which, rows in blocks_of(facets):
+        count = rows.shape[1]
+        local, weights = rule(count)
+        values, slopes = _filled(n, *shape_functions(2, count, local))
+        parts = [np.broadcast_to(part, (len(rows), *part.shape))
+                 for part in (values, slopes, weights)]
+        if len(rows) == k:
+            return parts[0], parts[1], parts[2]
+        found = found or [np.empty((k, *part.shape[1:])) for part in parts]
+        for whole, part in zip(found, parts, strict=True):
+            whole[which] = part
+    return found[0], found[1], found[2]
+
+
+def functions_at(facets: Integers, local: Array) -> tuple[Array, Array]:
+    """Shape functions (s, n) and slopes (s, n, d - 1) of facets (s, n) at places (s, d - 1)."""
+    n, axes = facets.shape[1], local.shape[1]
+    values, slopes = np.empty((len(facets), n)), np.empty((len(facets), n, axes))
+    if axes == 1:
+        return shape_functions(1, n, local)
+    for which, rows in blocks_of(facets) if len(facets) else []:
+        values[which], slopes[which] = _filled(n, *shape_functions(
+            2, rows.shape[1], local[which]))
+    return values, slopes
+
+
+def _filled(n: int, values: Array, slopes: Array) -> tuple[Array, Array]:
+    """Functions (..., n) and slopes (..., n, 2) with zeros for the nodes that fill a row."""
+    more = n - values.shape[-1]
+    if not more:
+        return values, slopes
+    zeros = np.zeros((*values.shape[:-1], more))
+    return (np.concatenate([values, zeros], axis=-1),
+            np.concatenate([slopes, np.stack([zeros, zeros], axis=-1)], axis=-2))
+
+
+def triangular(facets: Integers) -> NDArray[np.bool_]:
+    """Mask (k,) of the triangles among facets (k, n) of solids."""
+    return np.isin(widths(facets), (3, 6))
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +79,7 @@ class Surface:
     facets : (k, n) integer array
         Nodes of each facet: 3 or 4 corners, counter-clockwise seen from outside the body, of
         quadratic elements then the middles between successive corners and the centre of four-sided
-        facets.
+        facets. Triangles beside four-sided ones are filled by their last node.
     covered : (k, g) bool array, optional
         Quadrature points that count, as of a face of which a part has no partner; all by default.
     """
@@ -37,25 +90,23 @@ class Surface:
 
     @cached_property
     def sampled(self) -> tuple[Array, Array, Array, Array]:
-        """Shape functions (g, n), and places (k, g, 3), outward unit normals, weights (k, g) [m^2].
+        """Shape functions (k, g, n), places (k, g, 3), outward unit normals, weights (k, g) [m^2].
 
         The weights are those of quadrature over the facets as they are curved.
         """
-        local, weights = quadrature(self.facets.shape[1])
-        values, places, normals, areas = self.at(local)
-        weights = areas * weights
+        values, places, normals, weights = self.at(quadrature)
         return values, places, normals, (weights if self.covered is None
                                          else weights * self.covered)
 
-    def at(self, local: Array) -> tuple[Array, Array, Array, Array]:
-        """Shape functions, places, unit normals and Jacobians at local coordinates (g, 2)."""
-        values, slopes = shape_functions(2, self.facets.shape[1], local)
+    def at(self, rule: Rule) -> tuple[Array, Array, Array, Array]:
+        """Shape functions, places, unit normals and weights at the points of a rule."""
+        values, slopes, shares = functions_by(rule, self.facets)
         corners = self.places[self.facets]
-        places = np.einsum("gn,knx->kgx", values, corners)
-        along = np.einsum("gnd,knx->dkgx", slopes, corners)
+        places = np.einsum("kgn,knx->kgx", values, corners)
+        along = np.einsum("kgnd,knx->dkgx", slopes, corners)
         normals = np.cross(along[0], along[1])
         areas = np.linalg.norm(normals, axis=2)
-        return values, places, normals / areas[..., None], areas
+        return values, places, normals / areas[..., None], areas * shares
 
     @cached_property
     def areas(self) -> Array:
@@ -77,13 +128,13 @@ class Surface:
     @cached_property
     def shape_integrals(self) -> Array:
         """Integrals (k, n) of the shape functions over the facets [m^2]."""
-        return self.sampled[3] @ self.sampled[0]
+        return np.einsum("kg,kgn->kn", self.sampled[3], self.sampled[0])
 
     def pressure_forces(self) -> Array:
         """Nodal forces (3 N,) of a pressure of 1 Pa, along the inward normal [m^2]."""
         values, _, normals, weights = self.sampled
         forces = np.zeros_like(self.places)
-        np.add.at(forces, self.facets, -np.einsum("kg,gn,kgx->knx", weights, values, normals))
+        np.add.at(forces, self.facets, -np.einsum("kg,kgn,kgx->knx", weights, values, normals))
         return forces.ravel()
 
     def only(self, which: Any) -> "Surface":
@@ -149,7 +200,7 @@ class Patches:
         surface, owner = self.surface, self.owner
         values, places, _, weights = surface.sampled
         arm = places - self.centres[owner, None]
-        moments = np.einsum("kg,gn,kgx->knx", weights, values, arm)
+        moments = np.einsum("kg,kgn,kgx->knx", weights, values, arm)
         spread = self.second_moments
         trace = np.trace(spread, axis1=1, axis2=2)[:, None, None]
         inverse = np.linalg.inv(trace * np.eye(3) - spread)
@@ -165,13 +216,40 @@ class Patches:
         return matrix
 
 
-def linear_facets(facets: Integers) -> Integers:
-    """First-order facets (k, 3) or (k, 4) between all nodes of facets, with their orientation.
+def linear_facets(facets: Integers) -> tuple[Integers, Integers]:
+    """First-order facets (p, 3) or (p, 4) between all nodes of facets, and the facet of each part.
 
-    The first part of each comes first, then the second part of each, and so on.
+    Parts have the orientation of their facet. The first part of each comes first, then the second
+    part of each, and so on. Four-sided ones beside triangles are cut into triangles.
     """
-    parts = _PARTS[facets.shape[1]]
-    return np.concatenate([facets[:, list(part)] for part in parts])
+    found, owner = [], []
+    for which, rows in blocks_of(facets):
+        for part in _PARTS[rows.shape[1]]:
+            found.append(rows[:, list(part)])
+            owner.append(np.arange(len(facets))[which])
+    parts, of = drawn_facets(padded(found))
+    of = np.concatenate(owner)[of]
+    order = np.argsort(of, kind="stable")
+    rank = np.empty(len(of), np.int64)
+    rank[order] = np.arange(len(of)) - np.searchsorted(of[order], of[order])
+    order = np.lexsort((of, rank))
+    return parts[order], of[order]
+
+
+def drawn_facets(facets: Integers) -> tuple[Integers, Integers]:
+    """First-order facets without filled rows, and the facet of each part.
+
+    Where triangles and quadrilaterals are mixed, all are triangles.
+    """
+    whole = np.arange(len(facets))
+    if facets.shape[1] < 4:
+        return facets, whole
+    triangles = triangular(facets)
+    if not triangles.any():
+        return facets, whole
+    four = np.flatnonzero(~triangles)
+    return (np.concatenate([facets[:, :3], facets[four][:, [0, 2, 3]]]),
+            np.concatenate([whole, four]))
 
 
 _PARTS = {

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.errors import MeshError
 from fecontact.core.types import Array, Integers
+from fecontact.fem.elements.cell_kinds import blocks_of
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.raw import NODES, PLANE, RawMesh
 
@@ -213,11 +214,14 @@ def _raw_mesh(
 
 
 # Gmsh's types of elements by number of corners and dimension, of first and second order.
-_CODES = {(2, 1): (1, 8), (3, 2): (2, 9), (4, 2): (3, 16), (4, 3): (4, 11), (8, 3): (5, 17)}
+_CODES = {(2, 1): (1, 8), (3, 2): (2, 9), (4, 2): (3, 16), (4, 3): (4, 11), (5, 3): (7, 19),
+          (6, 3): (6, 18), (8, 3): (5, 17)}
 # Edges of elements in the order of Gmsh's second-order nodes.
 _EDGES = {
     (2, 1): ((0, 1),), (3, 2): ((0, 1), (1, 2), (2, 0)), (4, 2): ((0, 1), (1, 2), (2, 3), (3, 0)),
     (4, 3): ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)),
+    (5, 3): ((0, 1), (0, 3), (0, 4), (1, 2), (1, 4), (2, 3), (2, 4), (3, 4)),
+    (6, 3): ((0, 1), (0, 2), (0, 3), (1, 2), (1, 4), (2, 5), (3, 4), (3, 5), (4, 5)),
     (8, 3): ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6),
              (6, 7)),
 }
@@ -282,10 +286,11 @@ def write_msh(mesh: Mesh, stream: TextIO) -> None:
 
     blocks: list[tuple[int, int, int, list[Any]]] = [
         (0, tag, 15, [(node,)]) for tag, node in enumerate(vertices, start=1)]
-    blocks += [(d - 1, tag, *_elements(mesh, np.array(rows), d - 1))
-               for tag, rows in enumerate(groups.values(), start=1)]
-    blocks += [(d, entity + 1, *_elements(mesh, mesh.cells[block == entity], d))
-               for entity in range(len(tags))]
+    blocks += [(d - 1, tag, *_elements(mesh, some, d - 1))
+               for tag, rows in enumerate(groups.values(), start=1)
+               for _, some in blocks_of(np.array(rows))]
+    blocks += [(d, entity + 1, *_elements(mesh, some, d)) for entity in range(len(tags))
+               for _, some in blocks_of(mesh.cells[block == entity])]
     total = sum(len(rows) for *_, rows in blocks)
     stream.write(f"$EndNodes\n$Elements\n{len(blocks)} {total} 1 {total}\n")
     tag = 0

@@ -141,7 +141,7 @@ def _node_at(mesh: Mesh, name: str, place: Coordinates) -> Integers:
 def _inside(mesh: Mesh, place: Array) -> bool:
     """Whether a place lies in a straight cell of a solid."""
     try:
-        interpolation(mesh.nodes, mesh.cells[:, list(mesh.kind.order)], place, "")
+        interpolation(mesh.nodes, mesh.elements, place, "")
     except InputError:
         return False
     return True

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from fecontact.core.errors import choices
-from fecontact.fem.mesh_files.cut_cells import SHAPES
+from fecontact.fem.elements.cell_kinds import CELL_KINDS
 from fecontact.fem.mesh_files.deck_contents import COMPONENTS, DeckContents
 from fecontact.fem.mesh_files.distributed_loads import DistributedLoads
 from fecontact.fem.mesh_files.nastran_cards import cards, grid_rows, point_rows, real, whole
@@ -224,7 +224,7 @@ def _side(
     Of a tetrahedron the second point is the corner opposite to the side; of others it lies across
     the side from the first one, and triangles of wedges have none.
     """
-    sides = [tuple(corners[k] for k in facet) for facet in SHAPES[len(corners)].facets]
+    sides = [tuple(corners[k] for k in facet) for facet in CELL_KINDS[3, len(corners)].facets]
     if len(corners) == 4:
         held = [side for side in sides if first in side and second not in side]
     elif second is None:

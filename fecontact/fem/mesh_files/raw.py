@@ -9,17 +9,15 @@ from fecontact.core.errors import MeshError, choices, nearest
 from fecontact.core.types import Array, Integers
 from fecontact.fem.attachments import Attachment
 from fecontact.fem.constraints import Constraint
-from fecontact.fem.elements.cell_kinds import CELL_KINDS, CellKind, numbered_rows
+from fecontact.fem.elements.cell_kinds import (
+    CELL_KINDS,
+    CellKind,
+    padded,
+    row_numbers,
+    unordered,
+)
 from fecontact.fem.material import AnyMaterial
 from fecontact.fem.mesh import Bricks, Mesh
-from fecontact.fem.mesh_files.cut_cells import (
-    PYRAMID,
-    SHAPES,
-    WEDGE,
-    cut_faces,
-    cut_into_tetrahedra,
-    diagonals,
-)
 from fecontact.fem.mesh_files.raw_constraints import constraints_of_mesh
 
 PLANE = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
@@ -177,9 +175,9 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     ------
     MeshError
         If the elements are neither a plane mesh of triangles or of quadrilaterals, nor a solid of
-        tetrahedra or of hexahedra, or of both with wedges or pyramids.
+        tetrahedra, pyramids, wedges and hexahedra.
     """
-    blocks = _blocks_of_one_kind(raw.cells)
+    blocks = _cells_of_body(raw.cells)
     of_corners = [block[:, :CORNERS[kind]] for kind, block in blocks]
     corners = np.concatenate([block.ravel() for block in of_corners])
     points = np.asarray(raw.points, float) * scale
@@ -205,8 +203,7 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
         raise MeshError("The file holds solid elements, but its nodes have two coordinates; save "
                         "all three.")
     dimension = points.shape[1]
-    kinds = [SHAPES[block.shape[1]] if dimension == 3 else CELL_KINDS[2, block.shape[1]]
-             for block in of_corners]
+    kinds = [CELL_KINDS[dimension, block.shape[1]] for block in of_corners]
     second_order = [(kind, block) for kind, (_, block) in zip(kinds, blocks, strict=True)
                     if block.shape[1] > kind.corners]
     orders = [kind.corners + _edge_order(points, cells, kind) for kind, cells in second_order]
@@ -220,18 +217,13 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     _require_one_body(raw, number)
     curves = [_curved_edges(points, cells, kind, order, size)
               for (kind, cells), order in zip(second_order, orders, strict=True)]
-    if any(kind in (WEDGE, PYRAMID) for kind in kinds):
-        of_corners = [cut_into_tetrahedra(points, number, block, kind)
-                      for block, kind in zip(of_corners, kinds, strict=True)]
-        curves += [_curved(points, *diagonals(points, number, cells, kind, order), size)
-                   for (kind, cells), order in zip(second_order, orders, strict=True)]
-    cells = number[np.concatenate(of_corners)]
-    _, distinct = np.unique(np.sort(cells, axis=1), axis=0, return_index=True)
+    cells = number[padded(of_corners)]
+    _, distinct = np.unique(unordered(cells), axis=0, return_index=True)
     ends = number[np.concatenate([np.empty((0, 2), np.int64), *(ends for ends, _ in curves)])]
     middles = np.concatenate([np.empty((0, dimension)), *(places for _, places in curves)])
     _, once = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)
     kept = np.sort(distinct)
-    regions = _cell_groups(raw, points, number, cells[kept])
+    regions = _cell_groups(raw, dimension, number, cells[kept])
     mesh = Mesh(points[used], cells[kept], {}, {}, ends[once], middles[once],
                 cell_groups=regions, bricks=raw.bricks,
                 node_numbers=None if raw.numbers is None else raw.numbers[used])
@@ -254,28 +246,24 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
 
 
 def _cell_groups(
-    raw: RawMesh, points: Array, number: Integers, cells: Integers
+    raw: RawMesh, dimension: int, number: Integers, cells: Integers
 ) -> dict[str, Integers]:
     """Numbers of the cells (M, n) of each group of elements of the file that holds some."""
-    rows, names = [np.sort(cells, axis=1)], []
+    rows, names = [unordered(cells)], []
     for name, blocks in {**raw.cell_sets, **raw.parts}.items():
         found = [np.empty((0, cells.shape[1]), np.int64)]
         for kind, block in blocks:
             corners = block[:, :CORNERS.get(kind, 0)]
-            if (kind in SOLID) != (points.shape[1] == 3) or not corners.size:
+            if (kind in SOLID) != (dimension == 3) or not (
+                    corners.size > 0 and corners.shape[1] <= cells.shape[1]):
                 continue
             inside = corners[(number[corners] >= 0).all(axis=1)]
-            if cells.shape[1] == 4 and kind in SOLID and len(inside):
-                inside = cut_into_tetrahedra(points, number, inside, SHAPES[CORNERS[kind]])
-            if inside.shape[1] == cells.shape[1]:
-                found.append(np.sort(number[inside], axis=1))
+            found.append(unordered(padded([number[inside]], cells.shape[1])))
         rows.append(np.concatenate(found))
         names.append(name)
-    label = numbered_rows(np.concatenate(rows))[1]
-    place = np.full(int(label.max()) + 1, -1)
-    place[label[:len(cells)]] = np.arange(len(cells))
+    place = row_numbers(rows[0], np.concatenate(rows))
     ends = np.cumsum([len(one) for one in rows])
-    groups = {name: np.unique(place[label[start:end]])
+    groups = {name: np.unique(place[start:end])
               for name, start, end in zip(names, ends, ends[1:], strict=False)}
     groups = {name: held[held >= 0] for name, held in groups.items()}
     return {name: held for name, held in groups.items() if len(held)}
@@ -313,20 +301,17 @@ def _groups(raw: RawMesh, mesh: Mesh, number: Integers) -> Groups:
         for block in blocks:
             facets = number[block]
             facets = facets[(facets >= 0).all(axis=1)]
-            if mesh.dimension == 3 and mesh.kind.simplex and facets.shape[1] == 4:
-                facets = cut_faces(facets)
             facets = facets[(np.diff(np.sort(facets, axis=1), axis=1) > 0).all(axis=1)]
             rows += [row.get(frozenset(facet)) for facet in facets.tolist()]
-            met.append(facets.ravel())
+            met.append(facets)
         outer = sorted({k for k in rows if k is not None})
         if None not in rows and rows:
             boundaries[name] = mesh.outline[outer]
         elif rows:
-            points.setdefault(name, np.unique(np.concatenate(met)))
+            points.setdefault(name, np.unique(np.concatenate([one.ravel() for one in met])))
             width = mesh.outline.shape[1]
             inner[name] = np.concatenate([np.empty((0, width), np.int64), *(
-                one.reshape(-1, width) for one, block in zip(met, sides[name], strict=True)
-                if block.shape[1] == width or mesh.kind.simplex)])
+                padded([one], width) for one in met if one.shape[1] <= width)])
     if mesh.dimension == 3:
         for name, group in raw.edges.items():
             nodes = np.unique(number[group[:, :2]])
@@ -348,11 +333,8 @@ def _faces(raw: RawMesh) -> dict[str, list[Integers]]:
     return found
 
 
-def _blocks_of_one_kind(cells: list[tuple[str, Integers]]) -> list[tuple[str, Integers]]:
-    """The solid elements of a file, or the plane ones if there are no others.
-
-    Of one kind, unless there are wedges or pyramids, with which all are cut into tetrahedra.
-    """
+def _cells_of_body(cells: list[tuple[str, Integers]]) -> list[tuple[str, Integers]]:
+    """The solid elements of a file, or the plane ones, of one kind, if there are no others."""
     present = [(kind, block) for kind, block in cells if len(block)]
     solid = [(kind, block) for kind, block in present if kind in SOLID]
     other = sorted({kind for kind, _ in present if kind not in CORNERS})
@@ -365,19 +347,14 @@ def _blocks_of_one_kind(cells: list[tuple[str, Integers]]) -> list[tuple[str, In
     if not present:
         raise MeshError("The mesh holds no triangles or quadrilaterals, and no tetrahedra or "
                         "hexahedra; save these elements too.")
-    chosen = solid or present
-    if any(CORNERS[kind] in (5, 6) for kind, _ in solid):
-        return chosen
-    names = {3: "triangles", 4: "tetrahedra" if solid else "quadrilaterals", 8: "hexahedra"}
-    counts: dict[int, int] = {}
-    for kind, block in chosen:
-        counts[CORNERS[kind]] = counts.get(CORNERS[kind], 0) + len(block)
-    if len(counts) > 1:
-        (a, first), (b, second) = sorted(counts.items())
-        remedy = "volumes" if solid else "surfaces"
-        raise MeshError(f"The mesh mixes {first} {names[a]} and {second} {names[b]}; mesh with one "
-                        f"kind only (in Gmsh, recombine all {remedy} or none).")
-    return chosen
+    if solid:
+        return solid
+    three, four = (sum(len(block) for kind, block in present if CORNERS[kind] == corners)
+                   for corners in (3, 4))
+    if three and four:
+        raise MeshError(f"The mesh mixes {three} triangles and {four} quadrilaterals; mesh with "
+                        f"one kind only (in Gmsh, recombine all surfaces or none).")
+    return present
 
 
 def _require_one_body(raw: RawMesh, number: Integers) -> None:
@@ -408,11 +385,10 @@ def _temperature(
     at_nodes = values[used]
     found = np.append(at_nodes, at_nodes[mesh.edges[0]].mean(axis=1))
     for (kind, cells), order in zip(second_order, orders, strict=True):
-        if kind in CELL_KINDS.values():
-            pairs = number[cells[:, np.array(kind.edges)]].reshape(-1, 2)
-            pairs, once = np.unique(np.sort(pairs, axis=1), axis=0, return_index=True)
-            edges = mesh.edge_numbers(pairs, "temperature")
-            found[len(at_nodes) + edges] = values[cells[:, order].ravel()[once]]
+        pairs = number[cells[:, np.array(kind.edges)]].reshape(-1, 2)
+        pairs, once = np.unique(np.sort(pairs, axis=1), axis=0, return_index=True)
+        edges = mesh.edge_numbers(pairs, "temperature")
+        found[len(at_nodes) + edges] = values[cells[:, order].ravel()[once]]
     return found
 
 

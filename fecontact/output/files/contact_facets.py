@@ -66,6 +66,9 @@ class ContactFacets:
         rows = np.repeat(np.arange(np.count_nonzero(beside)), cells.shape[1])
         members = sp.csr_array((np.ones(len(rows)), (rows, cells[beside].ravel())),
                                shape=(np.count_nonzero(beside), count))
+        # Rows of cells may repeat their last corner.
+        members.sum_duplicates()
+        members.data[:] = 1.0
         shared = sp.coo_array(members @ facets)
         whole = shared.data == corners
         found[np.flatnonzero(beside)[shared.row[whole]]] = shared.col[whole]

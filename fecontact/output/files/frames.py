@@ -10,6 +10,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.magnitude import magnitude
 from fecontact.core.types import Array
+from fecontact.fem.elements.cell_kinds import widths
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.ground.ground import Ground
 from fecontact.output.files.contact_facets import contact_facets
@@ -129,11 +130,12 @@ def cell_stress(field: ModeShapes, q: Array) -> Array:
 
     They are the means of their corners.
     """
-    count, corners = field.cells.shape
+    count, size = len(field.cells), widths(field.cells)[:, None, None]
     stress, factors = field.stress_terms, field.stress_coordinates(q)
     _, components, terms = stress.shape
     # Corner by corner: all at once would hold the stress of each cell several times.
-    mean = sum(stress[field.cells[:, corner]] for corner in range(corners)) / corners
+    mean = sum(stress[nodes] * (corner < size)
+               for corner, nodes in enumerate(field.cells.T)) / size
     unit = magnitude(factors)
     found = (factors / unit) @ mean.reshape(components * count, terms).T
     with np.errstate(over="ignore"):

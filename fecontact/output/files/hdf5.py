@@ -25,6 +25,7 @@ from fecontact.core.files.stored import (
 )
 from fecontact.core.progress import held_back_interrupt
 from fecontact.core.types import Array
+from fecontact.fem.elements.cell_kinds import CELL_KINDS, widths
 from fecontact.reduction.large_deflections.forces import LargeDeflectionForces
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import (
@@ -292,8 +293,7 @@ def _read_mode_shapes(group: Any, modes: int, T: Array) -> ModeShapes:
     nodes = bounded(group, "nodes", (None, d))
     N = len(nodes)
     cells = indices(group, "cells", (None, None), N)
-    if cells.shape[1] not in (d + 1, 2**d):
-        raise DamagedError(f"cells have {cells.shape[1]} corners, not {d + 1} or {2**d}")
+    _require_widths("cells", cells, "corners", [corners for of, corners in CELL_KINDS if of == d])
     stored = member(group, "restriction")
     shape = tuple(int(length) for length in np.atleast_1d(stored.attrs["shape"]))
     if shape != (T.shape[0] * T.shape[1], d * N):
@@ -328,11 +328,18 @@ def _elements(group: Any, nodes: int, dimension: int) -> Any:
     if "elements" not in group:
         return None
     elements = indices(group, "elements", (None, None), nodes)
-    known = (3, 4, 6, 9) if dimension == 2 else (4, 8, 10, 27)
-    if elements.shape[1] not in known:
-        raise DamagedError(f"elements have {elements.shape[1]} nodes, not "
-                           f"{', '.join(map(str, known[:-1]))} or {known[-1]}")
+    _require_widths("elements", elements, "nodes", sorted(
+        number for (of, corners), kind in CELL_KINDS.items() if of == dimension
+        for number in (corners, len(kind.places))))
     return elements
+
+
+def _require_widths(what: str, rows: Any, parts: str, known: list[int]) -> None:
+    """Refuse rows that have another number of nodes, but for repeats of the last, than known."""
+    size = widths(rows)
+    if not np.isin(size, known).all():
+        raise DamagedError(f"{what} have {size.max()} {parts}, not "
+                           f"{', '.join(map(str, known[:-1]))} or {known[-1]}")
 
 
 def _read_rotation(group: Any, modes: int) -> ModalRotation:

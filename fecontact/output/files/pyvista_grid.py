@@ -9,7 +9,7 @@ from fecontact.core.errors import InputError, MissingLibraryError
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.fields_of_frames import FrameFields
 from fecontact.output.files.frames import require_drawable, require_field
-from fecontact.output.files.vtkhdf import CELL_TYPES
+from fecontact.output.files.vtkhdf import cells_of_vtk
 
 if TYPE_CHECKING:
     import pyvista
@@ -63,11 +63,12 @@ def to_pyvista(trajectory: Trajectory, time: float | None = None) -> "pyvista.Un
     at = int(np.argmin(np.abs(outputs - time)))
     which = slice(at, at + 1)
     require_drawable(trajectory, which)
-    d, (count, corners) = field.nodes.shape[1], field.cells.shape
+    d = field.nodes.shape[1]
     points = np.zeros((len(field.nodes), 3))
     points[:, :d] = field.nodes
-    cells = np.hstack([np.full((count, 1), corners), field.cells])
-    grid = pyvista.UnstructuredGrid(cells.ravel(), np.full(count, CELL_TYPES[d, corners]), points)
+    connectivity, offsets, types = cells_of_vtk(field.cells, d)
+    cells = np.insert(connectivity, offsets[:-1], np.diff(offsets))
+    grid = pyvista.UnstructuredGrid(cells, types, points)
     fields = FrameFields(trajectory)
     values = fields.at(which)
     for kind in fields.kinds:

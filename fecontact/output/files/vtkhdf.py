@@ -6,13 +6,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
+from fecontact.fem.elements.cell_kinds import widths
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.fields_of_frames import FrameFields
 from fecontact.output.files.frames import blocks, body_numbers, require_field
 from fecontact.output.files.hdf5 import COMPRESSED, store_compressed
 
-# VTK_TRIANGLE, VTK_QUAD, VTK_TETRA, VTK_HEXAHEDRON by dimension and corners.
-CELL_TYPES = {(2, 3): 5, (2, 4): 9, (3, 4): 10, (3, 8): 12}
+# VTK_TRIANGLE, VTK_QUAD, VTK_TETRA, VTK_PYRAMID, VTK_WEDGE, VTK_HEXAHEDRON by dimension, corners.
+_CELL_TYPES = {(2, 3): 5, (2, 4): 9, (3, 4): 10, (3, 5): 14, (3, 6): 13, (3, 8): 12}
+
+
+def cells_of_vtk(cells: Integers, dimension: int) -> tuple[Integers, Integers, Any]:
+    """Nodes of all cells in turn, the first (M + 1,) of each and the last one's end, VTK's types.
+
+    Rows of cells may be filled by their last corner.
+    """
+    size = widths(cells)
+    types = np.zeros(9, np.uint8)
+    for (of, corners), code in _CELL_TYPES.items():
+        types[corners] = code if of == dimension else types[corners]
+    nodes = cells[np.arange(cells.shape[1]) < size[:, None]].astype(np.int64)
+    return nodes, np.append(0, np.cumsum(size)), types[size]
 
 _CHUNK = 2**14  # fewest values of a compressed chunk
 
@@ -84,18 +98,17 @@ def write_vtkhdf(file: Any, trajectory: Trajectory, indices: NDArray[np.intp]) -
 
 
 def _write_grid(group: Any, nodes: Array, cells: Integers) -> None:
-    count, corners = cells.shape
+    connectivity, offsets, types = cells_of_vtk(cells, nodes.shape[1])
     points = np.zeros((len(nodes), 3))
     points[:, : nodes.shape[1]] = nodes
     store_compressed(group, "Points", points)
     group["Points"].attrs["unit"] = "m"
-    store_compressed(group, "Connectivity", cells.astype(np.int64).reshape(-1))
-    store_compressed(group, "Offsets", np.arange(count + 1, dtype=np.int64) * corners)
-    store_compressed(group, "Types", np.full(count, CELL_TYPES[nodes.shape[1], corners],
-                                             dtype=np.uint8))
+    store_compressed(group, "Connectivity", connectivity)
+    store_compressed(group, "Offsets", offsets)
+    store_compressed(group, "Types", types)
     group["NumberOfPoints"] = np.array([len(nodes)], dtype=np.int64)
-    group["NumberOfCells"] = np.array([count], dtype=np.int64)
-    group["NumberOfConnectivityIds"] = np.array([cells.size], dtype=np.int64)
+    group["NumberOfCells"] = np.array([len(cells)], dtype=np.int64)
+    group["NumberOfConnectivityIds"] = np.array([connectivity.size], dtype=np.int64)
 
 
 def _write_steps(group: Any, times: Array, fields: FrameFields) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
-from fecontact.output.files.vtkhdf import CELL_TYPES
+from fecontact.output.files.vtkhdf import cells_of_vtk
 
 _BLOCK = 2**15  # bytes that are compressed together
 _TYPES = {"f4": "Float32", "f8": "Float64", "i1": "Int8", "u1": "UInt8", "i4": "Int32",
@@ -34,7 +34,7 @@ def write_vtu(
     """Write fields on first-order cells as a compressed VTU file, with the time it shows [s]."""
     points = np.zeros((len(nodes), 3))
     points[:, : nodes.shape[1]] = nodes
-    count, corners = cells.shape
+    connectivity, offsets, types = cells_of_vtk(cells, nodes.shape[1])
     data: dict[str, list[str]] = {"Point": [], "Cell": []}
     for one in fields:
         data[one.of].append(_array(one.name, one.values, one.components))
@@ -45,11 +45,10 @@ def write_vtu(
         "<UnstructuredGrid>",
         *([] if time is None else ["<FieldData>", _array("TimeValue", np.array([time]), (), True),
                                    "</FieldData>"]),
-        f'<Piece NumberOfPoints="{len(nodes)}" NumberOfCells="{count}">',
+        f'<Piece NumberOfPoints="{len(nodes)}" NumberOfCells="{len(cells)}">',
         "<Points>", _array("Points", points, ("x", "y", "z")), "</Points>",
-        "<Cells>", _array("connectivity", cells.astype(np.int64).ravel()),
-        _array("offsets", np.arange(1, count + 1, dtype=np.int64) * corners),
-        _array("types", np.full(count, CELL_TYPES[nodes.shape[1], corners], np.uint8)), "</Cells>",
+        "<Cells>", _array("connectivity", connectivity), _array("offsets", offsets[1:]),
+        _array("types", types), "</Cells>",
         "<PointData>", *data["Point"], "</PointData>", "<CellData>", *data["Cell"], "</CellData>",
         "</Piece>", "</UnstructuredGrid>", "</VTKFile>", ""]
     part.write_text("\n".join(lines), encoding="ascii", newline="\n")

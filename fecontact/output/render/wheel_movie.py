@@ -8,7 +8,7 @@ from fecontact.bifurcation.harmonic.wheel_orbits import WheelMotion
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ComplexArray, Integers
-from fecontact.fem.fields import body_elements, linear_cells, of_one_kind
+from fecontact.fem.fields import linear_cells, of_one_kind
 from fecontact.output.render.mode_movie import ModeMotion, write_motion
 from fecontact.output.render.movie import Progress
 from fecontact.reduction.mode_shapes import ModeShapes
@@ -81,7 +81,7 @@ def _of_response(motion: WheelMotion) -> tuple[ModeMotion, str]:
     nodes, cells, outlines, starts = [], [], [], []
     shapes: dict[int, list[ComplexArray]] = {h: [] for h in motion.amplitudes if h}
     for name, body in motion.wheel.bodies.items():
-        own = linear_cells(body.nodes, body_elements(body))
+        own = linear_cells(body.nodes, body.elements)
         edges = first_order(body, body.mesh.outline)
         for s in range(symmetry.sectors):
             nodes.append(symmetry.turned(body.nodes, s))

@@ -15,6 +15,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located
 from fecontact.core.types import Array
+from fecontact.fem.elements.cell_kinds import padded
 from fecontact.fem.faces.frames import frames_of
 from fecontact.fem.fields import of_one_kind
 from fecontact.fem.pairing import Pairing, TwoPassPairing
@@ -279,7 +280,7 @@ class _Places:
                 np.zeros(len(one.nodes)) if one.temperature is None else one.temperature
                 for _, one in given])
         elements = [one.cells if one.elements is None else one.elements for _, one in given]
-        alike = len({array.shape[1] for array in elements}) == 1
+        width = max(array.shape[1] for array in elements)
         cells = of_one_kind([one.cells for _, one in given], d)
         outlines = of_one_kind([one.outline for _, one in given], d - 1)
         first = [part.nodes[0] for part, _ in given]
@@ -292,7 +293,7 @@ class _Places:
             nodes=np.concatenate([one.nodes for _, one in given]), cells=together(cells),
             outline=together(outlines), shapes=moved, stress=stress,
             restriction=sp.csr_array(sp.vstack(list(restriction))),
-            elements=together(elements) if alike else None,
+            elements=together([padded([array], width) for array in elements]),
             nonlinear_stress=self._joined_stress(bent) if bent else None,
             temperature=temperature)
 

@@ -29,7 +29,7 @@ from fecontact.core.units import Summarised, listed, span
 from fecontact.fem.body_forces import boundary_forces
 from fecontact.fem.cyclic_symmetry import NEXT, CyclicSymmetry, sector_nodes
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.fields import BodyFields, body_elements, stress_of
+from fecontact.fem.fields import BodyFields, stress_of
 from fecontact.fem.pairing import Pairing
 from fecontact.fem.points import Place
 from fecontact.fem.rotation import Rotation, coriolis_matrix
@@ -169,7 +169,7 @@ class CyclicBasis(Summarised):
         stress, warm = stress_of(one, moved.reshape(-1, 1))[:, :, 0], self.temperature.get(body)
         if warm is not None:
             stress = stress + held_stress(one, warm)
-        return BodyFields(one.nodes, body_elements(one), moved, stress, warm)
+        return BodyFields(one.nodes, one.elements, moved, stress, warm)
 
 
 def cyclic_basis(

@@ -36,6 +36,14 @@ _INCOMPRESSIBLE = 14.5 * (1.0 + 1e-12)
 # Largest energy norm of the residuals of modes.
 _MODES = 1e-6
 
+# Edges along the axes of the reference cell, in columns, of regular cells by their corners.
+_TRIANGLE = np.array([[1.0, 0.5, 0.0], [0.0, np.sqrt(0.75), 0.0], [0.0, 0.0, 1.0]])
+_REGULAR = {
+    4: np.array([[1.0, 0.5, 0.5], [0.0, np.sqrt(0.75), np.sqrt(1.0 / 12.0)],
+                 [0.0, 0.0, np.sqrt(2.0 / 3.0)]]),
+    5: np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, np.sqrt(0.5)]]),
+    6: _TRIANGLE, 8: np.eye(3)}
+
 # Vectors that are solved at once.
 WIDTH = 32
 
@@ -56,16 +64,15 @@ def suited(body: ElasticBody) -> bool:
 
 def aspect_ratios(body: ElasticBody) -> Array:
     """Length over width of cells (c,): of the ellipsoid that a regular cell's sphere becomes."""
-    corners = body.mesh.nodes[body.mesh.cells[:, list(body.mesh.kind.order)]]
-    if corners.shape[1] == 4:
-        regular = np.array([[1.0, 0.5, 0.5], [0.0, np.sqrt(0.75), np.sqrt(1.0 / 12.0)],
-                            [0.0, 0.0, np.sqrt(2.0 / 3.0)]])
-        jacobian = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2) @ np.linalg.inv(regular)
-    else:
-        slopes = shape_functions(3, 8, np.full((1, 3), 0.5))[1][0]
-        jacobian = np.einsum("kj,eki->eij", slopes, corners)
-    values = np.linalg.svd(jacobian, compute_uv=False)
-    return np.asarray(values[:, 0] / values[:, -1])
+    found = np.empty(len(body.mesh.cells))
+    for block in body.mesh.blocks:
+        count = block.kind.corners
+        corners = body.mesh.nodes[block.ordered]
+        slopes = shape_functions(3, count, block.kind.middle)[1]
+        jacobian = np.einsum("kj,eki->eij", slopes, corners) @ np.linalg.inv(_REGULAR[count])
+        values = np.linalg.svd(jacobian, compute_uv=False)
+        found[block.numbers] = values[:, 0] / values[:, -1]
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -357,15 +364,18 @@ def interpolation(body: ElasticBody) -> Any:
     """Nodal displacements of quadratic elements from those of linear ones, sparse (N, n)."""
     import scipy.sparse as sp
 
-    members = body.basis.element_dofs.T
-    corners = body.mesh.kind.corners
-    values = shape_functions(3, corners, body.basis.elem.doflocs)[0]
-    # Each node takes its weights from one of its elements; all give the same.
-    nodes, first = np.unique(members, return_index=True)
-    element, local = np.divmod(first, members.shape[1])
-    weights = values[local]
-    columns = members[element, :corners]
-    used = np.abs(weights) > 1e-12
-    rows = np.broadcast_to(nodes[:, None], weights.shape)
-    return sp.csr_array(sp.coo_array((weights[used], (rows[used], columns[used])),
-                                     shape=(len(body.nodes), len(body.mesh.nodes))))
+    shape, found = (len(body.nodes), len(body.mesh.nodes)), []
+    left = np.ones(len(body.nodes), bool)
+    for block in body.blocks:
+        members, corners = block.nodes, block.kind.corners
+        values = shape_functions(3, corners, block.at_nodes)[0]
+        # Each node takes its weights from one of its elements; all give the same.
+        nodes, first = np.unique(members, return_index=True)
+        nodes, first, left[nodes] = nodes[left[nodes]], first[left[nodes]], False
+        element, local = np.divmod(first, members.shape[1])
+        weights = values[local]
+        columns = members[element, :corners]
+        used = np.abs(weights) > 1e-12
+        rows = np.broadcast_to(nodes[:, None], weights.shape)
+        found.append(sp.coo_array((weights[used], (rows[used], columns[used])), shape=shape))
+    return sp.csr_array(sum(found[1:], start=found[0]))

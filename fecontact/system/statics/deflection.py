@@ -16,7 +16,7 @@ from fecontact.core.units import Summarised, quantity
 from fecontact.fem.constraints import Coupling
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.faces.contact_patches import Count
-from fecontact.fem.fields import BodyFields, body_elements
+from fecontact.fem.fields import BodyFields
 from fecontact.fem.finite_rotations import turning_nodes
 from fecontact.fem.finite_strain import LARGE_STRAIN, FiniteStrainModel
 from fecontact.fem.load_steps import DeflectionSteps, Loads, PathPoint, follow
@@ -132,7 +132,7 @@ class DeflectionPath(Summarised):
             raise InputError(f"fields: state = {state!r} must be a whole number from {-count} to "
                              f"{count - 1}.")
         stress = FiniteStrainModel(self.body).stress(self.unknowns[state][:, None])
-        return BodyFields(self.body.nodes, body_elements(self.body), self.displacements[state],
+        return BodyFields(self.body.nodes, self.body.elements, self.displacements[state],
                           stress[..., 0])
 
 

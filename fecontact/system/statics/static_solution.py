@@ -9,7 +9,7 @@ from fecontact.core.errors import AnalysisError, InputError, choices, require_fi
 from fecontact.core.types import Array, Coordinates
 from fecontact.fem.body_forces import boundary_forces, inertia_forces
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.fields import BodyFields, StressAxes, body_elements, stress_of
+from fecontact.fem.fields import BodyFields, StressAxes, stress_of
 from fecontact.fem.points import Place, place_rows
 from fecontact.fem.rotation import Rotation, centrifugal_force
 from fecontact.fem.thermal import (
@@ -85,7 +85,7 @@ def static_solution(
     stress = stress_of(body, u[:, None], stress_axes)[:, :, 0]
     if warm is not None:
         stress = stress + held_stress(body, warm)
-    return BodyFields(body.nodes, body_elements(body), u.reshape(-1, body.mesh.dimension), stress,
+    return BodyFields(body.nodes, body.elements, u.reshape(-1, body.mesh.dimension), stress,
                       warm)
 
 
