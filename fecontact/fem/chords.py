@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
+from fecontact.fem.elements.cell_kinds import edges_around
 from fecontact.fem.mesh import Mesh
 
 # Facets that meet at less are one plane, at more they form an edge of the body [rad].
@@ -87,15 +88,13 @@ def _normals(corners: Array) -> Array:
 def _neighbours(mesh: Mesh, facets: Integers) -> tuple[Integers, Integers, Array]:
     """Pairs of facets that share a node, of solids an edge, and its unit direction (k, d)."""
     if facets.shape[1] == 2:
-        sides = facets[..., None]
+        flat, owner = facets.reshape(-1, 1), np.repeat(np.arange(len(facets)), 2)
     else:
-        sides = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=-1), axis=-1)
-    flat = sides.reshape(-1, sides.shape[-1])
-    owner = np.repeat(np.arange(len(facets)), facets.shape[1])
+        flat, owner = edges_around(facets)
     order = np.lexsort(flat.T)
     same = (flat[order[1:]] == flat[order[:-1]]).all(axis=1)
     first, second = owner[order[:-1][same]], owner[order[1:][same]]
-    if sides.shape[-1] == 1:
+    if flat.shape[1] == 1:
         return first, second, np.zeros((len(first), mesh.nodes.shape[1]))
     ends = mesh.nodes[flat[order[1:][same]]]
     along = ends[:, 1] - ends[:, 0]

@@ -39,7 +39,13 @@ from fecontact.fem.constraints import (
 )
 from fecontact.fem.element_block import ElementBlock
 from fecontact.fem.elements.cell_geometry import centres_of
-from fecontact.fem.elements.cell_kinds import HEXAHEDRON, blocks_of, padded, row_numbers
+from fecontact.fem.elements.cell_kinds import (
+    HEXAHEDRON,
+    blocks_of,
+    edges_around,
+    padded,
+    row_numbers,
+)
 from fecontact.fem.elements.quadrature import rule_of
 from fecontact.fem.elimination import Elimination, eliminated
 from fecontact.fem.equations import Unknowns
@@ -239,7 +245,7 @@ class ElasticBody(Summarised):
         for number, block in enumerate(self.mesh.blocks):
             kind = block.kind
             members = (block.ordered if self.degree == 1
-                       else self.mesh.second_order.members[number])
+                       else self.mesh._second_order.members[number])
             found.append(ElementBlock(
                 kind, block.numbers, np.ascontiguousarray(members), self.nodes,
                 members.shape[1] if self.curved else kind.corners,
@@ -267,7 +273,7 @@ class ElasticBody(Summarised):
     @cached_property
     def nodes(self) -> Array:
         """Reference places (N, d) of the displacement nodes [m]."""
-        return self.mesh.nodes if self.degree == 1 else self.mesh.second_order.places
+        return self.mesh.nodes if self.degree == 1 else self.mesh._second_order.places
 
     @cached_property
     def stiffness(self) -> Any:
@@ -478,9 +484,8 @@ class ElasticBody(Summarised):
         """
         if self.dimension == 2 or self.degree == 1 or len(points) < 2:
             return points
-        faces = self.mesh.outline
-        ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-        ends = np.unique(np.sort(ends[np.isin(ends, points).all(axis=1)], axis=1), axis=0)
+        ends, _ = edges_around(self.mesh.outline)
+        ends = np.unique(ends[np.isin(ends, points).all(axis=1)], axis=0)
         return np.unique(np.concatenate([points, self.edge_nodes(ends)[:, 1]]))
 
     @cached_property
@@ -533,7 +538,7 @@ class ElasticBody(Summarised):
                              for i in range(count))]
             if count == 4:
                 first = len(self.mesh.nodes) + len(self.mesh.edges[0])
-                faces = self.mesh.second_order.faces
+                faces = self.mesh._second_order.faces
                 parts.append(first + row_numbers(faces, np.sort(some, axis=1))[:, None])
             found[which] = padded([np.concatenate(parts, axis=1)], found.shape[1])
         return found

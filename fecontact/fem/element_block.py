@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elements.cell_kinds import CellKind, shape_functions
 
@@ -16,6 +17,7 @@ PAIRS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2)
 _AT_ONCE = 2000
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class ElementBlock:
     """Elements of one kind.

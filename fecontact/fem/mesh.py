@@ -429,7 +429,7 @@ class Mesh(Summarised):
         return second_order_places(self.nodes, block.nodes, block.kind, self.edge_middles[edges])
 
     @cached_property
-    def second_order(self) -> SecondOrder:
+    def _second_order(self) -> SecondOrder:
         """Second-order nodes, which elements of degree 2 and the refined mesh have."""
         return second_order_nodes(self)
 

@@ -17,6 +17,7 @@ import numpy as np
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.elements.cell_geometry import centres_of
 
 # Part of the angle over which a facet reaches that its normal may lean along the circumference.
 _LEAN, _ROUNDING = 0.6, 0.02
@@ -62,7 +63,8 @@ def require_revolution(body: ElasticBody, S: Array, centre: Array) -> None:
         normals = np.cross(sides[:, 0], sides[:, 1])
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     around = (corners - centre) @ S.T
-    middle = around.mean(axis=1)
+    centres = centres_of(body.mesh.nodes, body.mesh.outline)
+    middle = (centres - centre) @ S.T
     speed = np.linalg.norm(middle, axis=1)
     lean = np.abs((normals * middle).sum(axis=1))
     units = around / np.maximum(np.linalg.norm(around, axis=2), 1e-300)[:, :, None]
@@ -70,7 +72,7 @@ def require_revolution(body: ElasticBody, S: Array, centre: Array) -> None:
     reach = np.arccos(cosine).max(axis=(1, 2))
     wrong = lean > (_LEAN * reach + _ROUNDING) * speed
     if wrong.any():
-        place = ", ".join(f"{x:g}" for x in corners[np.argmax(wrong)].mean(axis=0))
+        place = ", ".join(f"{x:g}" for x in centres[np.argmax(wrong)])
         raise InputError(f"Rotation: frame = 'standing' is for bodies of revolution about the "
                          f"axis, but the surface at ({place}) crosses circles around it; take "
                          f"frame = 'rotating'.")

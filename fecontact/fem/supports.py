@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.core.errors import InputError, MeshError, choices, nearest
 from fecontact.core.types import Array, Integers
+from fecontact.fem.elements.cell_geometry import centres_of
 from fecontact.fem.mesh import Mesh
 
 KINDS = {2: ("x", "y", "xy", "hinge"),
@@ -107,7 +108,7 @@ def _centre(mesh: Mesh, places: Array, name: str) -> Array:
         weights = np.linalg.norm(_area_vectors(ends), axis=1)
     else:
         weights = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    return np.asarray((weights @ ends.mean(axis=1)) / weights.sum())
+    return np.asarray(weights @ centres_of(mesh.nodes, mesh.boundaries[name]) / weights.sum())
 
 
 def _area_vectors(corners: Array) -> Array:

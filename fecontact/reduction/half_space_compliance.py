@@ -22,7 +22,7 @@ from fecontact.core.errors import InputError, require_not_negative, require_posi
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.faces.frames import frames_of
-from fecontact.fem.faces.surface import Patches, Surface
+from fecontact.fem.faces.surface import Patches, Surface, corners_of, drawn_facets
 from fecontact.fem.material import Material
 from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.half_space.patches import PixelPatches
@@ -185,9 +185,9 @@ def _local(body: ElasticBody, face: _Face) -> Array:
                          f"give a part of it as the face that touches.")
     axes = frames_of(face.inward[None])[0]
     origin = face.patches.centres.mean(axis=0)
-    corners = 3 if surface.facets.shape[1] in (3, 6) else 4
-    polygons = ((surface.places - origin) @ axes.T)[surface.facets[:, :corners]]
-    pixels = PixelPatches.of(polygons[..., :2], face.patches.owner)
+    corners, facet = drawn_facets(corners_of(surface.facets))
+    polygons = ((surface.places - origin) @ axes.T)[corners]
+    pixels = PixelPatches.of(polygons[..., :2], face.patches.owner[facet])
     places = (body.nodes - origin) @ axes.T
     free, beside, material = _region(body, face, places, pixels)
     n, loads = face.patches.count, np.asarray(face.rows.T.tocsr()[free].todense())

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from solid_blocks import mixed_mesh
 
 import fecontact as fc
 from fecontact.core.errors import InputError
@@ -11,11 +12,14 @@ from fecontact.laws import ConstantFriction, LinearContact
 pytest.importorskip("pyvista")
 
 
-@pytest.mark.parametrize("space", [False, True])
-def test_a_grid_has_the_fields_of_the_run(space):
+@pytest.mark.parametrize("kind", ["plane", "bricks", "mixed"])
+def test_a_grid_has_the_fields_of_the_run(kind):
+    space = kind != "plane"
     lines = [np.linspace(0.0, 0.1, 4), np.linspace(0.0, 0.02, 3), np.linspace(0.0, 0.02, 3)]
-    mesh = fc.Mesh.grid(*lines[: 3 if space else 2])
-    basis = fc.modal_basis(fc.ElasticBody(mesh), 8, contact="bottom")
+    mesh = (mixed_mesh((1, 2, 2), (0.1, 0.02, 0.02)) if kind == "mixed"
+            else fc.Mesh.grid(*lines[: 3 if space else 2]))
+    basis = fc.modal_basis(fc.ElasticBody(mesh), 8,
+                           contact="contact" if kind == "mixed" else "bottom")
     system = fc.ContactSystem(basis, LinearContact(1e8), ConstantFriction(0.3),
                               load=fc.Load(gravity=(0.0, 0.0, -9.81)[3 - mesh.nodes.shape[1] :]))
     run = fc.simulate(system, 1e-3, outputs=11)

@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import h5py
 import numpy as np
 import pytest
-from solid_blocks import block_body
+from solid_blocks import block_body, mixed_mesh
 from systems import TURN
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkFiltersVerdict import vtkCellSizeFilter
@@ -34,12 +34,17 @@ from fecontact.system.powers import POWERS
 from fecontact.system.tables import system_tables
 
 SIZE = (0.2, 0.1, 0.05)
-KINDS = pytest.mark.parametrize("tetrahedra", [False, True])
+# Kinds of solids, and those of their cells in VTK.
+CELLS = {"hexahedra": {"vtkHexahedron"}, "tetrahedra": {"vtkTetra"},
+         "mixed": {"vtkTetra", "vtkPyramid", "vtkWedge", "vtkHexahedron"}}
+KINDS = pytest.mark.parametrize("kind", list(CELLS))
 
 
-def solid(tetrahedra=False, counts=(4, 2, 1)):
-    return fc.modal_basis(block_body(counts, SIZE, tetrahedra=tetrahedra), 8, contact_nodes=4,
-                          B=(0.0, 0.05, 0.05), C=(0.1, 0.05, 0.05))
+def solid(kind="hexahedra", counts=(4, 2, 1)):
+    body = (fc.ElasticBody(mixed_mesh((1, 2, 1), SIZE)) if kind == "mixed"
+            else block_body(counts, SIZE, tetrahedra=kind == "tetrahedra"))
+    return fc.modal_basis(body, 8, contact_nodes=4, B=(0.0, 0.05, 0.05),
+                          C=(0.1, 0.05, 0.05))
 
 
 def system(basis, **parts):
@@ -95,8 +100,8 @@ def stacked():
 
 
 @KINDS
-def test_vtk_reads_volume_motion_and_stress_of_solids(tmp_path, tetrahedra):
-    basis = solid(tetrahedra)
+def test_vtk_reads_volume_motion_and_stress_of_solids(tmp_path, kind):
+    basis = solid(kind)
     run = moved(system(basis))
     path = fc.write_case(tmp_path / "solid.vtkhdf", run, frames=9)
     field = basis.mode_shapes
@@ -107,7 +112,8 @@ def test_vtk_reads_volume_motion_and_stress_of_solids(tmp_path, tetrahedra):
     volumes = of(sizes.GetOutput(), "Cell", "Volume")
     assert volumes.min() > 0.0
     assert volumes.sum() == pytest.approx(np.prod(SIZE), rel=1e-12)
-    assert grid.GetCell(0).GetClassName() == ("vtkTetra" if tetrahedra else "vtkHexahedron")
+    names = {grid.GetCell(k).GetClassName() for k in range(grid.GetNumberOfCells())}
+    assert names == CELLS[kind]
     for name, q in (("displacement", run.modal_coordinates), ("velocity", run.modal_velocities)):
         expected = field.shapes @ q[4]
         assert of(grid, "Point", name) == pytest.approx(expected,
@@ -135,8 +141,8 @@ def facet_areas(grid, chosen):
 
 
 @KINDS
-def test_pressures_on_cells_and_forces_on_nodes_carry_the_contact_forces(tmp_path, tetrahedra):
-    run = moved(system(solid(tetrahedra)))
+def test_pressures_on_cells_and_forces_on_nodes_carry_the_contact_forces(tmp_path, kind):
+    run = moved(system(solid(kind)))
     path = fc.write_case(tmp_path / "solid.vtkhdf", run, frames=9)
     forces = contact_forces(run)
     places = run.system.basis.contact_places

@@ -11,6 +11,7 @@ from solid_blocks import block_mesh
 
 from fecontact import InputError, MeshError, Study, read_mesh, static_solution
 from fecontact.fem.elements.cell_kinds import CELL_KINDS, HEXAHEDRON
+from fecontact.fem.faces.surface import Surface
 from fecontact.fem.mesh_files.deck_contents import COMPONENTS
 from fecontact.fem.mesh_files.nastran_loads import nastran_contents
 from fecontact.study.imported import imported
@@ -213,10 +214,9 @@ def test_sums_of_forces_of_nastran_are_those_of_another_reader(tmp_path):
     assert contents.distributed.unread == []
     force, moment = np.zeros(3), np.zeros(3)
     for name, pressure in contents.distributed.pressures:
-        corners = mesh.nodes[mesh.boundaries[name]]
-        areas = 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        force -= pressure * areas.sum(axis=0)
-        moment -= pressure * np.cross(corners.mean(axis=1), areas).sum(axis=0)
+        surface = Surface(mesh.nodes, mesh.boundaries[name])
+        force -= pressure * surface.area_vectors.sum(axis=0)
+        moment -= pressure * np.cross(surface.centres, surface.area_vectors).sum(axis=0)
     for name, component, value in contents.forces:
         way = value * np.eye(6)[COMPONENTS.index(component)]
         force += way[:3]

@@ -11,6 +11,7 @@ from fecontact.fem.elements.cell_kinds import (
     CELL_KINDS,
     CellKind,
     blocks_of,
+    edges_around,
     numbered_rows,
     padded,
     shape_functions,
@@ -200,8 +201,7 @@ def require_conforming(outline: Integers, nodes: Array) -> None:
     from scipy.spatial import KDTree
 
     _require_like_faces(outline, nodes)
-    ends = np.sort(np.stack([outline, np.roll(outline, 1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    ends, _, _ = numbered_rows(ends[ends[:, 0] != ends[:, 1]])
+    ends, _, _ = numbered_rows(edges_around(outline)[0])
     on_outline = np.unique(ends)
     a, b = nodes[ends[:, 0]], nodes[ends[:, 1]]
     middles, radii = 0.5 * (a + b), 0.5 * (1.0 - _ON_EDGE) * np.linalg.norm(b - a, axis=1)

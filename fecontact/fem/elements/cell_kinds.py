@@ -1,4 +1,4 @@
-"""Kinds of cells: their sides and edges, and the order in which scikit-fem takes their corners.
+"""Kinds of cells: their sides, edges and second-order nodes; shape functions; rows of cells.
 
 Corners are numbered as Gmsh, VTK and Abaqus do: along the outline of plane cells; tetrahedra with
 the fourth corner above the first three, which run counter-clockwise seen from it; hexahedra by
@@ -11,9 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 
 
+@read_only_arrays
 @dataclass(frozen=True)
 class CellKind:
     """One kind of cell.
@@ -27,13 +29,14 @@ class CellKind:
         Corners of each side: edges with the cell on their left; faces counter-clockwise, seen from
         outside.
     edges : tuple of pairs
-        In the order of scikit-fem's degrees of freedom.
+        In the order of the nodes in their middles.
     order : tuple of int
-        The corner at each of scikit-fem's corners.
+        The corner at each of the leading nodes of an element.
     mirrored : tuple of int
         Corners of the same cell with the opposite orientation.
     places : tuple of tuples
-        Local coordinates of scikit-fem's quadratic degrees of freedom, from 0 to 1.
+        Local coordinates of the nodes of quadratic elements, from 0 to 1: corners, middles of
+        edges, of four-sided faces, of the cell.
     """
 
     name: str
@@ -96,7 +99,7 @@ _UNKNOWNS = {(2, 3, 1): 1, (2, 3, 2): 4, (2, 4, 1): 2, (2, 4, 2): 8,
              (3, 8, 1): 3, (3, 8, 2): 24}
 
 _H = 0.5
-# Corners of the hexahedron at those of scikit-fem, and its edges between these.
+# Corners of the hexahedron in the order of its nodes, and its edges between these.
 _HEX_ORDER = (6, 2, 5, 7, 1, 3, 4, 0)
 _HEX_EDGES = ((0, 1), (0, 2), (0, 3), (1, 4), (1, 5), (2, 4), (2, 6), (3, 5), (3, 6), (4, 7),
               (5, 7), (6, 7))
@@ -189,6 +192,14 @@ def unordered(rows: Integers) -> Integers:
     return np.sort(found, axis=1)
 
 
+def edges_around(facets: Integers) -> tuple[Integers, Integers]:
+    """Edges (e, 2) around facets (k, n) of solids, ends ascending, and the facet of each."""
+    ends = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
+    real = ends[:, 0] != ends[:, 1]
+    owner = np.repeat(np.arange(len(facets)), facets.shape[1])
+    return np.sort(ends[real], axis=1), owner[real]
+
+
 def numbered_rows(rows: Integers) -> tuple[Integers, Integers, Integers]:
     """Distinct rows in lexicographic order, the number of each row, and how often each occurs."""
     number = rows[:, 0].astype(np.int64)
@@ -208,6 +219,7 @@ def row_numbers(known: Integers, rows: Integers) -> Integers:
     return np.asarray(place[number[len(known):]])
 
 
+@read_only_arrays
 @dataclass(frozen=True, eq=False)
 class CellBlock:
     """Cells of one kind of a mesh: their numbers (m,) and their corners (m, k)."""

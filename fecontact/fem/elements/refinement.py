@@ -37,7 +37,7 @@ class _Cells(Protocol):
     @property
     def curved_cells(self) -> Integers: ...
     @property
-    def second_order(self) -> "SecondOrder": ...
+    def _second_order(self) -> "SecondOrder": ...
     def second_order_places(self, block: CellBlock) -> Array: ...
 
 
@@ -119,9 +119,9 @@ def second_order_nodes(mesh: _Cells) -> SecondOrder:
 
 def at_second_order(mesh: _Cells, values: Array) -> Array:
     """Values (n,) at all second-order nodes from those (N + E,) at corners and middles of edges."""
-    found = np.zeros(len(mesh.second_order.places))
+    found = np.zeros(len(mesh._second_order.places))
     corners, middles = values[: len(mesh.nodes), None], values[len(mesh.nodes) :, None]
-    for block, members in zip(mesh.blocks, mesh.second_order.members, strict=True):
+    for block, members in zip(mesh.blocks, mesh._second_order.members, strict=True):
         edges = mesh.edges[1][block.numbers][:, : len(block.kind.edges)]
         found[members] = second_order_places(corners, block.nodes, block.kind,
                                              middles[edges])[:, :, 0]
@@ -135,7 +135,7 @@ def refined(
 
     The cell (M,) of which each is a part comes beside them.
     """
-    second = mesh.second_order
+    second = mesh._second_order
     cells, owner = [], []
     for block, members in zip(mesh.blocks, second.members, strict=True):
         for part in PARTS[mesh.dimension, block.kind.corners]:
@@ -175,7 +175,7 @@ def _facet_parts(mesh: _Cells, facets: Integers, faces: Integers) -> Integers:
 
 def _curves(mesh: _Cells) -> tuple[Integers, Array]:
     """Curved edges of the parts of curved cells, and their middles."""
-    second = mesh.second_order
+    second = mesh._second_order
     found = [np.empty((0, 2), np.int64)]
     places = [np.empty((0, mesh.dimension))]
     for block, rows in zip(mesh.blocks, second.members, strict=True):

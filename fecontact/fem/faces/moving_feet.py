@@ -45,7 +45,7 @@ class Feet:
         Facets.
     nodes : (n, k) integer array
         Nodes of the facets.
-    values, slopes, bends : (n, k), (n, k, d - 1), (n, k, d - 1, d - 1) arrays
+    values, slopes, second_derivatives : (n, k), (n, k, d - 1), (n, k, d - 1, d - 1) arrays
         Shape functions at the feet, and their first and second derivatives.
     places : (n, d) array
         Feet [m].

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from fecontact.core.types import Array, Integers
-from fecontact.fem.elements.cell_kinds import blocks_of
+from fecontact.fem.elements.cell_kinds import edges_around
 from fecontact.fem.faces.frames import frames_of
-from fecontact.fem.faces.surface import Surface
+from fecontact.fem.faces.surface import Surface, corners_of
 
 # Differences of area count so much against second moments.
 _UNEQUAL = 10.0
@@ -68,13 +68,9 @@ def grid_partition(surface: Surface, along: int, across: int) -> Integers | None
 
 def _closes(surface: Surface) -> bool:
     """Whether a connected face closes around an axis, by its numbers of corners, edges, facets."""
-    nodes, ends = [], []
-    for _, rows in blocks_of(surface.facets):
-        corners = rows[:, : 3 if rows.shape[1] in (3, 6) else 4]
-        nodes.append(corners.ravel())
-        ends.append(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2))
-    edges = np.unique(np.sort(np.concatenate(ends), axis=1), axis=0)
-    return len(np.unique(np.concatenate(nodes))) - len(edges) + len(surface.facets) == 0
+    corners = corners_of(surface.facets)
+    edges = np.unique(edges_around(corners)[0], axis=0)
+    return len(np.unique(corners)) - len(edges) + len(corners) == 0
 
 
 def _is_grid(

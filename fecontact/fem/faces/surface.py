@@ -63,6 +63,15 @@ def _filled(n: int, values: Array, slopes: Array) -> tuple[Array, Array]:
             np.concatenate([slopes, np.stack([zeros, zeros], axis=-1)], axis=-2))
 
 
+def corners_of(facets: Integers) -> Integers:
+    """Corners (k, 3) or (k, 4) of facets (k, n) of solids."""
+    found = np.empty((len(facets), 3 if facets.shape[1] in (3, 6) else 4), np.int64)
+    for which, rows in blocks_of(facets):
+        count = 3 if rows.shape[1] in (3, 6) else 4
+        found[which] = padded([rows[:, :count]], found.shape[1])
+    return found
+
+
 def triangular(facets: Integers) -> NDArray[np.bool_]:
     """Mask (k,) of the triangles among facets (k, n) of solids."""
     return np.isin(widths(facets), (3, 6))

@@ -61,8 +61,8 @@ def read_mesh(
 
     Formats: Gmsh (.msh 2.2 and 4.1), Abaqus (.inp), Ansys (.cdb, by mapdl-archive), Nastran (.bdf,
     .nas, .fem), MED (.med), VTK (.vtk, .vtu). Files with tetrahedra, hexahedra, wedges or pyramids
-    hold solids; with wedges or pyramids all elements are cut into tetrahedra. Boundaries are groups
-    of lines, of solids those of surfaces: physical groups (Gmsh), surfaces, element sets and node
+    hold solids, which may have elements of several kinds. Boundaries are groups of lines, of solids
+    those of surfaces: physical groups (Gmsh), surfaces, element sets and node
     sets on the outline (Abaqus, MED), components of nodes on it (Ansys), elements by property
     number (Nastran). Points are physical points, node sets, groups inside the body, and lines of
     solids. VTK files have no groups. Curved sides of second-order elements are kept, coincident
@@ -420,7 +420,7 @@ def _by_meshio(format_name: str, source: Path | io.StringIO) -> Any:
             getattr(meshio, format_name).read(source)
     if "cannot handle" in printed.getvalue():
         raise MeshError("The file holds elements of a kind that meshio does not read; mesh with "
-                        "triangles, quadrilaterals, tetrahedra or hexahedra.")
+                        "triangles, quadrilaterals, tetrahedra, pyramids, wedges or hexahedra.")
     if np.any(found.point_data.get("nastran:ref", 0)):
         raise MeshError("The file gives nodes in local coordinate systems; export them in the "
                         "basic one.")

@@ -340,7 +340,7 @@ def _cells_of_body(cells: list[tuple[str, Integers]]) -> list[tuple[str, Integer
     other = sorted({kind for kind, _ in present if kind not in CORNERS})
     if other and (solid or any(kind.startswith(_UNREAD_SOLIDS) for kind in other)):
         raise MeshError(f"The mesh holds solid elements that are not read ({', '.join(other)}); "
-                        f"mesh with tetrahedra, hexahedra or wedges of first or second order.")
+                        f"mesh with tetrahedra, hexahedra, wedges or pyramids of 4 to 27 nodes.")
     if other:
         raise MeshError(f"The mesh holds elements that are not read ({', '.join(other)}); mesh "
                         f"with first-order triangles or quadrilaterals.")
