@@ -41,10 +41,11 @@ CHANGE = 1e-7
 DEEPEST = 5.0
 # Steps after which the reference gives up.
 MOST_STEPS = 20_000_000
-# The contact element is two other laws, and rigid stops need solvers of their own.
+# The contact element is two other laws, and rigid stops need solvers of their own; a table of
+# asperities is interpolated as the measured surface, parallel sliders have the kernel of Iwan's.
 NORMAL = [name for name in law_names()[laws.NormalLaw]
-          if name not in ("friction-contact-3d", "rigid-stop")]
-FRICTION = list(law_names()[laws.FrictionLaw])
+          if name not in ("friction-contact-3d", "rigid-stop", "asperity")]
+FRICTION = [name for name in law_names()[laws.FrictionLaw] if name != "parallel-sliders"]
 # Time constant of memory that fades without force [s].
 FADING = 1e-7
 # Parts of a step at which excesses over limits are compared, parts of the largest deflection that

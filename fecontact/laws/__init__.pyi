@@ -1,7 +1,12 @@
 from .base import Bound, FrictionLaw, NormalLaw, NotNegative, PerNode, Positive
 from .check import CompiledLaw, check_law
 from .friction.bristle import BoucWenFriction, DahlFriction, LuGreFriction
-from .friction.maxwell_slip import FourParameterIwanFriction, IwanFriction, JenkinsFriction
+from .friction.maxwell_slip import (
+    FourParameterIwanFriction,
+    IwanFriction,
+    JenkinsFriction,
+    ParallelSliders,
+)
 from .friction.stribeck import (
     ConstantFriction,
     CubicFriction,
@@ -20,6 +25,7 @@ from .ground.motion import GroundMotion, HarmonicSpeed, SpeedRamp
 from .ground.profile import Flat, Profile, Sine
 from .ground.random_roughness import RandomRoughness
 from .ground.sliding import SlidingRotation, SlidingTranslation
+from .normal.asperities import AsperityContact
 from .normal.bilateral import (
     BilateralLaw,
     BilateralPiecewise,
@@ -48,6 +54,7 @@ from .wear import ArchardWear, EnergyWear, WearLaw
 
 __all__ = [
     "ArchardWear",
+    "AsperityContact",
     "BackBurdekinContact",
     "BilateralLaw",
     "BilateralPiecewise",
@@ -89,6 +96,7 @@ __all__ = [
     "NormalLaw",
     "NotNegative",
     "ParabolicSurface",
+    "ParallelSliders",
     "PerNode",
     "Positive",
     "PowerContact",

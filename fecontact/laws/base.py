@@ -133,8 +133,11 @@ class NodeLaw:
         return next(iter(sizes.values()), None)
 
     def table(self, share: Array) -> Array:
-        """Parameters (n, k) of n nodes; ``share`` (n,) is each node's fraction of the face."""
-        entries = fields(self)
+        """Parameters (n, k) of n nodes; ``share`` (n,) is each node's fraction of the face.
+
+        Without the :attr:`shared_fields`.
+        """
+        entries = [entry for entry in fields(self) if entry.name not in self.shared_fields]
         table = np.empty((len(share), len(entries)))
         for column, entry in enumerate(entries):
             given = getattr(self, entry.name)

@@ -35,6 +35,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
         random_roughness,
     )
     from fecontact.laws.normal import (
+        asperities,
         bilateral,
         linear,
         measured_surface,
@@ -58,6 +59,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "exponential": statistical.ExponentialContact,
             "back-burdekin": power.BackBurdekinContact,
             "greenwood-williamson": statistical.GreenwoodWilliamson,
+            "asperity": asperities.AsperityContact,
             "two-sided-stop": linear.TwoSidedStop,
             "rigid-stop": rigid_stop.RigidStop,
             "prescribed-force": linear.PrescribedForce,
@@ -78,6 +80,7 @@ def law_names() -> Mapping[type, Mapping[str, type]]:
             "jenkins": maxwell_slip.JenkinsFriction,
             "iwan": maxwell_slip.IwanFriction,
             "four-parameter-iwan": maxwell_slip.FourParameterIwanFriction,
+            "parallel-sliders": maxwell_slip.ParallelSliders,
             "dahl": bristle.DahlFriction,
             "lugre": bristle.LuGreFriction,
             "bouc-wen": bristle.BoucWenFriction,

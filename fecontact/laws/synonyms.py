@@ -8,10 +8,10 @@ from fecontact.core.docstrings import summary
 
 _STRIBECK = ("ExponentialFriction", "GaussianFriction", "HyperbolicFriction", "CubicFriction",
              "GalvanettoFriction", "LuGreFriction")
-_IWAN = ("IwanFriction", "FourParameterIwanFriction")
+_IWAN = ("IwanFriction", "FourParameterIwanFriction", "ParallelSliders")
 _HERTZ = ("PowerContact", "RestitutionContact")
 _ROUGH = ("RoughSurface", "ParabolicSurface", "CosineSurface", "GaussianSurface",
-          "GreenwoodWilliamson", "ExponentialContact", "MeasuredSurface")
+          "GreenwoodWilliamson", "AsperityContact", "ExponentialContact", "MeasuredSurface")
 
 # Words, without spaces, hyphens and accents, and the classes that they stand for.
 _WORDS: Mapping[str, tuple[str, ...]] = {

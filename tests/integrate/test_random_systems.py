@@ -35,9 +35,11 @@ def test_equations_are_those_of_the_package(systems):
             found = case.system.rhs(t, y)
             size = np.maximum(np.abs(expected), 1e-3 * np.abs(expected).max())
             assert (np.abs(found - expected) / size).max() < 1e-8, (number, case.names)
-    assert met == {*systems.NORMAL, *law_names()[FrictionLaw], "cubic spring"}
-    # Without the contact element of two laws and the rigid stop.
-    assert len(systems.NORMAL) == len(law_names()[NormalLaw]) - 2
+    assert met == {*systems.NORMAL, *systems.FRICTION, "cubic spring"}
+    # Without the contact element of two laws, the rigid stop and the table of asperities; without
+    # sliders of Iwan's kernel.
+    assert len(systems.NORMAL) == len(law_names()[NormalLaw]) - 3
+    assert len(systems.FRICTION) == len(law_names()[FrictionLaw]) - 1
 
 
 def test_errors_at_the_default_tolerance(systems):

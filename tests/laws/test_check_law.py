@@ -11,6 +11,7 @@ from law_values import made
 import fecontact as fc
 from fecontact.cli import execute
 from fecontact.laws import (
+    AsperityContact,
     BackBurdekinContact,
     BilateralPiecewise,
     BilateralPlay,
@@ -28,6 +29,7 @@ from fecontact.laws import (
     MeasuredSurface,
     NormalLaw,
     ParabolicSurface,
+    ParallelSliders,
     PowerContact,
     PrescribedForce,
     RestitutionContact,
@@ -51,7 +53,9 @@ NEEDED = {
     BackBurdekinContact: (1e-4, 1e-9), TwoSidedStop: (1e6, 1e-4, 1.5), PrescribedForce: (3.0,),
     BilateralPolynomial: (1e6, 1e15, 3.0), BilateralPlay: (1e6, 1e-5, 3.0),
     BilateralPiecewise: ((-1e-3, 0.0, 1e-3), (-1e3, 0.0, 2e3), 3.0),
-    GreenwoodWilliamson: (1e4, 1e-4, 1e11, 1e-6), FrictionContact3D: (1e6, 8e5, 0.4),
+    GreenwoodWilliamson: (1e4, 1e-4, 1e11, 1e-6),
+    AsperityContact: (1e4, 1e-4, 1e11, 1e-5, (1.0, 3.0, 0.0), 1e9),
+    ParallelSliders: (2e6, 0.4, (1.0, 2.0), (1.0, 3.0)), FrictionContact3D: (1e6, 8e5, 0.4),
 }
 
 

@@ -41,6 +41,7 @@ GIVEN = REQUIRED | {
     "rms_height": 1e-6, "length": 1e-2, "seed": 3, "hurst_exponent": 0.8,
     "start": 0.1, "cut_off_wavelength": 1e-4, "roll_off_wavelength": 5e-3, "kind": "half-sine",
     "cubic_stiffness": 1e15, "elongations": (-1e-3, 0.0, 1e-3), "forces": (-1e3, 0.0, 2e3),
+    "gap_range": 1e-5, "springs": (1.0, 2.0), "limits": (1.0, 3.0),
     "normal_stiffness": 1e6, "tangential_stiffness": 8e5,
 }
 ALL = [(kind, name) for kind, names in law_names().items() for name in names]

@@ -16,6 +16,7 @@ from fecontact.laws import (
     IwanFriction,
     JenkinsFriction,
     LuGreFriction,
+    ParallelSliders,
 )
 
 LAWS = [
@@ -23,6 +24,7 @@ LAWS = [
     IwanFriction(2e6, 0.4, elements=5), IwanFriction(2e6, 0.4, elements=1),
     FourParameterIwanFriction(2e6, 0.4, -0.5, 0.1, elements=2),
     FourParameterIwanFriction((2e6, 1e6), 0.4, chi=-0.8, beta=0.0, elements=2, spacing_ratio=1.5),
+    ParallelSliders((2e6, 1e6), 0.4, (1.0, 2.0), (1.0, 3.0)),
     DahlFriction(0.4, 2e5), DahlFriction((0.4, 0.5), 2e5, 1.5), DahlFriction(0.4, 2e5, 2.0),
     LuGreFriction(0.8, 0.55, 1e-3, 2.0, 1e5), LuGreFriction(0.8, 0.5, 2e-3, 1.0, 1e5, 30.0, 20.0),
     LuGreFriction(0.8, 0.5, 2e-3, 0.7, 1e5, 30.0, 0.0, 10.0),

@@ -13,6 +13,7 @@ from fecontact.laws import (
     IwanFriction,
     JenkinsFriction,
     LuGreFriction,
+    ParallelSliders,
     PrescribedForce,
     RoughSurface,
 )
@@ -21,6 +22,7 @@ LAWS = {
     "jenkins": JenkinsFriction(2e5, 0.4),
     "iwan": IwanFriction(2e5, 0.4, elements=5),
     "four-parameter-iwan": FourParameterIwanFriction(2e5, 0.4, chi=-0.3, elements=4, beta=0.1),
+    "parallel-sliders": ParallelSliders(2e5, 0.4, (1.0, 2.0, 0.5), (1.0, 5.0, 1.0)),
     "dahl": DahlFriction(0.4, 2e4),
     "lugre": LuGreFriction(0.5, 0.4, 1e-3, 2.0, bristle_stiffness=2e4, bristle_damping=0.5),
     "bouc-wen": BoucWenFriction(0.4, 2e-5),

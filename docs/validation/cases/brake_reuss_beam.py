@@ -67,7 +67,9 @@ def beam(deck: Path) -> fc.ElasticBody:
     return fc.ElasticBody(mesh, degree=1)
 
 
-def reduced(body: fc.ElasticBody, nodes: tuple[int, int]) -> tuple[Pairing, fc.ModalBasis]:
+def reduced(
+    body: fc.ElasticBody, nodes: tuple[int, int], tolerance: float = 0.02
+) -> tuple[Pairing, fc.ModalBasis]:
     """Faces of the lap with nodes along and across, and the basis of the free beam.
 
     Damping in proportion to the mass gives the mode the ratio published for small amplitudes.
@@ -76,7 +78,7 @@ def reduced(body: fc.ElasticBody, nodes: tuple[int, int]) -> tuple[Pairing, fc.M
     lap = pair_faces(bodies, "beam.BOTBEAM_INSURF", "beam.TOPBEAM_INSURF", nodes=nodes)
     points = {name: name for pair in THREADS for name in pair}
     points |= {"out": "OutNodes"}
-    bases = reduce_bodies(bodies, [lap], modes=14, tolerance=0.02, each={
+    bases = reduce_bodies(bodies, [lap], modes=14, tolerance=tolerance, each={
         "beam": {"points": points, "loads": [name for pair in THREADS for name in pair]}})
     basis, (_, hertz, ratio) = assembled_basis(bases, {"lap": lap}), PUBLISHED[0]
     return lap, replace(basis, damping=4.0 * np.pi * hertz * ratio * np.eye(basis.modes))

@@ -253,6 +253,55 @@ class IwanFriction(_MaxwellSlip):
 
 
 @dataclass(frozen=True)
+class ParallelSliders(_MaxwellSlip):
+    r"""Jenkins elements in parallel with given stiffnesses and limits (Maxwell slip, Masing).
+
+    .. math:: R = \sum_i \min\left(k_i |z_i|,\ \phi_i\right) \operatorname{sgn} z_i, \qquad
+        k_i = k\, \frac{s_i}{\sum_j s_j}, \quad \phi_i = \mu F\, \frac{l_i}{\sum_j l_j}
+
+    with z_i as in :class:`JenkinsFriction`. Element i slides from the deflection ``phi_i / k_i``
+    on. Two elements of equal springs and the limits 1 and 3 are :class:`IwanFriction` with two.
+
+    Parameters
+    ----------
+    springs : sequence
+        s_i: stiffnesses of the elements, above zero, in any unit.
+    limits : sequence
+        l_i: limits of the elements, above zero, in any unit; as many.
+
+    References
+    ----------
+    G. Masing, Eigenspannungen und Verfestigung beim Messing, Proc. 2nd International Congress of
+    Applied Mechanics, Zurich 1926.
+    """
+
+    shared_fields: ClassVar = frozenset({"springs", "limits"})
+
+    springs: tuple[float, ...]
+    limits: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        s, limits = np.asarray(self.springs), np.asarray(self.limits)
+        if s.ndim != 1 or s.shape != limits.shape or not len(s) <= _MOST_ELEMENTS or not (
+                (s > 0.0).all() and (limits > 0.0).all()):
+            raise InputError(f"ParallelSliders: springs = {shown(self.springs)} and limits = "
+                             f"{shown(self.limits)} must be lists of equal length of numbers "
+                             f"above zero.")
+
+    @property
+    def memory(self) -> int:
+        """One internal variable per element."""
+        return len(self.springs)
+
+    @property
+    def shares(self) -> tuple[Array, Array]:
+        """Fractions (s,) of the stiffness k, and of the limit mu F, that the elements have."""
+        return (np.asarray(self.springs) / np.sum(self.springs),
+                np.asarray(self.limits) / np.sum(self.limits))
+
+
+@dataclass(frozen=True)
 class FourParameterIwanFriction(_MaxwellSlip):
     r"""Four-parameter Iwan law (Segalman): a power-law distribution of sliders for bolted joints.
 
