@@ -472,3 +472,22 @@ def test_coordinates_of_a_harmonic_that_was_not_computed():
     mode = nonlinear_mode(masses(), (1e-3, 2e-3), observe=("a.p", "y"), method=HarmonicBalance(2))
     with pytest.raises(InputError, match="from 0 to 2"):
         mode.coordinates(3)
+
+
+def test_the_undamped_mode_beside_stiff_ones_is_found_in_few_steps(monkeypatch):
+    """Rounding of eigenvalues is that of the largest, which lies 6000 times higher here."""
+    from fecontact.bifurcation.nonlinear_modes import linear_start
+
+    monkeypatch.setattr(linear_start, "_ITERATIONS", 8)
+    n, rng = 40, np.random.default_rng(0)
+    w = 2.0 * np.pi * np.geomspace(175.0, 1e6, n)
+    E = np.kron(np.diag([0.0, 1.0]), np.eye(n))
+    for _ in range(6):
+        Q = np.linalg.qr(rng.standard_normal((n, n)))[0]
+        K, C = Q @ np.diag(w**2) @ Q.T, Q @ np.diag(0.02 * w + 1.8) @ Q.T
+        A = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -C]])
+        rate = 0.5 * (0.02 * w[0] + 1.8)
+        found, _, xi = linear_start._undamped(
+            A, E, complex(-rate, np.sqrt(w[0] ** 2 - rate**2)))
+        assert found == pytest.approx(w[0], rel=1e-8)
+        assert xi == pytest.approx(2.0 * rate, rel=1e-8)

@@ -12,12 +12,12 @@ the reference below and not part of this package. The script
 5. follows the first bending mode over its amplitude: frequency and damping by the extended periodic
    motion concept.
 
-Contact is that of rough surfaces, whose pressure grows with the approach as exp(u / u_0): the
-asperities measured by Porter and Brake give u_0 = 2.2 um near the mean pressure in the lap, 12.8
-MPa. Tangential stiffness is 2 (1 - nu) / (2 - nu) times the normal one of each contact node under
-the bolts (Mindlin). Friction acts along both directions of the lap.
+Contact is that of elastic-plastic asperities with measured heights (`AsperityContact`): the bolts
+flatten them, the vibration is elastic. Each asperity sticks with Mindlin's stiffness and slides at
+its own limit, along both directions of the lap; ten elements stand for all of a node. The lap is
+flat, or has its measured shape. The file of the surface is published with the reference too.
 
-Usage: python brake_reuss_beam.py DECK [FOLDER] [--quick]
+Usage: python brake_reuss_beam.py DECK SURFACE [FOLDER] [--quick]
        python brake_reuss_beam.py DECK --second-order
 
 The second form prints the free modes of second-order bricks (867,000 unknowns), and ends.
@@ -29,10 +29,12 @@ Structures 154 (2015).
 """
 
 import sys
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.io import loadmat
 
 import fecontact as fc
 from fecontact.bifurcation import (
@@ -42,14 +44,14 @@ from fecontact.bifurcation import (
     nonlinear_mode,
 )
 from fecontact.fem import Pairing, pair_faces
-from fecontact.laws import ExponentialContact, IwanFriction
+from fecontact.laws import AsperityContact, IwanFriction
 from fecontact.plot import COLOURS, new_figure
 from fecontact.reduction import assembled_basis, eigenfrequencies_hz, reduce_bodies
 from fecontact.system import LoadHistory
 
 BOLT = 12249.0  # force of each bolt [N]
-PRESSURE, DEPTH = 1e6, 2.2e-6  # of the normal law [Pa, m]: the first is free, as the halves are
-RATIO, COEFFICIENT, ELEMENTS = 0.82, 0.03, 5  # of friction
+MODULUS, POISSON, YIELD = 192.31e9, 0.3, 331.7e6  # of the asperities [Pa]
+COEFFICIENT, ELEMENTS = 0.03, 10  # of friction
 # Published without contact [Hz], and with a flat interface of rough surfaces: amplitude of the end
 # [m], frequency [Hz], damping ratio (of which 8.7e-4 is that of the material).
 WITHOUT_CONTACT = (70.323, 151.26, 609.25)
@@ -68,32 +70,83 @@ def beam(deck: Path) -> fc.ElasticBody:
 
 
 def reduced(
-    body: fc.ElasticBody, nodes: tuple[int, int], tolerance: float = 0.02
+    body: fc.ElasticBody, nodes: tuple[int, int], modes: int
 ) -> tuple[Pairing, fc.ModalBasis]:
     """Faces of the lap with nodes along and across, and the basis of the free beam.
 
-    Damping in proportion to the mass gives the mode the ratio published for small amplitudes.
+    Of the modes that all residual vectors give, the lowest are kept: they hold the compliance under
+    the stiff contact better than as many residual vectors chosen by a larger tolerance. Damping in
+    proportion to the mass gives the mode the ratio published for small amplitudes.
     """
     bodies = {"beam": body}
     lap = pair_faces(bodies, "beam.BOTBEAM_INSURF", "beam.TOPBEAM_INSURF", nodes=nodes)
     points = {name: name for pair in THREADS for name in pair}
     points |= {"out": "OutNodes"}
-    bases = reduce_bodies(bodies, [lap], modes=14, tolerance=tolerance, each={
+    bases = reduce_bodies(bodies, [lap], modes=14, tolerance=1e-4, each={
         "beam": {"points": points, "loads": [name for pair in THREADS for name in pair]}})
     basis, (_, hertz, ratio) = assembled_basis(bases, {"lap": lap}), PUBLISHED[0]
+    basis = basis.select(range(modes))
     return lap, replace(basis, damping=4.0 * np.pi * hertz * ratio * np.eye(basis.modes))
 
 
-def bolted(lap: Pairing, basis: fc.ModalBasis) -> fc.ContactSystem:
-    """The beam with tightened bolts, and the friction that belongs to the pressure in the lap."""
+@dataclass(frozen=True)
+class Surface:
+    """Measured asperities, and the shape of the faces of the lap.
+
+    density is that of the gaps of asperities at equal distances from 0 to gap_range [m], per_area
+    their number [1/m^2], radius that of a pair [m], places (k, 2) and gaps (k,) those of the lap
+    [m].
+    """
+
+    density: tuple[float, ...]
+    gap_range: float
+    per_area: float
+    radius: float
+    places: np.ndarray
+    gaps: np.ndarray
+
+    @classmethod
+    def read(cls, file: Path) -> "Surface":
+        """From the file that Porter and Brake published."""
+        found = loadmat(file)
+        grid = found["mesoscale_xygap"]
+        grid = grid[np.isfinite(grid).all(axis=1)]
+        return cls(tuple(found["pzinterp"][0]), float(found["z_max"].item()),
+                   float(found["area_density"].item()), float(found["Re"].item()), grid[:, :2],
+                   grid[:, 2])
+
+    def law(self, lap: Pairing, yield_stress: float = YIELD) -> AsperityContact:
+        """Law of the new faces of the lap."""
+        return AsperityContact(tuple(self.per_area * lap.tributary), self.radius,
+                               0.5 * MODULUS / (1.0 - POISSON**2), self.gap_range, self.density,
+                               yield_stress, POISSON)
+
+    def gap(self, lap: Pairing) -> tuple[float, ...]:
+        """Mean gap of the patch about each contact node, zero at the closest one [m]."""
+        middle = 0.5 * (lap.places.min(axis=0) + lap.places.max(axis=0))
+        places = (lap.places - middle)[:, :2]
+        near = ((self.places[:, None] - places) ** 2).sum(axis=2).argmin(axis=1)
+        found = np.array([self.gaps[near == node].mean() for node in range(len(places))])
+        return tuple((found - found.min()).tolist())
+
+
+def bolted(
+    lap: Pairing, basis: fc.ModalBasis, surface: Surface, *, shaped: bool = False,
+    yield_stress: float = YIELD,
+) -> fc.ContactSystem:
+    """The beam with tightened bolts, whose asperities have been flattened by them.
+
+    The lap is flat, or has the measured shape.
+    """
     load = fc.Load(forces=tuple(
         fc.PointLoad(f"beam.{name}", "z", signal=sign * BOLT)
         for pair in THREADS for name, sign in zip(pair, (1.0, -1.0), strict=True)))
-    normal = ExponentialContact(PRESSURE * lap.tributary.sum(), DEPTH)
-    plain = fc.ContactSystem(basis, normal, IwanFriction(1.0, COEFFICIENT, ELEMENTS), load=load)
-    pressed = fc.equilibrium(plain).normal_force
-    return fc.ContactSystem(basis, normal, IwanFriction(RATIO * pressed / DEPTH, COEFFICIENT,
-                                                        ELEMENTS), load=load)
+    gap = surface.gap(lap) if shaped else 0.0
+    new, share = surface.law(lap, yield_stress), lap.tributary / lap.tributary.sum()
+    pressed = fc.equilibrium(fc.ContactSystem(basis, new, IwanFriction(1.0, COEFFICIENT, ELEMENTS),
+                                              load=load, gap=gap)).penetration
+    return fc.ContactSystem(basis, new.flattened(pressed), new.friction(
+        share, pressed, COEFFICIENT, ELEMENTS), load=load, gap=gap)
 
 
 def stuck_modes(system: fc.ContactSystem) -> tuple[LoadHistory, np.ndarray]:
@@ -109,33 +162,37 @@ def backbone(system: fc.ContactSystem, rest: LoadHistory, largest: float) -> Non
                           options=ContinuationOptions(points=100, step=0.2, largest_step=1.0))
 
 
-def draw(mode: NonlinearMode, path: Path) -> None:
+def draw(modes: Mapping[str, NonlinearMode], path: Path) -> None:
     """Frequency, relative to that of small amplitudes, and damping beside the published ones."""
     with new_figure(9.0, 3.6, path) as figure:
-        frequency, damping = figure.subplots(1, 2)
-        for axes, own, column, label in (
-                (frequency, 100.0 * (mode.frequency_hz / mode.frequency_hz[0] - 1.0),
-                 100.0 * (PUBLISHED[:, 1] / PUBLISHED[0, 1] - 1.0), "change of frequency [%]"),
-                (damping, 100.0 * mode.damping_ratio, 100.0 * PUBLISHED[:, 2],
-                 "damping ratio [%]")):
-            axes.plot(1e6 * mode.amplitude, own, color=COLOURS[0], label="this model")
-            axes.plot(1e6 * PUBLISHED[:, 0], column, "o", color=COLOURS[1], ms=4.0,
-                      label="Porter and Brake 2023")
-            axes.set(xlabel="amplitude of the end [um]", ylabel=label)
-            axes.set_xscale("log")
-            axes.set_xlim(left=0.9)
-            axes.legend()
+        axes = figure.subplots(1, 2)
+        for k, (name, mode) in enumerate(modes.items()):
+            for one, values in zip(axes, (
+                    100.0 * (mode.frequency_hz / mode.frequency_hz[0] - 1.0),
+                    100.0 * mode.damping_ratio), strict=True):
+                one.plot(1e6 * mode.amplitude, values, color=COLOURS[k], label=name)
+        for one, values, label in zip(axes, (
+                100.0 * (PUBLISHED[:, 1] / PUBLISHED[0, 1] - 1.0), 100.0 * PUBLISHED[:, 2]),
+                ("change of frequency [%]", "damping ratio [%]"), strict=True):
+            one.plot(1e6 * PUBLISHED[:, 0], values, "o", color="black", ms=4.0,
+                     label="flat, Porter and Brake 2023")
+            one.set(xlabel="amplitude of the end [um]", ylabel=label)
+            one.set_xscale("log")
+            one.set_xlim(left=0.9)
+        axes[1].legend()
 
 
-def draw_pressure(lap: Pairing, system: fc.ContactSystem, path: Path) -> None:
+def draw_pressure(lap: Pairing, systems: Mapping[str, fc.ContactSystem], path: Path) -> None:
     """Pressure of the contact nodes in the lap under the bolts [MPa]."""
-    force = fc.equilibrium(system).normal_force
-    with new_figure(9.0, 2.6, path) as figure:
-        axes = figure.subplots()
-        shown = axes.scatter(1e3 * lap.places[:, 0], 1e3 * lap.places[:, 1], s=260.0, marker="s",
-                             c=1e-6 * force / lap.tributary, cmap="viridis")
-        figure.colorbar(shown, label="pressure [MPa]")
-        axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", ylim=(-16.0, 16.0))
+    with new_figure(9.0, 2.4 * len(systems), path) as figure:
+        every = np.atleast_1d(figure.subplots(len(systems), 1))
+        for axes, (name, system) in zip(every, systems.items(), strict=True):
+            force = fc.equilibrium(system).normal_force
+            shown = axes.scatter(1e3 * lap.places[:, 0], 1e3 * lap.places[:, 1], s=260.0,
+                                 marker="s", c=1e-6 * force / lap.tributary, cmap="viridis")
+            figure.colorbar(shown, label="pressure [MPa]")
+            axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", ylim=(-16.0, 16.0),
+                     title=name)
 
 
 def print_free_modes(frequencies_hz: np.ndarray) -> None:
@@ -145,25 +202,32 @@ def print_free_modes(frequencies_hz: np.ndarray) -> None:
                                for found, known in zip(free, WITHOUT_CONTACT, strict=True)))
 
 
-def main(deck: Path, folder: Path, quick: bool) -> None:
-    """Prints frequencies and the backbone; pictures in the folder."""
+def main(deck: Path, file: Path, folder: Path, quick: bool) -> None:
+    """Prints frequencies and the backbones; pictures in the folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    body = beam(deck)
-    lap, basis = reduced(body, (8, 2) if quick else (12, 3))
+    lap, basis = reduced(beam(deck), *(((8, 2), 60) if quick else ((12, 3), 90)))
     print_free_modes(basis.frequencies_hz)
-    system = bolted(lap, basis)
-    rest, frequencies = stuck_modes(system)
-    print(f"bolted: {frequencies[frequencies > 20.0][0]:.2f} Hz with stuck contacts (published "
-          f"{PUBLISHED[0, 1]:.2f} Hz)")
-    draw_pressure(lap, system, folder / "brake_reuss_pressure.png")
-    mode = backbone(system, rest, 4e-6 if quick else 1.6e-5)
-    for amplitude, hertz, ratio in PUBLISHED:
-        if mode.amplitude[0] <= amplitude <= mode.amplitude[-1]:
-            own = [np.interp(amplitude, mode.amplitude, found)
-                   for found in (mode.frequency_hz, mode.damping_ratio)]
-            print(f"{1e6 * amplitude:5.2f} um: {own[0]:.2f} Hz, damping ratio {own[1]:.5f} "
-                  f"(published {hertz:.2f} Hz, {ratio:.5f})")
-    draw(mode, folder / "brake_reuss_backbone.png")
+    surface = Surface.read(file)
+    systems = {"flat": bolted(lap, basis, surface),
+               "flat, elastic": bolted(lap, basis, surface, yield_stress=0.0),
+               "measured shape": bolted(lap, basis, surface, shaped=True)}
+    modes = {}
+    for name, system in systems.items():
+        rest, frequencies = stuck_modes(system)
+        print(f"{name}: {frequencies[frequencies > 20.0][0]:.2f} Hz with stuck contacts "
+              f"(published, flat {PUBLISHED[0, 1]:.2f} Hz)", flush=True)
+        modes[name] = mode = backbone(system, rest, 4e-6 if quick else 1.6e-5)
+        print("amplitude [um], change of frequency [%] and damping ratio, both published for flat")
+        for amplitude, hertz, ratio in PUBLISHED:
+            if mode.amplitude[0] <= amplitude <= mode.amplitude[-1]:
+                own, damping = (np.interp(amplitude, mode.amplitude, found)
+                                for found in (mode.frequency_hz, mode.damping_ratio))
+                print(f"{1e6 * amplitude:5.2f} {100.0 * (own / mode.frequency_hz[0] - 1.0):+.3f} "
+                      f"{damping:.5f} {100.0 * (hertz / PUBLISHED[0, 1] - 1.0):+.3f} {ratio:.5f}",
+                      flush=True)
+    draw_pressure(lap, {name: systems[name] for name in ("flat", "measured shape")},
+                  folder / "brake_reuss_pressure.png")
+    draw(modes, folder / "brake_reuss_backbone.png")
 
 
 if __name__ == "__main__":
@@ -171,8 +235,8 @@ if __name__ == "__main__":
     if given and given[0].is_file() and "--second-order" in sys.argv:
         second = fc.ElasticBody(fc.read_mesh(given[0]), degree=2)
         print_free_modes(eigenfrequencies_hz(second, 10))
-    elif given and given[0].is_file():
-        main(given[0], *given[1:2] or [Path()], quick="--quick" in sys.argv)
+    elif len(given) > 1 and given[0].is_file() and given[1].is_file():
+        main(given[0], given[1], given[2] if len(given) > 2 else Path(), "--quick" in sys.argv)
     else:
-        print("Give the deck of the Brake-Reuss beam (an .inp file) as the first argument; there "
-              "is nothing to compute without it.")
+        print("Give the deck of the Brake-Reuss beam (an .inp file) and its surface (a .mat file) "
+              "as first arguments; there is nothing to compute without them.")

@@ -267,7 +267,8 @@ def _undamped(
         slope = complex(s @ E @ r / (s @ r))
         change = -value.real / slope.real
         xi, value = xi + change, value + change * slope
-        if abs(change) <= _SETTLED * abs(value):
+        # Eigenvalues have the rounding of the largest one.
+        if abs(change) <= _SETTLED * np.abs(eigenvalues).max():
             return float(value.imag), np.asarray(r / np.linalg.norm(r)), float(xi)
     raise AnalysisError(f"The linear mode at {value.imag / (2.0 * np.pi):.5g} Hz is damped too "
                         f"strongly to be followed: with less damping it does not become an "

@@ -203,9 +203,9 @@ class AsperityContact(NormalLaw):
         """Zero (n,), where the first asperities touch."""
         return np.full(nodes, 0.0 if self.kernel is _asperities else -np.inf)
 
-    def flattened(self, penetration: PerNode) -> "AsperityContact":
+    def flattened(self, penetration: PerNode | Array) -> "AsperityContact":
         """The law after the face, or each node, has been pressed in so far [m]."""
-        given = np.maximum(penetration, 0.0)
+        given = np.maximum(np.asarray(penetration, dtype=float), 0.0)
         return replace(self, deepest=tuple(given.tolist()) if given.ndim else float(given))
 
     def friction(
