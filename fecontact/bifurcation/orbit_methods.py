@@ -25,15 +25,14 @@ class Collocation:
     tolerance : float
         Largest error of the parameter of special points, in widths of the diagram: each is located
         again on twice the intervals until its ``parameter_error`` is smaller, up to
-        ``most_intervals``. It then keeps the mesh that suffices.
+        ``most_intervals``.
     most_intervals : int
-        Limit for that, and for the intervals of all other points. The checks of a special point may
-        use more: twice its intervals, for a coefficient up to 16 times ``intervals``.
+        Largest number of intervals of a point. The checks of a special point may use more: twice
+        its intervals, for a coefficient up to 16 times ``intervals``.
     state_tolerance : float, optional
-        Largest error of the states of an orbit between the ends of intervals, in their ranges over
-        it: where the estimate 'state_error' exceeds it, a point is found again on more intervals,
-        which become fewer again where that leaves a tenth of it. None keeps ``intervals``.
-        Newton's method ends with steps of a hundredth of it at most.
+        Largest error 'state_error' of the states of an orbit, relative to their ranges. Above it a
+        point is computed again on more intervals; below a tenth of it their number falls again.
+        None keeps ``intervals``. The last Newton step is at most a hundredth of it.
 
     Raises
     ------

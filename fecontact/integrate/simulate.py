@@ -90,12 +90,12 @@ def simulate(
         Auto, the default, chooses one of the next three (docs/integrator.md). The next three are
         for set-valued friction and rigid stops; Scipy and CVODE are references.
     rtol : float
-        Relative tolerance; absolute ones follow from it and the scales of laws, or of states.
+        Tolerance of the local error of each state, relative to its largest value so far.
     max_step : float, optional
         Longest step [s]; by default a fraction of the shortest period of drive, loads and waves.
         Give it for a vector field with a brief excitation.
     events : ContactEvents, Crossing, Event or sequence of them, optional
-        Located within the steps and stored in :attr:`Trajectory.events`.
+        Events to locate within the steps; stored in :attr:`Trajectory.events`.
     keep_steps : bool
         Whether a run keeps motion between the outputs for plots; see :attr:`Trajectory.kept`.
     progress : bool or callable, optional

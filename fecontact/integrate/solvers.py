@@ -97,13 +97,13 @@ class CompiledSolver(Solver):
 
 @dataclass(frozen=True)
 class Auto(CompiledSolver):
-    """The fastest of the compiled solvers for a system and a tolerance; the default.
+    """Choice of a compiled solver by the system and the tolerance; the default.
 
-    Auto chooses, in this order: :class:`PowerSeries` if the system allows them and has up to four
-    modes and nodes, no derivatives are asked for, and no mode is several hundred times faster than
-    the slowest motion; :class:`Radau` if the system allows it and ``rtol`` is 1e-7 or less;
-    :class:`Rodas5P`. Vector fields are run by Rodas5P. ``statistics["method"]`` of a run names the
-    solver.
+    Auto takes the first of these solvers whose conditions hold. :class:`PowerSeries`: the system
+    allows it and has up to four modes and four nodes, no derivatives are requested, and no mode is
+    several hundred times faster than the slowest motion. :class:`Radau`: the system allows it, and
+    ``rtol`` is 1e-7 or less. :class:`Rodas5P`: always, and for vector fields.
+    ``statistics["method"]`` of a run names the solver.
     """
 
     method: ClassVar[str] = "auto"
@@ -125,9 +125,9 @@ class Rodas5P(CompiledSolver):
 
 @dataclass(frozen=True)
 class Radau(CompiledSolver):
-    """Compiled collocation of order 9 (Radau IIA), with long steps where little error is allowed.
+    """Compiled collocation of order 9 (Radau IIA), for small tolerances.
 
-    For plane systems of up to four modes and two nodes on flat ground, of laws without memory,
+    For plane systems of up to four modes and two nodes on flat ground, with laws without memory,
     without events. Steps end where forces switch.
 
     References
@@ -143,7 +143,7 @@ class Radau(CompiledSolver):
 class PowerSeries(CompiledSolver):
     """Power series in time between switches of contacts, exact to nearly round-off.
 
-    If laws are polynomials piece by piece, the coefficients of the motion follow from a recursion.
+    For piecewise polynomial laws the coefficients of the motion follow from a recursion.
     Series need a plane system on flat ground without friction, with
     :class:`~fecontact.laws.RoughSurface` or :class:`~fecontact.laws.LinearContact`, or
     :class:`~fecontact.laws.PowerContact` or :class:`~fecontact.laws.TwoSidedStop` with exponents 1
@@ -192,9 +192,9 @@ class SetValued(Solver):
         R_j = \mu(|v_j|) F_j\, \mathrm{sign}(v_j) \ \text{ else}
 
     This is the limit of infinite ``smoothing_slope``, which friction laws must have. On solids R
-    and v are vectors along the tangents, R is in the direction of v, and the set is a disc. Plane
-    bodies of up to eight independent slip velocities, and all with rigid stops, are run by
-    :class:`EventDriven`, others by :class:`TimeStepping`; ``statistics["method"]`` says which.
+    and v are vectors along the tangents, R is in the direction of v, and the set is a disc.
+    :class:`EventDriven` runs plane bodies of up to eight independent slip velocities, and all plane
+    bodies with rigid stops. :class:`TimeStepping` runs others. ``statistics["method"]`` says which.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ class SetValued(Solver):
         says so. Poisson's law does not; it is for plane bodies.
     tangential_restitution : float, (n,) sequence or mapping
         Newton's coefficient along the ground, from 0 to 1, of contacts that stick in an impact;
-        given in the same ways. Nodes that always move along the ground together need one value.
+        given in the same ways. Nodes that always slip together need one value.
 
     Raises
     ------
@@ -272,9 +272,9 @@ class SetValued(Solver):
 
 @dataclass(frozen=True)
 class EventDriven(SetValued):
-    """:class:`SetValued` from event to event, by steps of order 8 that end at stick and slip.
+    """:class:`SetValued` by an explicit method of order 8 whose steps end at stick and slip.
 
-    For plane bodies whose nodes have independent slip velocities, equal ones counted once.
+    For plane bodies whose nodes have independent slip velocities; equal ones count once.
     """
 
     method: ClassVar[str] = "event-driven"
@@ -284,8 +284,8 @@ class EventDriven(SetValued):
 class TimeStepping(SetValued):
     """:class:`SetValued` by implicit steps of order 3, for any number of nodes and for solids.
 
-    Steps do not end where nodes begin to stick or slip: there they are of first order. Rigid stops
-    are for solids alone, with Moreau's impacts at the ends of steps; events are not located.
+    Steps do not end where nodes begin to stick or slip; the order is one there. Events are not
+    located. Rigid stops are for solids only, by the scheme of Moreau and Jean.
     """
 
     method: ClassVar[str] = "time-stepping"

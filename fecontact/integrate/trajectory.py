@@ -31,12 +31,12 @@ class Status(Enum):
                     "until then is kept.")
     ENERGY_GREW = ("The stored energy grew by more than all work put in: a law or the tolerance is "
                    "at fault; see the energy balance.")
-    NOT_FINITE = "The motion grew beyond all numbers; what was computed until then is kept."
-    ENERGY_NOT_FINITE = ("Energies or forces of the run are beyond all numbers, so that nothing "
-                         "can be said of their balance: a speed, a load or a stiffness is far out "
-                         "of range.")
-    PARADOX = "Rigid stops with friction have no acceleration, or several (Painleve's paradox)."
-    IMPACT_UNSOLVED = "No impulses meet the conditions of an impact with friction."
+    NOT_FINITE = "The motion is no longer finite; what was computed until then is kept."
+    ENERGY_NOT_FINITE = ("Energies or forces of the run are not finite, and their balance is "
+                         "unknown: a speed, a load or a stiffness is far out of range.")
+    PARADOX = ("The contact conditions at rigid stops with friction have no solution for the "
+               "accelerations, or several (Painleve's paradox).")
+    IMPACT_UNSOLVED = "The conditions of an impact with friction have no solution for the impulses."
     IMPACT_GAINED = "An impact gained energy: use equal restitutions, or impact_law = 'poisson'."
     FAILED = "The integrator could not go on; what was computed until then is kept."
 

@@ -82,7 +82,7 @@ class EquilibriumProblem(Problem):
                                          self.values(u), (self.index,))
         matrix = np.concatenate([J[0], P[0]], axis=1)
         if not max(np.abs(f).max(), np.abs(matrix).max()) < _OVERFLOW:
-            raise AnalysisError("The rates grow beyond all numbers there.")
+            raise AnalysisError("The rates are not finite there.")
         return _Bordered(f[0], matrix)
 
     def weights(self) -> Array:

@@ -289,7 +289,7 @@ class EventLinearisation:
                   / self.problem.scales[:d, None] * self.problem.scales[:d])
         found: NDArray[np.complex128] = np.zeros(d, dtype=complex)
         if not np.isfinite(scaled).all():
-            raise AnalysisError("The multipliers grow beyond all numbers there.")
+            raise AnalysisError("The multipliers are not finite there.")
         found[:rank] = np.linalg.eigvals(image.T @ scaled @ image)
         found = by_falling_modulus(found)
         trivial = None if self.problem.forced else int(np.argmin(np.abs(found - 1.0)))

@@ -49,7 +49,7 @@ def _step(solver: Any) -> str | None:
             message = solver.step()
     except (ValueError, ArithmeticError, np.linalg.LinAlgError):
         # scipy's linear algebra raises this for values that are not finite.
-        return "The motion grew beyond all numbers."
+        return "The motion is no longer finite."
     if solver.status == "failed":
         return str(message)
-    return None if np.isfinite(solver.y).all() else "The motion grew beyond all numbers."
+    return None if np.isfinite(solver.y).all() else "The motion is no longer finite."

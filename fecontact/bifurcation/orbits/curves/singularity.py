@@ -229,7 +229,7 @@ def _critical_pair(mu: list[complex], autonomous: bool) -> tuple[int, int]:
     if autonomous:
         places.remove(min(places, key=lambda place: abs(mu[place] - 1.0)))
     if len(places) < 2:
-        raise AnalysisError("The multipliers beside the orbit grow beyond all numbers.")
+        raise AnalysisError("The multipliers beside the orbit are not finite.")
     return min(combinations(places, 2), key=lambda both: abs(mu[both[0]] * mu[both[1]] - 1.0))
 
 
