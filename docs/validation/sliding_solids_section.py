@@ -30,8 +30,8 @@ def section(images: Path) -> str:
 
 A steel pad of 60 x 36 x 30 mm on a belt, pressed and held at its top (`tipping_pad.py`).
 Friction mu N moves the resultant of the pressure ahead by mu h, h = 30 mm, on belts in any
-direction. The edge that lifts off: largest difference from a rigid pad on springs that do not pull,
-solved as three equations, in parts of the largest force; with six modes the pad is rigid.
+direction. The rows with an edge that lifts off give the largest difference from a rigid pad on
+unilateral springs (three equations), relative to the largest force. Six modes make the pad rigid.
 
 {comparisons(pad)}
 

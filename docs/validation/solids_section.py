@@ -150,22 +150,21 @@ def sphere_of_elements(images: Path) -> str:
     save(plot_shear(found.history, 1), images / "pressed-sphere-shear.png")
     return f"""## An elastic sphere on a rigid plane
 
-The lowest part of such a sphere, of finite elements (Q2, nu = 0.49), on a rigid plane: pressed, and
-sheared by +-Q, Q = 0.9 mu P, in increments without time (`pressed_sphere.py`; so many
-elements along the radius of the contact). The plane is that of symmetry of two such spheres: half
-of their approach, displacement and loss. The body is five times as wide and high as the contact,
-and what it lacks of a half-space is taken from uniform tractions on the same face: 5 % of the
-approach, 4 % of the displacement, nothing of forces, radii and loss. Radii follow from second
-moments of the tractions. The loss is a small difference of large works: its error falls from 7 to
-2 %.
+The lowest part of such a sphere is modelled by finite elements (Q2, nu = 0.49). It is pressed on a
+rigid plane and sheared by +-Q, Q = 0.9 mu P, in quasi-static increments (`pressed_sphere.py`). Rows
+give the number of elements along the radius of the contact. The plane is the plane of symmetry of
+two such spheres; the sphere has half of their approach, displacement and loss. The body is five
+times as wide and high as the contact. The missing compliance of the half-space is computed from
+uniform tractions on the same face: 5 % of the approach, 4 % of the displacement; forces, radii and
+loss need no correction. Radii follow from second moments of the tractions. The loss is a small
+difference of large works: its error falls from 7 to 2 %.
 
-Friction has two directions here: across the load, where Cattaneo and Mindlin have none, it reaches
-12 % of the largest. That accounts for the displacement, which stays 0.25 and 0.28 % short with both
-meshes. The picture shows what two directions change in a half-space of Cerruti's squares under
-Hertz's pressure, without any finite elements: nothing without Poisson's ratio, -0.30 % at nu = 0.49
-and Q = 0.9 mu P. At smaller Q the ring that slips is an element wide or less, and the mesh errs by
-more, up to 2.5 % at 0.18 mu P. That the plane keeps the face of this small body from tilting is
-worth 0.05 %.
+Friction across the load, which Cattaneo and Mindlin neglect, reaches 12 % of the largest friction.
+This explains why the displacement is 0.25 and 0.28 % too small with both meshes. The picture shows
+the effect of this friction in a half-space of Cerruti's squares under Hertz's pressure, without
+finite elements: zero for nu = 0, -0.30 % at nu = 0.49 and Q = 0.9 mu P. At smaller Q the slipping
+ring is an element wide or less, and the error of the mesh is larger, up to 2.5 % at 0.18 mu P. The
+plane keeps the face of this small body from tilting, an effect of 0.05 %.
 
 {comparisons(rows)}
 
