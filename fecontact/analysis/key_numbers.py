@@ -65,7 +65,7 @@ class KeyNumbers:
         if found.kind == "unknown":
             return "unknown: too few output times"
         if found.period is None:
-            return f"no, it repeats only to within {100.0 * found.misfit:.3g} % of its size"
+            return f"no, motion repeats with an error of {100.0 * found.misfit:.3g} % of its size"
         text = f"yes, periodic with {quantity(found.period, 's', 4)}"
         if self.drive_period is None:
             return text

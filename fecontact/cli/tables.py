@@ -124,8 +124,8 @@ def wear_table(history: "WearHistory", basis: "ModalBasis") -> Any:
 
 
 def complex_table(modes: "ComplexModes", highest_hz: float) -> Any:
-    """Frequencies and damping ratios of complex modes up to a frequency, and which of them grow."""
-    rows = [(str(number), f"{hertz:.6g}", f"{ratio:.3%}", "grows" if grows else "")
+    """Frequencies and damping ratios of complex modes up to a frequency; unstable ones marked."""
+    rows = [(str(number), f"{hertz:.6g}", f"{ratio:.3%}", "unstable" if grows else "")
             for number, (hertz, ratio, grows) in enumerate(zip(
                 modes.frequencies_hz.tolist(), modes.damping_ratios.tolist(),
                 modes.grows.tolist(), strict=True)) if hertz <= highest_hz]

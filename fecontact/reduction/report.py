@@ -164,10 +164,10 @@ class BasisReport:
 
     @property
     def kinds(self) -> list[str]:
-        """Kind of each mode: rigid, vibration, or one that completes the basis."""
+        """Kind of each mode: rigid, vibration, residual vector, or reduced (without vibrations)."""
         quality = self.basis.quality
         vibrations = self.basis.modes if quality is None else quality.vibration_modes
-        other = "reduced" if vibrations == self.basis.rigid_modes else "completing"
+        other = "reduced" if vibrations == self.basis.rigid_modes else "residual"
         return ["rigid" if w == 0.0 else "vibration" if mode < vibrations else other
                 for mode, w in enumerate(self.basis.angular_frequencies)]
 
@@ -202,7 +202,7 @@ class BasisReport:
                       f"effective mass kept: {_along_axes(mass.sum(axis=1))}",
                       f"mass-orthogonality: {self.orthogonality:.1e}"]
         if self.highest_frequency_hz > 0.0:
-            lines.append(f"highest frequency: {self.highest_frequency_hz:.6g} Hz, resolved by "
+            lines.append(f"highest frequency: {self.highest_frequency_hz:.6g} Hz, resolved by time "
                          f"steps of {self.time_step:.2g} s")
         if basis.rotation is not None:
             lines.append(f"frequencies are those at rest, the body rotates at "

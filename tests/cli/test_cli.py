@@ -566,9 +566,9 @@ def test_complex_modes_and_a_movie_of_one(cli, study, monkeypatch):
     # On the spring, 1.57 kg/m over 0.1 m: sqrt(1e4 / 0.157) / (2 pi) = 40.17 Hz.
     assert re.search(r"steady sliding:\s+mode .*\s+\S+\s+0 +40\.1\d+ ", out)
     every = cli("modes", study, "--complex", "--all", *spring)[1]
-    left_out = int(re.search(r"note: (\d+) modes beyond .* --all shows them", out)[1])
+    left_out = int(re.search(r"note: (\d+) modes above .* --all shows these modes", out)[1])
     assert left_out > 0
-    assert "modes beyond" not in every
+    assert "modes above" not in every
     table, whole = (len(text.partition("steady sliding:")[2].splitlines()) for text in (out, every))
     assert whole - table >= left_out - 2
     assert cli("modes", study, "--movie", "0")[0] == 0

@@ -186,9 +186,9 @@ def modes(
             plot_modes(one, path=picture)
             echo_written(picture)
         if interfaces:
-            echo("\nPart of the static compliance that the modes resolve [%], under uniform "
-                 "pressure and normal\nforces at single nodes (mean and worst), then under "
-                 "traction and tangential forces:")
+            echo("\nStatic compliance that the modes resolve [%]: under uniform pressure, and "
+                 "under normal forces\nat single nodes (mean and worst node); under uniform "
+                 "traction, and under tangential forces\nat single nodes (mean and worst node):")
             show(compliance_table(interfaces))
             for face in interfaces:
                 if not face.enough:
@@ -204,9 +204,9 @@ def modes(
             show(complex_table(sliding, usable))
             if beyond.any():
                 growing = np.count_nonzero(sliding.grows & beyond)
-                echo(f"note: {np.count_nonzero(beyond)} modes beyond {quantity(usable, 'Hz')}, up "
-                     f"to which the basis is usable, are left out, {growing} of them growing; "
-                     f"--all shows them.")
+                echo(f"note: {np.count_nonzero(beyond)} modes above {quantity(usable, 'Hz')} are "
+                     f"left out, because the basis is not accurate there; {growing} of them are "
+                     f"unstable. --all shows these modes.")
         if movie is not None:
             from fecontact.output.render.mode_movie import render_mode
 
