@@ -7,13 +7,18 @@ import numpy as np
 import pytest
 from solid_blocks import block_mesh, mixed_mesh
 
+import fecontact.fem.assembly as assembly
+import fecontact.fem.elastic_body as elastic_body
 from fecontact import (
     ElasticBody,
+    Load,
     Material,
     Mesh,
     MeshError,
+    PointLoad,
     modal_basis,
     read_mesh,
+    static_solution,
     write_mesh,
 )
 from fecontact.fem import BodyFields, Tie, stress_of
@@ -359,6 +364,25 @@ def test_frequencies_of_wedges_are_those_of_calculix(tmp_path, order, expected, 
     assert mesh.cell_counts == {"wedges": 32}
     found = eigenfrequencies_hz(ElasticBody(mesh, degree=order), 10)[6:]
     assert found == pytest.approx(expected, rel=tolerance)
+
+
+def test_wedges_at_two_points_bend_as_those_of_calculix(tmp_path, monkeypatch):
+    """The bar of 32 wedges C3D6, clamped, in CalculiX 2.20, with two points of quadrature."""
+    nodes, cells = wedges((8, 2, 1))
+    mesh = read_mesh(deck(tmp_path / "a.inp", nodes, cells))
+    line = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
+    points = np.column_stack([np.full((2, 2), 1.0 / 3.0), line])
+    monkeypatch.setattr(elastic_body, "rule_of", lambda *_: (points, np.full(2, 0.25)))
+    monkeypatch.setattr(assembly, "_AFFINE", -1.0)
+    mesh = Mesh(mesh.nodes, mesh.cells, points={
+        "left": np.flatnonzero(mesh.nodes[:, 0] == 0.0),
+        "tip": int(np.linalg.norm(mesh.nodes - SIZE, axis=1).argmin())})
+    body = ElasticBody(mesh, degree=1, fixed={"left": "xyz"})
+    moved = static_solution(body, Load(forces=[
+        PointLoad("tip", way, signal=value) for way, value in zip("xyz", (300.0, 100.0, -200.0),
+                                                                 strict=True)]))
+    assert moved.displacement[mesh.points["tip"][0]] == pytest.approx(
+        [1.205412e-05, 4.407443e-06, -1.479856e-04], rel=1e-6)
 
 
 def test_second_order_wedges_follow_curved_faces(tmp_path):

@@ -13,6 +13,7 @@ from fecontact import (
     Interface,
     Load,
     Material,
+    Mesh,
     PointLoad,
     Study,
     basis_from_matrices,
@@ -33,6 +34,7 @@ from fecontact.bifurcation import (
     periodic_motion,
 )
 from fecontact.fem import CyclicSymmetry, Ring, Rotation
+from fecontact.fem.standing_frame import convective_matrices
 from fecontact.io import read_basis, write_basis
 from fecontact.laws import Frictionless, Harmonic, LinearContact
 from fecontact.reduction import PointPairing, Spring, assembled_basis, linked, sector_modes
@@ -185,3 +187,18 @@ def test_bodies_without_axis_do_not_stand():
         "element_size = 0.06\n[body]\nfixed = { inner = 'xyz' }\n[body.rotation]\nspeed = 300.0\n"
         "frame = 'standing'\n[basis]\nmodes = 6\ncontact = []\n")
     assert study.modal_basis().rotation.standing
+
+
+def test_each_material_has_its_density():
+    """int rho N_phi^T N_phi of the displacement x is int rho y^2, half the polar moment."""
+    ring = generate(Ring(0.5, 0.4, 0.1, element_size=0.1, layers=2))
+    low = ring.nodes[ring.cells].mean(axis=1)[:, 2] < ring.nodes[:, 2].mean()
+    mesh = Mesh(ring.nodes, ring.cells, ring.boundaries, {}, ring.curved_edges,
+                   ring.curved_middles, cell_groups={"low": np.flatnonzero(low),
+                                                     "high": np.flatnonzero(~low)})
+    body = ElasticBody(mesh, {"low": Material(density=1000.0),
+                                 "high": Material(density=5000.0)})
+    turning = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    _, second = convective_matrices(body, turning, np.zeros(3))
+    x, y, _ = body.nodes.T
+    assert x @ (second @ x) == pytest.approx(y @ (body.component_mass @ y), rel=1e-9)
