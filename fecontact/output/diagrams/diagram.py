@@ -50,12 +50,12 @@ class Curve:
 
     @property
     def solid(self) -> NDArray[np.bool_] | None:
-        """Which pieces (N - 1,) between neighbours are solid lines; None if all are."""
+        """Flags (N - 1,) of pieces between neighbours that are solid lines; None if all are."""
         return np.zeros(len(self.x) - 1, dtype=np.bool_) if self.dashed else self.stable
 
     @property
     def partly_unstable(self) -> bool:
-        """Whether any piece is unstable."""
+        """True if any piece is unstable."""
         return self.stable is not None and not self.stable.all()
 
 
