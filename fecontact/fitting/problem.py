@@ -85,6 +85,12 @@ class Problem:
         study.reuse(self.model)
         return study.system()
 
+    def predicted(self, u: Array) -> Array:
+        """Numbers (n,) of the model at places u (p,); FecontactError if it has none there."""
+        with quiet():
+            system = self.system(u)
+            return np.concatenate([_of(one, system) for one in self.data])
+
     def key(self) -> str:
         """Hash of all that the numbers depend on."""
         model = (self.model.to_toml() if isinstance(self.model, Study)
@@ -160,9 +166,7 @@ class Evaluator:
     def _evaluated(self, u: Array) -> Array | str:
         self.evaluations += 1
         try:
-            with quiet():
-                system = self.problem.system(u)
-                return np.concatenate([_of(one, system) for one in self.problem.data])
+            return self.problem.predicted(u)
         except FecontactError as error:
             return str(error)
 

@@ -67,6 +67,13 @@ def test_a_study_is_fitted(study, cli, tmp_path):
         found["friction.stiffness"])
     assert (folder / "fit.png").stat().st_size > 5000
     before = (folder / "start-0.jsonl").read_text()
+    code, out, told = cli("fit", str(study), "-o", str(folder), "--posterior", "30")
+    assert code == 0
+    assert "posterior, in SI units" in out
+    assert "shorter than 50 autocorrelation times" in told
+    chains = json.loads((folder / "fit.json").read_text())["posterior"]
+    median = chains["parameters"]["friction.stiffness"]["median"]
+    assert abs(median - found["friction.stiffness"]) < 4.0 * found.deviations["friction.stiffness"]
     assert cli("fit", str(study), "-o", str(folder))[0] == 0
     assert (folder / "start-0.jsonl").read_text() == before
     # Another start of the model is another fit.
