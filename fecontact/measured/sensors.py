@@ -138,8 +138,8 @@ class Accelerometer(Sensor):
     Parameters
     ----------
     point : str, int or place
-        Named point, number of a contact node on the ground, or place in the body [m]. A sensor with
-        a mass needs a named point.
+        Named point, number of a contact node on the ground, or place in the body, in m. A sensor
+        with a mass needs a named point.
     direction : '+x', '-x', '+y', ..., (x, y) or (x, y, z)
         Direction in which it measures.
 

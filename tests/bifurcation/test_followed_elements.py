@@ -10,7 +10,7 @@ from fecontact.bifurcation import HarmonicBalance, contact_field
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.elements import follow_elements
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated, series
-from fecontact.bifurcation.harmonic.starts import corrected, problem_for
+from fecontact.bifurcation.harmonic.starts import converged_orbit, problem_for
 from fecontact.laws import (
     DahlFriction,
     Frictionless,
@@ -209,7 +209,7 @@ def test_a_travelling_other_side_holds_elements_at_their_limit():
         ground=fc.Ground(speed=2e-3 / TURN),
         drive=fc.Drive(stiffness_x=1.0, damping_x=0.02, amplitude_x=0.01, frequency_hz=1.0 / TURN))
     field = contact_field(system, ["drive.frequency_hz"])
-    problem, u = corrected(*start(field, 3, 64))
+    problem, u = converged_orbit(*start(field, 3, 64))
     assert problem.coefficients(u)[0, 0] == pytest.approx(1.0, abs=0.02)
     assert problem.linearise(u).memory.max() == pytest.approx(-2.0, abs=0.05)
 
@@ -249,7 +249,7 @@ def test_nodes_with_elements_stand_beside_nodes_with_bristles():
         basis, normal=CONSTANT,
         friction={"one": DahlFriction(0.5, 1.0), "other": JenkinsFriction(0.5, 0.3)},
         drive=fc.Drive(stiffness_x=1.0, damping_x=0.1, amplitude_x=2.0, frequency_hz=0.9 / TURN))
-    problem, u = corrected(*start(contact_field(system, ["drive.frequency_hz"]), 9, 512))
+    problem, u = converged_orbit(*start(contact_field(system, ["drive.frequency_hz"]), 9, 512))
     period = TURN / 0.9
     settled = fc.simulate(system, 60.0 * period, rtol=1e-9, outputs=np.array([0.0, 60.0 * period]))
     run = fc.simulate(system, period, initial=settled.states[-1], rtol=1e-9, outputs=513)
@@ -261,7 +261,7 @@ def test_nodes_with_elements_stand_beside_nodes_with_bristles():
 
 def test_multipliers_by_hills_matrix_know_the_elements():
     """Multipliers by Hill's matrix, one a state, agree with those of transitions."""
-    problem, u = corrected(*start(jenkins(0.5), 3, 128))
+    problem, u = converged_orbit(*start(jenkins(0.5), 3, 128))
     found = problem.linearise(u)
     by_hill = np.linalg.eigvals(found.by_states.mean(axis=0) * TURN / 0.5)
     assert len(by_hill) == 3

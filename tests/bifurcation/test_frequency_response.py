@@ -171,7 +171,7 @@ def test_a_rigid_motion_that_nothing_resists_is_named(monkeypatch):
     def no_orbit(*given):
         raise AnalysisError("Newton's method does not converge.")
 
-    for name in ("_from_rest", "_raised", "_settled"):
+    for name in ("_from_rest", "_raised", "_from_run"):
         monkeypatch.setattr(f"fecontact.bifurcation.harmonic.response.{name}", no_orbit)
     with pytest.raises(AnalysisError, match="Nothing but friction resists a rotation"):
         frequency_response(system, (40.0, 160.0))

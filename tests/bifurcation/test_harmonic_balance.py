@@ -27,7 +27,7 @@ from fecontact.bifurcation import (
 )
 from fecontact.bifurcation.harmonic.series import series
 from fecontact.bifurcation.harmonic.stability import koopman_hill
-from fecontact.bifurcation.harmonic.starts import corrected, problem_for
+from fecontact.bifurcation.harmonic.starts import converged_orbit, problem_for
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.output.files.branches import read_branch, write_branch
 
@@ -43,7 +43,7 @@ def orbit(field, guess, H, samples=None, scales=None, **values):
     for place, value in guess.items():
         X[place] = value
     u = np.append(X.reshape(-1), [1.0] * (problem.common - 1) + [p[0]])
-    return corrected(problem, u)
+    return converged_orbit(problem, u)
 
 
 def sine_motion(field, X, w):

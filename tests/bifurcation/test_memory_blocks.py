@@ -9,7 +9,7 @@ import fecontact as fc
 from fecontact.bifurcation import HarmonicBalance, contact_field
 from fecontact.bifurcation.harmonic.layout import layout_of, memory_blocks
 from fecontact.bifurcation.harmonic.memory import LEAK, solve_around
-from fecontact.bifurcation.harmonic.starts import corrected, problem_for
+from fecontact.bifurcation.harmonic.starts import converged_orbit, problem_for
 from fecontact.laws import DahlFriction, IwanFriction, JenkinsFriction, PrescribedForce
 
 FREQUENCY = "drive.frequency_hz"
@@ -72,7 +72,7 @@ def test_elements_of_one_node_are_those_of_as_many_nodes():
         field = driven(system)
         problem = problem_for(field, field.values, 0, HarmonicBalance(5, 128),
                               np.ones(field.dimension + 2))
-        problem, u = corrected(problem, np.append(np.zeros(problem.size), 1.1 / TURN))
+        problem, u = converged_orbit(problem, np.append(np.zeros(problem.size), 1.1 / TURN))
         here = problem.linearise(u)
         # The last derivatives are those to the angular frequency.
         condensed = here.condensed / np.append(np.ones(problem.size), TURN)

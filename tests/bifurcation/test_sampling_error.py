@@ -18,7 +18,7 @@ from fecontact.bifurcation import (
 from fecontact.bifurcation.continuation import newton
 from fecontact.bifurcation.harmonic import branches
 from fecontact.bifurcation.harmonic.branches import sampling_error
-from fecontact.bifurcation.harmonic.starts import corrected, problem_for, restored
+from fecontact.bifurcation.harmonic.starts import converged_orbit, problem_for, restored
 from fecontact.bifurcation.response_options import ResponseSettings
 from fecontact.core.errors import AnalysisError, InputError
 
@@ -30,7 +30,7 @@ def orbit(field, harmonics, samples, **values):
     p = field.values_with(**values)
     problem = problem_for(field, p, 0, HarmonicBalance(harmonics, samples),
                           np.ones(field.dimension + 2))
-    return corrected(problem, np.append(np.zeros(problem.size), p[0]))
+    return converged_orbit(problem, np.append(np.zeros(problem.size), p[0]))
 
 
 def fixed(u):
@@ -95,10 +95,10 @@ def test_it_is_that_of_a_contact_with_separation():
     """Against sixteen times as many samples; corners lie anywhere between two of them."""
     field = unilateral(1.3)
     for samples in (64, 128, 256):
-        problem, u = corrected(problem_for(
+        problem, u = converged_orbit(problem_for(
             field, field.values, 0, HarmonicBalance(5, samples), np.ones(4)), np.append(
                 [0.0, 0.0, 2.0, *np.zeros(8)], 1.3 / TURN))
-        _, fine = corrected(replace(problem, samples=16 * samples), u)
+        _, fine = converged_orbit(replace(problem, samples=16 * samples), u)
         off = np.sqrt(((u - fine)[1:-1] ** 2).sum() / (fine[1:-1] ** 2).sum())
         assert 0.3 * off < sampling_error(problem, u, fixed(u)) < 3.0 * off
 

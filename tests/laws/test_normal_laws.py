@@ -91,9 +91,9 @@ LAWS = {
     "back-burdekin 0.4": (BackBurdekinContact(1e-3, 6e-9, 0.4), (-2e-5, 1e-5)),
     "exponential": (ExponentialContact(10.0, 1e-6, 0.3), (-6e-5, 2.5e-5)),
     "greenwood": (GreenwoodWilliamson(1e4, 1e-4, 1e11, 1e-6, 3.0, 0.3), (-8e-6, 1.6e-5)),
-    "asperities": (AsperityContact(1e3, 1e-4, 1e11, 1e-5, (0.0, 1.0, 2.0, 0.5)), MICRO),
+    "asperities": (AsperityContact(1e3, 1e-4, 1e9, 1e-5, (0.0, 1.0, 2.0, 0.5)), MICRO),
     "flattened asperities": (AsperityContact(
-        1e3, 1e-4, 1e11, 1e-5, (0.0, 1.0, 2.0, 0.5), 5e8, deepest=5e-6, damping_factor=0.3), MICRO),
+        1e3, 1e-4, 1e9, 1e-5, (0.0, 1.0, 2.0, 0.5), 5e8, deepest=5e-6, damping_factor=0.3), MICRO),
     "prescribed": (PrescribedForce(14.0), MICRO),
     "stop": (TwoSidedStop(1e6, 3e-5, 1.0, 0.4), (-1e-4, 6e-5)),
     "stop 1.5": (TwoSidedStop(1e9, 3e-5, 1.5, 0.4), (-1e-4, 6e-5)),

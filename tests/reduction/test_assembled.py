@@ -92,7 +92,8 @@ def test_fewer_modes_than_rigid_ones():
 def test_soft_springs_are_not_taken_for_rigid():
     """A block a x b on two springs k in x at its left corners, 1e-13 of its own stiffness.
 
-    It sways with 2 k / m and tilts with 2 k (b / 2)^2 / J, J = m (a^2 + b^2) / 12.
+    It sways with 2 k / m and tilts with 2 k (b / 2)^2 / J, J = m (a^2 + b^2) / 12. Rounding of the
+    body's stiffness is some 1e-3 of the springs.
     """
     k, m = 100.0, 0.1 * 0.05 * 7850.0
     _, M, K, _ = body_and_matrices(24, 12, {})
@@ -103,7 +104,7 @@ def test_soft_springs_are_not_taken_for_rigid():
     basis = basis_from_matrices(M, softened, {"contact": np.zeros((1, 3, d))}, modes=4)
     assert basis.rigid_modes == 1
     tilt = 2.0 * k * 0.025**2 / (m * (0.1**2 + 0.05**2) / 12.0)
-    assert basis.angular_frequencies[1:3] ** 2 == pytest.approx([tilt, 2.0 * k / m], rel=2e-4)
+    assert basis.angular_frequencies[1:3] ** 2 == pytest.approx([tilt, 2.0 * k / m], rel=1e-2)
 
 
 @pytest.mark.parametrize("pieces", [3, 7])

@@ -16,8 +16,8 @@ from fecontact.reduction.reduce_body import displacement_rows
 from fecontact.reduction.solvers.near_solver import NearSolver
 from fecontact.reduction.static_modes.flexibility import Flexibility
 from fecontact.reduction.static_modes.iterated_flexibility import (
-    Answers,
     IteratedFlexibility,
+    StaticResponses,
     TrialSpace,
 )
 
@@ -55,7 +55,7 @@ def test_what_linear_elements_lack_is_estimated(fixed, hexahedra):
     for layers in (1, 2, 3):
         near = NearSolver.of(body, system.iterative, nodes, layers)
         assert len(near.followers) > 0
-        answers = Answers.of(TrialSpace(system, near.solver, near), rows, modes, 1e-6)
+        answers = StaticResponses.of(TrialSpace(system, near.solver, near), rows, modes, 1e-6)
         lacking = exact - np.diag(answers.compliance)
         assert (lacking > 0.0).all()
         assert ((answers.missing > 0.95 * lacking) & (answers.missing < 2.4 * lacking)).all()
@@ -63,7 +63,7 @@ def test_what_linear_elements_lack_is_estimated(fixed, hexahedra):
         before = lacking.max()
     everywhere = NearSolver.of(body, system.iterative, nodes, 40)
     assert len(everywhere.followers) == 0
-    answers = Answers.of(TrialSpace(system, everywhere.solver, everywhere), rows, modes, 1e-6)
+    answers = StaticResponses.of(TrialSpace(system, everywhere.solver, everywhere), rows, modes, 1e-6)
     assert answers.compliance == pytest.approx(residual_compliance(body, rows, modes),
                                                abs=1e-6 * exact.max())
 

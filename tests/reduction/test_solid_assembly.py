@@ -53,7 +53,7 @@ def test_rows_are_relative_motions_in_the_frames_of_the_nodes(turn):
     here, there = contact_sides(whole)
     assert (here - there) @ (whole.mode_shapes.shapes @ q).ravel() == pytest.approx(
         relative[:, :3].ravel(), abs=1e-10)
-    assert whole.mode_shapes.cells.shape[1] == 4
+    assert whole.mode_shapes.cells.shape[1] == 8
     assert whole.contact_areas.sum() == pytest.approx(0.006)
 
 

@@ -283,7 +283,7 @@ def test_commands_name_bodies_and_interfaces(tmp_path, capsys, monkeypatch):
     out = capsys.readouterr().out
     assert "no contact nodes" not in out
     assert out.count("The body has contact at the interface 'lining'") == 2
-    assert "static compliance that the modes resolve [%]" in out
+    assert "Static compliance that the modes resolve [%]" in out
     assert "note:" not in out
     assert (tmp_path / "results" / "a-pad-modes.png").exists()
     assert execute(["run", "a.toml", *short]) == 0

@@ -152,4 +152,4 @@ def test_the_command_names_bodies_that_only_links_hold(tmp_path, capsys, monkeyp
     assert execute(["modes", "a.toml"]) == 0
     out = capsys.readouterr().out
     assert out.count("The body touches nothing at an interface.") == 2
-    assert "static compliance that the modes resolve" not in out
+    assert "Static compliance that the modes resolve" not in out
