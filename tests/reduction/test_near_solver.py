@@ -63,7 +63,8 @@ def test_what_linear_elements_lack_is_estimated(fixed, hexahedra):
         before = lacking.max()
     everywhere = NearSolver.of(body, system.iterative, nodes, 40)
     assert len(everywhere.followers) == 0
-    answers = StaticResponses.of(TrialSpace(system, everywhere.solver, everywhere), rows, modes, 1e-6)
+    answers = StaticResponses.of(TrialSpace(system, everywhere.solver, everywhere), rows, modes,
+                                 1e-6)
     assert answers.compliance == pytest.approx(residual_compliance(body, rows, modes),
                                                abs=1e-6 * exact.max())
 
