@@ -20,6 +20,7 @@ from fecontact.fitting.data_of_modes import (
 )
 from fecontact.fitting.fit_model import fit
 from fecontact.fitting.result import Fit
+from fecontact.measured.measured_units import response_kind
 from fecontact.measured.measurement import Axis, Measurement
 from fecontact.measured.read_measurements import read_measurement
 from fecontact.measured.ring_down import ring_down
@@ -149,9 +150,7 @@ def _frequencies(study: Study, one: FitDataSettings) -> FitData:
 def _receptance(study: Study, one: FitDataSettings) -> FitData:
     test = _measurement(study, one, "frequency")
     k = test.index(one.channel)
-    unit = test.channels[k].unit
-    kind: Any = ("accelerance" if unit.startswith(("m/s^2", "rad/s^2")) else
-                 "mobility" if unit.startswith(("m/s", "rad/s")) else "receptance")
+    kind = response_kind(test.channels[k].unit)
     return ReceptanceData(test.abscissa, np.asarray(test.values[:, k], dtype=complex),
                           (one.excitation, one.excitation_component), (one.point, one.component),
                           one.deviation, kind, None if one.about == "none" else one.about,

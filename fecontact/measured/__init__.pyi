@@ -7,6 +7,7 @@ from .assurance import (
     response_assurance,
     scale_question,
 )
+from .experimental_modes import ExperimentalModes, experimental_modes
 from .measurement import Channel, Measurement
 from .ring_down import ring_down
 from .sensors import Accelerometer, ForceGauge, Sensor, with_sensors
@@ -18,12 +19,14 @@ __all__ = [
     "Acquisition",
     "AmplitudeCurve",
     "Channel",
+    "ExperimentalModes",
     "ForceGauge",
     "Measurement",
     "ModePairs",
     "Sensor",
     "Shaker",
     "backbone_curve",
+    "experimental_modes",
     "measure",
     "modal_assurance",
     "modal_mass_at",

@@ -1,6 +1,7 @@
 """Units of measured channels by their symbols, and the SI units they are converted to."""
 
 import re
+from typing import Literal
 
 # Factors to SI by symbol.
 _LENGTHS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "um": 1e-6, "nm": 1e-9, "cm": 1e-2, "in": 0.0254}
@@ -42,3 +43,9 @@ def parted(title: str) -> tuple[str, str | None]:
     """Name and unit of a title such as ``x [mm]``, ``x (mm)`` or ``x``; None without a unit."""
     found = re.fullmatch(r"(.*?)\s*[\[(]([^\[\]()]*)[\])]\s*", title)
     return (found[1].strip(), found[2].strip()) if found else (title.strip(), None)
+
+
+def response_kind(unit: str) -> Literal["receptance", "mobility", "accelerance"]:
+    """Kind of a frequency response, by the SI unit of its channel."""
+    return ("accelerance" if unit.startswith(("m/s^2", "rad/s^2")) else
+            "mobility" if unit.startswith(("m/s", "rad/s")) else "receptance")
