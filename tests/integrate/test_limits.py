@@ -20,11 +20,13 @@ from fecontact import (
 )
 from fecontact.integrate import CVODE, EventDriven, initial_state, smoothing_cost
 from fecontact.laws import (
+    BilateralPolynomial,
     Constant,
     ConstantFriction,
     ExponentialFriction,
     LinearContact,
     NormalLaw,
+    PrescribedForce,
     RoughSurface,
     normal_law,
 )
@@ -95,6 +97,23 @@ def test_a_deep_start_is_warned_of():
     with pytest.warns(UserWarning, match=r"0\.0033 m deep in the ground"):
         simulate(system, 1e-4, initial=np.array([-1e-3, 0.0, 0.0, 0.0]), outputs=2)
     simulate(system, 1e-4, initial=np.array([-1e-6, 0.0, 0.0, 0.0]), outputs=2)
+
+
+def test_springs_and_prescribed_forces_have_no_depth_to_warn_of():
+    """Nodes with a force that does not end are in nothing, beside a contact far from its limit."""
+    rows = np.zeros((3, 3, 3))
+    rows[:, 1] = np.eye(3)
+    basis = basis_from_matrices(np.eye(3), np.eye(3), {"contact": {
+        "spring": rows[:1], "pressed": rows[1:2], "open": rows[2:]}})
+    system = ContactSystem(basis, normal={
+        "spring": BilateralPolynomial(1e6), "pressed": PrescribedForce(1.0),
+        "open": LinearContact(1e6)}, gap=np.array([0.0, 0.0, 1.0]))
+    deep = np.array([-0.1, -0.1, 0.0, 0.0, 0.0, 0.0])
+    simulate(system, 1e-6, initial=deep, outputs=2)
+    deep[2] = -1.1
+    with pytest.warns(UserWarning, match=r"0\.1 m deep in the ground, 1e\+05 times the 1e-06 m"):
+        run = simulate(system, 1e-9, initial=deep, outputs=2)
+    simulate(system, 2e-9, t_start=1e-9, initial=run, outputs=2)
 
 
 def test_a_start_at_the_depth_of_the_load_is_none_to_warn_of():

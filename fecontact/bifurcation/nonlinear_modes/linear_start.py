@@ -27,7 +27,7 @@ _LOOSE = 1e-14
 _ITERATIONS = 60
 # Part by which deflections of a preload are lowered, so that elements at their limits stick.
 _BELOW_LIMIT = 1e-6
-# Relative change of xi at which the search for the undamped motion ends.
+# Change of xi, in the largest eigenvalue, at which the search for the undamped motion ends.
 _SETTLED = 1e-13
 # Rates at the equilibrium, relative to the size of the equations, that are rounding.
 _AT_REST = 1e-9

@@ -251,9 +251,9 @@ def fold_between(u, tangent, there, leaving, row, weights, e, found):
         else:
             high = at
         left = abs(value * (at - x)) / abs(value - f) if value != f else 0.0
-        damped_newton = left <= 0.5 * _LOCATED * way and abs(value) <= _FALLS * abs(f)
+        converged = left <= 0.5 * _LOCATED * way and abs(value) <= _FALLS * abs(f)
         stuck = left <= _ROUNDED * way and abs(value) > _FALLS * abs(f)
-        if value == 0.0 or damped_newton or stuck or high - low <= _LOCATED * way:
+        if value == 0.0 or converged or stuck or high - low <= _LOCATED * way:
             return 1 if abs(value) <= _SMALL * largest else 0
     return 0
 
