@@ -174,8 +174,8 @@ def _outputs_per_sample(time: Array, acquisition: Acquisition) -> int:
             else f"outputs = {least * max(1, math.ceil(wanted)) + 1} up to t_end = "
                  f"{float(time[0]) + max(1, math.ceil(wanted)) / acquisition.rate_hz:.12g}")
     raise InputError(f"measure: the run has {'' if even else 'uneven '}outputs at {1.0 / step:.6g} "
-                     f"Hz, no multiple, {least} at least, of the sampling rate of "
-                     f"{acquisition.rate_hz:g} Hz; run with {hint}.")
+                     f"Hz; these must be even, and their rate a whole multiple, {least} times at "
+                     f"least, of the sampling rate of {acquisition.rate_hz:g} Hz; run with {hint}.")
 
 
 def _warn_of_alias(name: str, values: Array, each: int, acquisition: Acquisition) -> None:

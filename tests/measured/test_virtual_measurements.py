@@ -250,7 +250,7 @@ def test_the_mass_of_a_gauge_is_part_of_its_reading():
     (lambda run: measure(run, Accelerometer(point="tip"), Acquisition(3000.0)),
      "run with outputs = 12001"),
     (lambda run: measure(run, Accelerometer(point="tip"), Acquisition(2000.0)),
-     "no multiple, 4 at least"),
+     "a whole multiple, 4 times at least, of the sampling"),
     (lambda run: measure(run, Accelerometer(point="tip"), Acquisition(512.3)), "up to t_end = "),
     (lambda run: measure(run, Accelerometer(point="tap"), Acquisition(500.0)), "mean 'tip'"),
     (lambda run: measure(run, Accelerometer(direction="+z"), Acquisition(500.0)), "in the plane"),
