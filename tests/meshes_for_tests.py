@@ -3,6 +3,7 @@
 import numpy as np
 
 from fecontact import Mesh
+from fecontact.fem.elements.cell_kinds import padded
 
 
 def grid(xs, ys, *, triangles=False, warp=None, points=None, reverse=(), split=()):
@@ -11,6 +12,7 @@ def grid(xs, ys, *, triangles=False, warp=None, points=None, reverse=(), split=(
     The boundaries are left, right, bottom, top; those in ``reverse`` have their edges turned
     round and in another order. ``split`` names x intervals of the bottom: a boundary ``feet``.
     ``points`` maps names to places, the nearest node is taken. ``warp`` moves the nodes.
+    ``triangles`` may say of centres of cells which are cut.
     """
     xs, ys = np.asarray(xs, float), np.asarray(ys, float)
     x, y = np.meshgrid(xs, ys)
@@ -18,8 +20,9 @@ def grid(xs, ys, *, triangles=False, warp=None, points=None, reverse=(), split=(
     number = np.arange(len(nodes)).reshape(len(ys), len(xs))
     cells = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]],
                      axis=-1).reshape(-1, 4)
-    if triangles:
-        cells = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
+    cut = np.full(len(cells), triangles) if isinstance(triangles, bool) else triangles(
+        nodes[cells].mean(axis=1))
+    cells = padded([cells[~cut], cells[cut][:, [0, 1, 2]], cells[cut][:, [0, 2, 3]]])
     boundaries = {name: np.column_stack([line[:-1], line[1:]]) for name, line in (
         ("bottom", number[0]), ("right", number[:, -1]), ("top", number[-1]),
         ("left", number[:, 0]))}

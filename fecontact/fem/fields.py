@@ -14,7 +14,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity, span
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.element_block import PAIRS
-from fecontact.fem.elements.cell_geometry import oriented_solids, sides_of
+from fecontact.fem.elements.cell_geometry import oriented, sides_of
 from fecontact.fem.elements.cell_kinds import (
     HEXAHEDRON,
     blocks_of,
@@ -82,14 +82,9 @@ class BodyFields(Summarised):
     @cached_property
     def outline(self) -> Integers:
         """Edges (k, 2) or faces (k, 3) or (k, 4) of these cells on the outline."""
-        cells = self.cells
-        if self.nodes.shape[1] == 3:
-            faces, _ = sides_of(cells, 3)
-            _, number, count = numbered_rows(unordered(faces))
-            return drawn_facets(faces[count[number] == 1])[0]
-        sides = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2))
-        edges, count = np.unique(sides, axis=0, return_counts=True)
-        return np.asarray(edges[count == 1])
+        sides, _ = sides_of(self.cells, self.nodes.shape[1])
+        _, number, count = numbered_rows(unordered(sides))
+        return drawn_facets(sides[count[number] == 1])[0]
 
     @property
     def von_mises(self) -> Array:
@@ -145,49 +140,25 @@ class BodyFields(Summarised):
         return weights[0] @ self.displacement[which], weights[0] @ self.stress[which]
 
 
-def of_one_kind(cells: Sequence[Integers], dimension: int) -> list[Integers]:
-    """First-order cells of several bodies in rows of one length; plane ones as triangles."""
-    if len({array.shape[1] for array in cells}) == 1:
-        return list(cells)
-    if dimension == 3:
-        width = max(array.shape[1] for array in cells)
-        return [padded([array], width) for array in cells]
-    return [array if array.shape[1] == 3 else np.concatenate(
-        [array[:, [0, 1, 2]], array[:, [0, 2, 3]]]) for array in cells]
+def of_one_width(cells: Sequence[Integers]) -> list[Integers]:
+    """Rows of cells of several bodies filled by their last corner to one length."""
+    width = max(array.shape[1] for array in cells)
+    return [padded([array], width) for array in cells]
 
 
 def linear_cells(nodes: Array, elements: Integers) -> Integers:
     """First-order cells between all nodes of elements, with positive orientation.
 
-    Cells of solids have their corners in the order of meshes, rows filled by their last one.
+    Cells have their corners in the order of meshes, rows filled by their last one.
     """
-    if nodes.shape[1] == 3:
-        return _solid_cells(nodes, elements)
-    if elements.shape[1] < 6:
-        cells = elements
-    elif elements.shape[1] == 6:
-        a, b, c, ab, bc, ac = elements.T
-        cells = np.concatenate([np.column_stack(cell) for cell in (
-            (a, ab, ac), (ab, b, bc), (ac, bc, c), (ab, bc, ac))])
-    else:
-        a, b, c, d, ab, bc, cd, ad, m = elements.T
-        cells = np.concatenate([np.column_stack(cell) for cell in (
-            (a, ab, m, ad), (ab, b, bc, m), (m, bc, c, cd), (ad, m, cd, d))])
-    side = nodes[cells[:, :3]]
-    (ux, uy), (vx, vy) = (side[:, 1] - side[:, 0]).T, (side[:, 2] - side[:, 0]).T
-    return np.where((ux * vy - uy * vx < 0.0)[:, None], cells[:, ::-1], cells)
-
-
-def _solid_cells(nodes: Array, elements: Integers) -> Integers:
-    found = []
+    found, dimension = [], nodes.shape[1]
     for _, rows in blocks_of(elements):
-        kind = element_kind(3, rows.shape[1])
+        kind = element_kind(dimension, rows.shape[1])
         if rows.shape[1] == kind.corners:
             found.append(rows[:, np.argsort(kind.order)])
         else:
-            found += [rows[:, list(part)] for part in PARTS[3, kind.corners]]
-    cells = padded(found)
-    return cells if elements.shape[1] <= 8 else oriented_solids(nodes, cells)
+            found += [rows[:, list(part)] for part in PARTS[dimension, kind.corners]]
+    return oriented(nodes, padded(found))[0]
 
 
 def stress_of(

@@ -17,13 +17,14 @@ from fecontact.fem.attachments import Attachment, check_attachments, counted_att
 from fecontact.fem.constraints import Constraint, check_constraints, counted
 from fecontact.fem.elements.cell_geometry import (
     curved_volumes,
-    oriented_solids,
+    oriented,
     require_apart,
     require_conforming,
     require_no_overlap,
+    require_volume,
     second_order_places,
     sides_of,
-    solid_volumes,
+    straight_volumes,
 )
 from fecontact.fem.elements.cell_kinds import (
     CELL_KINDS,
@@ -46,8 +47,6 @@ from fecontact.fem.material import AnyMaterial
 
 # Eight-node bricks: trilinear displacements alone, or with incompatible modes of each cell.
 Bricks = Literal["full", "incompatible"]
-
-_FLAT = 1e-12  # area of a degenerate cell, relative to its squared sides
 
 
 class _Checked:
@@ -75,14 +74,15 @@ class _Checked:
         known = [corners for of, corners in CELL_KINDS if of == dimension]
         if cells.ndim != 2 or cells.shape[1] not in known or not len(cells):
             raise MeshError(
-                f"Mesh cells must have shape (M, 3) for triangles or (M, 4) for quadrilaterals "
-                f"with M > 0, not {cells.shape}." if dimension == 2 else
+                f"Mesh cells must have shape (M, 3) for triangles or (M, 4) for quadrilaterals, "
+                f"rows of triangles among these filled by their last corner, with M > 0, not "
+                f"{cells.shape}." if dimension == 2 else
                 f"Mesh cells of a solid must have shape (M, 4) for tetrahedra, (M, 5) for "
                 f"pyramids, (M, 6) for wedges or (M, 8) for hexahedra with M > 0, or rows of "
                 f"several kinds filled by their last corner, not {cells.shape}."
             )
         size = widths(cells)
-        poor = ~np.isin(size, known if dimension == 3 else cells.shape[1])
+        poor = ~np.isin(size, known)
         if poor.any():
             raise MeshError(
                 f"{np.count_nonzero(poor)} mesh cells have no "
@@ -97,7 +97,8 @@ class _Checked:
             raise MeshError(f"{unused} mesh nodes belong to no cell; remove them.")
         cells = cells[:, : size.max()]
         self.nodes = nodes
-        self.cells = (_oriented if dimension == 2 else oriented_solids)(nodes, cells)
+        self.cells, flat = oriented(nodes, cells)
+        require_volume(nodes, cells, flat)
         self.blocks = tuple(
             CellBlock(CELL_KINDS[dimension, rows.shape[1]], np.arange(len(cells))[which], rows)
             for which, rows in blocks_of(self.cells))
@@ -134,7 +135,7 @@ class Mesh(Summarised):
 
     Plane cells are triangles or quadrilaterals, counter-clockwise; cells of solids are tetrahedra,
     pyramids, wedges or hexahedra, their corners as Gmsh, VTK and Abaqus number them. Cells of the
-    opposite orientation are turned. Solids may have cells of several kinds: rows of ``cells`` are
+    opposite orientation are turned. A mesh may have cells of several kinds: rows of ``cells`` are
     then as long as the longest, filled by the last corner of the cell, and so are rows of faces.
 
     Parameters
@@ -544,19 +545,20 @@ class Mesh(Summarised):
         """Area of the meshed region of a plane body [m^2]; MeshError for a solid."""
         if self.dimension == 3:
             raise MeshError("A solid has a volume; area is that of a plane body.")
-        area = _signed_area(self.nodes, self.cells)
-        curved, areas = self._curved_volumes()
-        area[curved] = areas
-        return float(area.sum())
+        return self._size()
 
     @property
     def volume(self) -> float:
         """Volume of a solid [m^3]; MeshError for a plane body."""
         if self.dimension == 2:
             raise MeshError("A plane body has an area; volume is that of a solid.")
+        return self._size()
+
+    def _size(self) -> float:
+        """Sum of the volumes of the cells, in the plane of their areas [m^d]."""
         volume = np.empty(len(self.cells))
         for block in self.blocks:
-            volume[block.numbers] = solid_volumes(self.nodes, block.nodes, block.kind)
+            volume[block.numbers] = straight_volumes(self.nodes, block.nodes, block.kind)
         curved, volumes = self._curved_volumes()
         volume[curved] = volumes
         return float(volume.sum())
@@ -606,36 +608,3 @@ def _facets(name: str, facets: ArrayLike, checked: _Checked) -> Integers:
         raise MeshError(f"Boundary '{name}' must have shape (k, {width}), {what[1]} of nodes, "
                         f"not {array.shape}.")
     return array.reshape(-1, width)
-
-
-def _oriented(nodes: Array, cells: Integers) -> Integers:
-    """Plane cells counter-clockwise; MeshError for degenerate and folded ones."""
-    area = _signed_area(nodes, cells)
-    cells = np.where(area[:, None] < 0, cells[:, ::-1], cells)
-    area = _smallest_corner_jacobian(nodes, cells) if cells.shape[1] == 4 else np.abs(area)
-    side = nodes[cells] - np.roll(nodes[cells], 1, axis=1)
-    bad = area <= _FLAT * (side**2).sum(axis=(1, 2))
-    if bad.any():
-        raise MeshError(
-            f"{np.count_nonzero(bad)} mesh cells have no area or are folded, the first is cell "
-            f"{np.flatnonzero(bad)[0]}."
-        )
-    return cells
-
-
-def _signed_area(nodes: Array, cells: Integers) -> Array:
-    x, y = nodes[cells, 0], nodes[cells, 1]
-    area: Array = 0.5 * (
-        x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
-    return area
-
-
-def _smallest_corner_jacobian(
-    nodes: Array, cells: Integers
-) -> Array:
-    corner = nodes[cells]
-    ahead = np.roll(corner, -1, axis=1) - corner
-    back = np.roll(corner, 1, axis=1) - corner
-    smallest: Array = (
-        ahead[..., 0] * back[..., 1] - ahead[..., 1] * back[..., 0]).min(axis=1)
-    return smallest

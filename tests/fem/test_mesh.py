@@ -73,7 +73,7 @@ def test_mesh_survives_pickling() -> None:
         ((SQUARE, [[0, 1, 4]]), r"nodes outside 0 \.\.\. 3"),
         ((SQUARE, [[0, 1, -1]]), r"nodes outside 0 \.\.\. 3"),
         ((SQUARE, [[0, 1, 2]]), "1 mesh nodes belong to no cell"),
-        ((SQUARE, [[0, 2, 1, 3]]), "no area or are folded, the first is cell 0"),
+        ((SQUARE, [[0, 2, 1, 3]]), "no area, or are folded or inverted, the first is cell 0"),
         (([[0, 0], [2, 0], [0.5, 0.5], [0, 2]], [[0, 1, 2, 3]]), "folded"),
         (([[0, 0], [0.7, 0.1], [2.1, 0.3]], [[0, 1, 2]]), "no area"),
         ((SQUARE, [[0, 1, 2, 3]], {"contact": []}), "group 'contact' is empty"),

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from fecontact import InputError, Mesh, MeshError, ModelWarning, read_mesh, write_mesh
-from fecontact.fem.mesh_files import write_fields
 
 # 3 x 2 cells of 0.1 m x 0.05 m: nodes 0 ... 3 along the bottom, 8 ... 11 along the top.
 X, Y = np.meshgrid(np.linspace(0.0, 0.3, 4), np.linspace(0.0, 0.1, 3))
@@ -626,8 +625,6 @@ def nodes_and(cells: str) -> str:
         ("a.msh", nodes_and("1 14 2 1 1 1 2 3 4 1 2 3 4 1 2 3 4 1 2\n"),
          r"holds solid elements that are not read \(solid\); mesh with .* or pyramids"),
         ("a.msh", nodes_and("1 1 2 1 1 1 2\n"), "holds no triangles or quadrilaterals"),
-        ("a.msh", nodes_and("1 2 2 1 1 1 2 3\n2 3 2 1 1 1 2 4 3\n"),
-         "mixes 1 triangles and 1 quadrilaterals; mesh with one kind only"),
         ("a.msh", nodes_and("1 2 2 1 1 1 2 2\n"), r"a\.msh: 1 mesh cells have no area"),
         ("a.inp", "just some text\n", r"a\.inp: The file holds no \*NODE or no \*ELEMENT data"),
         ("a.inp", "*NODE\n1,0,x\n", "cannot be read as Abaqus, .*'x'"),
@@ -851,49 +848,6 @@ def test_failed_writing_leaves_the_old_file(
         write_mesh(quad_mesh(), path)
     assert path.read_text() == "old"
     assert [file.name for file in tmp_path.iterdir()] == ["a.msh"]
-
-
-@pytest.mark.parametrize("cells", [QUADS, TRIANGLES], ids=["quads", "triangles"])
-def test_fields_for_paraview(tmp_path: Path, cells: np.ndarray) -> None:
-    path = tmp_path / "a.vtu"
-    fields = {"u": NODES + 1, "stress": np.arange(12.0), "tensor": np.ones((12, 4)),
-              "held": NODES[:, 0] > 0.1, "single": np.arange(12, dtype=np.float32),
-              'a <"name"> & more': np.arange(12, dtype=np.int16)}
-    write_fields(path, NODES, cells, fields)
-    assert b'compressor="vtkZLibDataCompressor"' in path.read_bytes()
-    found = meshio.vtu.read(path)
-    assert np.array_equal(found.points, flat())
-    assert np.array_equal(found.cells[0].data, cells)
-    assert list(found.point_data) == list(fields)
-    assert np.array_equal(found.point_data["u"], flat(NODES + 1))
-    assert np.array_equal(found.point_data["tensor"], np.ones((12, 4)))
-    for name in ("stress", "held", "single", 'a <"name"> & more'):
-        assert np.array_equal(found.point_data[name], np.asarray(fields[name], float))
-    assert found.point_data["single"].dtype == np.float32
-    write_fields(path, flat() + np.array([0, 0, 1]), cells)
-    assert np.array_equal(meshio.vtu.read(path).points[:, 2], np.ones(12))
-    assert [file.name for file in tmp_path.iterdir()] == ["a.vtu"]
-
-
-@pytest.mark.parametrize(
-    ("name", "points", "cells", "fields", "message"),
-    [
-        ("a.vtk", NODES, QUADS, {}, r"a\.vtk: fields are written as VTU files"),
-        ("a.vtu", NODES[:, :1], QUADS, {}, r"points must have shape .* not \(12, 1\)"),
-        ("a.vtu", NODES, QUADS[:, :2], {}, r"cells must be integers .* int64 of shape \(6, 2\)"),
-        ("a.vtu", NODES, QUADS * 1.0, {}, "cells must be integers .* float64"),
-        ("a.vtu", NODES, QUADS, {"u": [1.0, 2.0]},
-         r"field 'u' must hold real numbers .* N = 12 points, not float64 of shape \(2,\)"),
-        ("a.vtu", NODES, QUADS, {"u": NODES[:, 0] * 1j}, "field 'u' must .* complex128"),
-        ("no/a.vtu", NODES, QUADS, {}, r"a\.vtu cannot be written: folder"),
-    ],
-)
-def test_fields_that_cannot_be_written(
-    tmp_path: Path, name: str, points: np.ndarray, cells: np.ndarray, fields: dict, message: str
-) -> None:
-    with pytest.raises(InputError, match=message):
-        write_fields(tmp_path / name, points, cells, fields)
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("content", [

@@ -1,9 +1,11 @@
 """Geometry of cells: orientation, volume, sides in common, second-order places of curved cells."""
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.errors import MeshError
 from fecontact.core.types import Array, Integers
@@ -19,7 +21,7 @@ from fecontact.fem.elements.cell_kinds import (
 )
 from fecontact.fem.elements.quadrature import rule
 
-_FLAT = 1e-12  # volume of a degenerate cell, relative to the cube of its size
+_FLAT = 1e-12  # volume of a degenerate cell, relative to that of a cube of its size
 _ON_EDGE = 1e-5  # distance of a node on an edge, per length: coordinates in single precision
 # Cells whose places are compared at once, and the depth in a cell at which a place lies within it,
 # relative to its centre.
@@ -27,31 +29,36 @@ _AT_ONCE, _WITHIN = 4000, 0.1
 _CELLS = 50_000  # whose corners are looked at together
 
 
-def oriented_solids(nodes: Array, cells: Integers) -> Integers:
-    """Cells of space with positive volume, those of the opposite orientation renumbered.
+def oriented(nodes: Array, cells: Integers) -> tuple[Integers, NDArray[np.bool_]]:
+    """Cells with positive volume, those of the opposite orientation renumbered.
 
-    Raises
-    ------
-    MeshError
-        For cells without volume, or folded at a corner.
+    A mask (M,) of cells that have none, or are folded at a corner, comes beside them. In the plane
+    the volume is the area.
     """
+    dimension = nodes.shape[1]
     found, flat = np.array(cells), np.zeros(len(cells), bool)
     for which, rows in blocks_of(cells):
-        kind = CELL_KINDS[3, rows.shape[1]]
+        kind = CELL_KINDS[dimension, rows.shape[1]]
         smallest, largest = _corner_volumes(nodes, rows, kind)
         rows = np.where((largest < 0.0)[:, None], rows[:, list(kind.mirrored)], rows)
         found[which] = padded([rows], cells.shape[1])
         smallest = np.where(largest < 0.0, -largest, smallest)
         size = np.linalg.norm(np.ptp(nodes[rows], axis=1), axis=1)
-        flat[which] = smallest <= _FLAT * size**3
-    if flat.any():
-        first = int(np.flatnonzero(flat)[0])
-        x, y, z = centres_of(nodes, cells)[first]
-        solid = widths(cells)[first] > 4
-        what = "have no volume, or are folded or inverted" if solid else "have no volume"
-        raise MeshError(f"{np.count_nonzero(flat)} mesh cells {what}, the first is cell {first} at "
-                        f"({x:g}, {y:g}, {z:g}).")
-    return found
+        flat[which] = smallest <= _FLAT * size**dimension
+    return found, flat
+
+
+def require_volume(nodes: Array, cells: Integers, flat: NDArray[np.bool_]) -> None:
+    """Raise :class:`MeshError` for cells without volume or folded ones, of which ``flat`` tells."""
+    if not flat.any():
+        return
+    first, dimension = int(np.flatnonzero(flat)[0]), nodes.shape[1]
+    where = ", ".join(f"{x:g}" for x in centres_of(nodes, cells)[first])
+    what = f"have no {'area' if dimension == 2 else 'volume'}"
+    if widths(cells)[first] > dimension + 1:
+        what += ", or are folded or inverted"
+    raise MeshError(f"{np.count_nonzero(flat)} mesh cells {what}, the first is cell {first} at "
+                    f"({where}).")
 
 
 def _corner_volumes(nodes: Array, cells: Integers, kind: CellKind) -> tuple[Array, Array]:
@@ -67,14 +74,15 @@ def _corner_volumes(nodes: Array, cells: Integers, kind: CellKind) -> tuple[Arra
     return least, largest
 
 
-def solid_volumes(nodes: Array, cells: Integers, kind: CellKind) -> Array:
-    """Volumes (M,) of cells with straight edges [m^3]."""
+def straight_volumes(nodes: Array, cells: Integers, kind: CellKind) -> Array:
+    """Volumes (M,), in the plane areas, of cells with straight edges [m^d]."""
     corners = nodes[cells[:, list(kind.order)]]
     if kind.simplex:
-        return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0)
+        return np.asarray(np.linalg.det(corners[:, 1:] - corners[:, :1])
+                          / math.factorial(kind.dimension))
     # Determinants of trilinear cells are quadratic in each direction.
-    local, weights = rule(3, kind.corners, 2)
-    _, slopes = shape_functions(3, kind.corners, local)
+    local, weights = rule(kind.dimension, kind.corners, 2)
+    _, slopes = shape_functions(kind.dimension, kind.corners, local)
     return np.asarray(np.linalg.det(np.einsum("pkj,mki->mpij", slopes, corners)) @ weights)
 
 

@@ -1,6 +1,6 @@
 """The surface of a solid as facets of its elements: areas, normals, mean motions of patches."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -243,6 +243,20 @@ def linear_facets(facets: Integers) -> tuple[Integers, Integers]:
     rank[order] = np.arange(len(of)) - np.searchsorted(of[order], of[order])
     order = np.lexsort((of, rank))
     return parts[order], of[order]
+
+
+def as_triangles(facets: Integers) -> Integers:
+    """Triangles (t, 3) of rows (k, 3) or (k, 4) of triangles and quadrilaterals, in their order."""
+    if facets.shape[1] == 3:
+        return facets
+    found = facets[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    return found[found[:, 1] != found[:, 2]]
+
+
+def triangles_if_mixed(facets: Sequence[Integers]) -> list[Integers]:
+    """Edges or facets of several bodies in rows of one length; mixed facets as triangles."""
+    same = len({rows.shape[1] for rows in facets}) == 1
+    return [rows if same else as_triangles(rows) for rows in facets]
 
 
 def drawn_facets(facets: Integers) -> tuple[Integers, Integers]:

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import as_path, require_kind, require_regular_file
 from fecontact.core.errors import (
@@ -25,7 +24,7 @@ from fecontact.core.errors import (
 )
 from fecontact.core.files.atomic_write import replaced
 from fecontact.core.resources.memory import available_memory, shown_memory
-from fecontact.core.types import ArrayLike, Coordinates, Integers
+from fecontact.core.types import Coordinates, Integers
 from fecontact.fem.attachments import counted_attachments
 from fecontact.fem.constraints import counted
 from fecontact.fem.mesh import Mesh
@@ -61,10 +60,10 @@ def read_mesh(
 
     Formats: Gmsh (.msh 2.2 and 4.1), Abaqus (.inp), Ansys (.cdb, by mapdl-archive), Nastran (.bdf,
     .nas, .fem), MED (.med), VTK (.vtk, .vtu). Files with tetrahedra, hexahedra, wedges or pyramids
-    hold solids, which may have elements of several kinds. Boundaries are groups of lines, of solids
-    those of surfaces: physical groups (Gmsh), surfaces, element sets and node
-    sets on the outline (Abaqus, MED), components of nodes on it (Ansys), elements by property
-    number (Nastran). Points are physical points, node sets, groups inside the body, and lines of
+    hold solids. Meshes may have elements of several kinds. Boundaries are groups of lines, of
+    solids those of surfaces: physical groups (Gmsh), surfaces, element sets and node sets on the
+    outline (Abaqus, MED), components of nodes on it (Ansys), elements by property number (Nastran).
+    Points are physical points, node sets, groups inside the body, and lines of
     solids. VTK files have no groups. Curved sides of second-order elements are kept, coincident
     nodes merged, nodes without a cell left out. Ties, couplings, equations and sections of bolts of
     Abaqus files, RBE2, RBE3 and MPC of Nastran's become ``mesh.constraints``, whose nodes are not
@@ -94,7 +93,7 @@ def read_mesh(
         If there is no such file or suffix, scale is not above zero, or a boundary or point is given
         in another form.
     MeshError
-        If the file holds no such mesh of one kind of elements, or has no such group, part, edges,
+        If the file holds no such mesh, or has no such group, part, edges,
         faces or node.
     """
     path = as_path(path, "a mesh")
@@ -246,59 +245,6 @@ def write_mesh(mesh: Mesh, path: str | Path) -> None:
                       f"anew.", ModelWarning, stacklevel=2)
     with replaced(path) as part, part.open("w", encoding="utf-8", newline="\n") as stream:
         write_msh(mesh, stream)
-
-
-def write_fields(
-    path: str | Path,
-    points: ArrayLike,
-    cells: ArrayLike,
-    point_data: Mapping[str, ArrayLike] | None = None,
-) -> None:
-    """Write fields on a mesh as a compressed VTU file for ParaView.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file, written whole or not at all.
-    points : (N, 2) or (N, 3) array
-        Coordinates [m]; z is zero by default.
-    cells : (M, 3) or (M, 4) integer array
-        Corners of triangles or quadrilaterals.
-    point_data : mapping of name to (N,) or (N, k) array
-        Fields at the nodes; vectors of two components get a zero third component.
-
-    Raises
-    ------
-    InputError
-        If the name does not end in .vtu, a shape does not fit, or the file cannot be written.
-    """
-    from xml.sax.saxutils import escape
-
-    path = Path(path)
-    if path.suffix.lower() != ".vtu":
-        raise InputError(f"{path}: fields are written as VTU files; choose a name that ends in "
-                         f".vtu.")
-    xyz, corners = np.asarray(points, float), np.asarray(cells)
-    if xyz.ndim != 2 or xyz.shape[1] not in (2, 3):
-        raise InputError(f"{path}: points must have shape (N, 2) or (N, 3), not {xyz.shape}.")
-    if corners.ndim != 2 or corners.shape[1] not in (3, 4) or corners.dtype.kind not in "iu":
-        raise InputError(f"{path}: cells must be integers of shape (M, 3) or (M, 4), not "
-                         f"{corners.dtype} of shape {corners.shape}.")
-    data = {}
-    for name, values in (point_data or {}).items():
-        column = np.asarray(values)
-        if column.ndim not in (1, 2) or len(column) != len(xyz) or column.dtype.kind not in "biuf":
-            raise InputError(f"{path}: field '{name}' must hold real numbers of shape (N,) or "
-                             f"(N, k) with N = {len(xyz)} points, not {column.dtype} of shape "
-                             f"{column.shape}.")
-        if column.dtype.kind == "b" or column.dtype.itemsize not in (4, 8):
-            column = column.astype(np.int32 if column.dtype.kind in "biu" else np.float64)
-        data[escape(name, {'"': "&quot;"})] = _three(column) if column.ndim == 2 else column
-    kind = "triangle" if corners.shape[1] == 3 else "quad"
-    import meshio
-
-    with replaced(path) as part:
-        meshio.vtu.write(part, meshio.Mesh(_three(xyz), [(kind, corners.astype(np.int64))], data))
 
 
 def _reader(path: Path) -> tuple[Callable[[Path], RawMesh], str]:
@@ -497,8 +443,3 @@ def _silence() -> Iterator[io.StringIO]:
           warnings.catch_warnings()):
         warnings.simplefilter("ignore")
         yield printed
-
-
-def _three(columns: NDArray[Any]) -> NDArray[Any]:
-    """Add a zero third component to vectors of two; leave others unchanged."""
-    return np.pad(columns, ((0, 0), (0, 1))) if columns.shape[1] == 2 else columns

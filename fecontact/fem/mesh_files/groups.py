@@ -122,24 +122,15 @@ def _node_at(mesh: Mesh, name: str, place: Coordinates) -> Integers:
                                             f"place {axes} in metres")
     distance = np.linalg.norm(mesh.nodes - where, axis=1)
     node = int(np.argmin(distance))
-    corners = mesh.nodes[mesh.cells]
-    around = corners[(mesh.cells == node).any(axis=1)]
+    around = mesh.nodes[mesh.cells[(mesh.cells == node).any(axis=1)]]
     element_size = np.linalg.norm(np.roll(around, -1, axis=1) - around, axis=2).max()
-    if mesh.dimension == 3:
-        inside = _inside(mesh, where)
-        if not inside and distance[node] > element_size / 2:
-            raise _outside(mesh, name, where, float(distance[node]))
-        return np.array([node])
-    to_next, to_place = np.roll(corners, -1, axis=1) - corners, where - corners
-    left = to_next[..., 0] * to_place[..., 1] - to_next[..., 1] * to_place[..., 0]
-    inside = bool((left >= 0).all(axis=1).any())
-    if not inside and distance[node] > element_size / 2:
+    if distance[node] > element_size / 2 and not _inside(mesh, where):
         raise _outside(mesh, name, where, float(distance[node]))
     return np.array([node])
 
 
 def _inside(mesh: Mesh, place: Array) -> bool:
-    """Whether a place lies in a straight cell of a solid."""
+    """True if a place lies in a cell with straight edges."""
     try:
         interpolation(mesh.nodes, mesh.elements, place, "")
     except InputError:

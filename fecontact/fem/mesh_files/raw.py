@@ -174,7 +174,7 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     Raises
     ------
     MeshError
-        If the elements are neither a plane mesh of triangles or of quadrilaterals, nor a solid of
+        If the elements are neither a plane mesh of triangles and quadrilaterals, nor a solid of
         tetrahedra, pyramids, wedges and hexahedra.
     """
     blocks = _cells_of_body(raw.cells)
@@ -334,7 +334,7 @@ def _faces(raw: RawMesh) -> dict[str, list[Integers]]:
 
 
 def _cells_of_body(cells: list[tuple[str, Integers]]) -> list[tuple[str, Integers]]:
-    """The solid elements of a file, or the plane ones, of one kind, if there are no others."""
+    """The solid elements of a file, or the plane ones if there are no others."""
     present = [(kind, block) for kind, block in cells if len(block)]
     solid = [(kind, block) for kind, block in present if kind in SOLID]
     other = sorted({kind for kind, _ in present if kind not in CORNERS})
@@ -347,14 +347,7 @@ def _cells_of_body(cells: list[tuple[str, Integers]]) -> list[tuple[str, Integer
     if not present:
         raise MeshError("The mesh holds no triangles or quadrilaterals, and no tetrahedra or "
                         "hexahedra; save these elements too.")
-    if solid:
-        return solid
-    three, four = (sum(len(block) for kind, block in present if CORNERS[kind] == corners)
-                   for corners in (3, 4))
-    if three and four:
-        raise MeshError(f"The mesh mixes {three} triangles and {four} quadrilaterals; mesh with "
-                        f"one kind only (in Gmsh, recombine all surfaces or none).")
-    return present
+    return solid or present
 
 
 def _require_one_body(raw: RawMesh, number: Integers) -> None:

@@ -9,6 +9,7 @@ from fecontact.core.checks import require_kind, require_scale
 from fecontact.core.errors import require_choice
 from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
+from fecontact.fem.faces.surface import as_triangles
 from fecontact.fem.fields import BodyFields
 from fecontact.output.plots.drawing import name_axis
 from fecontact.output.plots.figure import new_figure
@@ -110,11 +111,9 @@ def _draw_plane(
     from matplotlib.collections import LineCollection
     from matplotlib.tri import Triangulation
 
-    cells = fields.cells
-    if cells.shape[1] == 4:
-        cells = np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
-    drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], cells), stress,
-                           shading="gouraud", rasterized=True, **options)
+    drawn = axis.tripcolor(
+        Triangulation(places[:, 0], places[:, 1], as_triangles(fields.cells)), stress,
+        shading="gouraud", rasterized=True, **options)
     for nodes, colour in ((fields.nodes, "#8c8c8c"), (places, "#303030")):
         axis.add_collection(LineCollection(list(nodes[fields.outline]), colors=colour,
                                            linewidths=0.8))

@@ -9,6 +9,7 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
+from fecontact.fem.faces.surface import as_triangles
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.solids.surface import draw_surface, seen_box
 from fecontact.reduction.assembly.bodies_convergence import BodiesConvergence
@@ -282,9 +283,7 @@ def _draw_mode(
         cells = field.cells[(first <= field.cells[:, 0]) & (field.cells[:, 0] < end)]
         if not len(cells):
             continue
-        if cells.shape[1] == 4:
-            cells = np.vstack([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
-        drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], cells),
+        drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], as_triangles(cells)),
                                amplitude / largest, shading="gouraud", cmap="viridis", vmin=0.0,
                                vmax=1.0, rasterized=True)
     for nodes, colour in ((field.nodes, "#8c8c8c"), (places, "#303030")):

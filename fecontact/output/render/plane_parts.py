@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.types import Array
+from fecontact.fem.faces.surface import as_triangles
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.pixels import DARK
 from fecontact.output.render.scene import (
@@ -87,7 +88,8 @@ class PlaneBodies:
     def __init__(self, scene: Scene, motion: Shown) -> None:
         self._motion, field = motion, motion.mode_shapes
         self._body = scene.mesh(
-            _lifted(scene, "body", field.nodes), faces=field.cells, scalars="colour",
+            _lifted(scene, "body", field.nodes), faces=as_triangles(field.cells),
+            scalars="colour",
             point_data={"colour": np.zeros(len(field.nodes))}, cmap=COLOUR_MAPS[motion.colour],
             clim=(0.0, motion.largest_colour or 1.0), interpolate_before_map=True, n_colors=256)
         self._edges, _ = (

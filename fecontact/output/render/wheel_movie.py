@@ -8,7 +8,8 @@ from fecontact.bifurcation.harmonic.wheel_orbits import WheelMotion
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ComplexArray, Integers
-from fecontact.fem.fields import linear_cells, of_one_kind
+from fecontact.fem.faces.surface import triangles_if_mixed
+from fecontact.fem.fields import linear_cells, of_one_width
 from fecontact.output.render.mode_movie import ModeMotion, write_motion
 from fecontact.output.render.movie import Progress
 from fecontact.reduction.mode_shapes import ModeShapes
@@ -94,10 +95,9 @@ def _of_response(motion: WheelMotion) -> tuple[ModeMotion, str]:
                 found.append(motion.harmonic(name, h, s) @ turn)
     whole = {h: np.concatenate(found) for h, found in shapes.items()}
     words = f"engine order {motion.order}, {1.0 / motion.period:.5g} Hz"
-    d = nodes[0].shape[1]
     joined = [np.concatenate([array + start for array, start in zip(
-        of_one_kind(arrays, size), starts, strict=True)])
-        for arrays, size in ((cells, d), (outlines, d - 1))]
+        of_one_shape(arrays), starts, strict=True)])
+        for arrays, of_one_shape in ((cells, of_one_width), (outlines, triangles_if_mixed))]
     return ModeMotion(_drawn(np.concatenate(nodes), *joined), whole, np.zeros(0)), words
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from fecontact.core.types import Array, Integers
+from fecontact.fem.faces.surface import as_triangles
 from fecontact.output.files.contact_facets import contact_facets
 from fecontact.output.render.frames_data import body_labels
 from fecontact.output.render.surfaces import sharp_edges
@@ -230,16 +231,6 @@ def _labels_on(
         top = np.array([*0.5 * (low + high)[:2], high[2]])
         found.append((part.name, int(own[np.linalg.norm(places[own] - top, axis=1).argmin()])))
     return tuple(found)
-
-
-def as_triangles(facets: Integers) -> Integers:
-    """Triangles (k, 3) of facets (f, 3) or (f, 4), one facet after the other.
-
-    Plane bodies that overlap are drawn in turn.
-    """
-    if facets.shape[1] == 3:
-        return facets
-    return facets[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
 
 
 def along_edges(bodies: DrawnBodies) -> DrawnBodies:

@@ -15,9 +15,9 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.tables import located
 from fecontact.core.types import Array
-from fecontact.fem.elements.cell_kinds import padded
 from fecontact.fem.faces.frames import frames_of
-from fecontact.fem.fields import of_one_kind
+from fecontact.fem.faces.surface import triangles_if_mixed
+from fecontact.fem.fields import of_one_width
 from fecontact.fem.pairing import Pairing, TwoPassPairing
 from fecontact.reduction.assembly.links import Links, NonlinearSpring, linked
 from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs, spring_row
@@ -280,9 +280,8 @@ class _Places:
                 np.zeros(len(one.nodes)) if one.temperature is None else one.temperature
                 for _, one in given])
         elements = [one.cells if one.elements is None else one.elements for _, one in given]
-        width = max(array.shape[1] for array in elements)
-        cells = of_one_kind([one.cells for _, one in given], d)
-        outlines = of_one_kind([one.outline for _, one in given], d - 1)
+        cells = of_one_width([one.cells for _, one in given])
+        outlines = triangles_if_mixed([one.outline for _, one in given])
         first = [part.nodes[0] for part, _ in given]
 
         def together(arrays: Sequence[Any]) -> Any:
@@ -293,7 +292,7 @@ class _Places:
             nodes=np.concatenate([one.nodes for _, one in given]), cells=together(cells),
             outline=together(outlines), shapes=moved, stress=stress,
             restriction=sp.csr_array(sp.vstack(list(restriction))),
-            elements=together([padded([array], width) for array in elements]),
+            elements=together(of_one_width(elements)),
             nonlinear_stress=self._joined_stress(bent) if bent else None,
             temperature=temperature)
 
