@@ -13,13 +13,14 @@ from fecontact.bifurcation.continuation.problem import ContinuationOptions, titl
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.orbits.samples import observe
+from fecontact.bifurcation.tori.method import TorusBalance
 from fecontact.bifurcation.tori.motion import torus_motion
-from fecontact.bifurcation.tree import BranchTree, Task, grow, tasks_beyond
+from fecontact.bifurcation.tree import BranchTree, Methods, Task, grow, tasks_beyond
 from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.diagram_options import BranchSettings
-    from fecontact.bifurcation.orbit_methods import Collocation, Shooting
+    from fecontact.bifurcation.orbit_methods import Method
     from fecontact.system.contact_system import ContactSystem
 
 
@@ -83,8 +84,10 @@ def follow_branches(
         warn_of_limits(_limits_exceeded(field, branch), f"On '{title}'")
         return observe(field, branch, shown, wanted.component)
 
+    methods = Methods(_method(wanted), TorusBalance(wanted.torus_harmonics))
+
     def beyond(task: Task, branch: Branch) -> Iterator[Task]:
-        return tasks_beyond(field, branch, task, wanted.switch, _method(wanted), True,
+        return tasks_beyond(field, branch, task, wanted.switch, methods, True,
                             f"{task.title}, " if task.generation else "")
 
     result = Branches(contact_field=field, observe=(shown, wanted.component))
@@ -148,11 +151,14 @@ def _orbits(
         direction=1.0 if wanted.first < high else -1.0, both=low < wanted.first < high)
 
 
-def _method(wanted: "BranchSettings") -> "Collocation | Shooting":
-    """Collocation or shooting."""
+def _method(wanted: "BranchSettings") -> "Method":
+    """Method of the orbits."""
+    from fecontact.bifurcation.harmonic.method import HarmonicBalance
     from fecontact.bifurcation.orbit_methods import Collocation, Shooting
 
     if wanted.method == "shooting":
         return Shooting(segments=wanted.segments)
+    if wanted.method == "harmonic balance":
+        return HarmonicBalance(wanted.harmonics)
     return Collocation(intervals=wanted.intervals, tolerance=wanted.tolerance,
                        state_tolerance=wanted.state_tolerance)

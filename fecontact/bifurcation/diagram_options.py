@@ -44,9 +44,9 @@ class BranchSettings:
         First and largest step, in parts of the diagram.
     points : int
         Most points of a branch.
-    method : 'collocation' or 'shooting'
-        For orbits: collocation on an adaptive mesh, or the compiled integrator, for steep
-        friction, impacts and many modes.
+    method : 'collocation', 'shooting' or 'harmonic balance'
+        For orbits: collocation on an adaptive mesh, the compiled integrator, for steep friction,
+        impacts and many modes, or Fourier series, for smooth vibration with few harmonics.
     intervals : int
         For collocation: mesh intervals of an orbit.
     tolerance : float
@@ -57,6 +57,10 @@ class BranchSettings:
         get more intervals than ``intervals`` where they need them for it.
     segments : int
         For shooting: pieces of an orbit that are run for themselves; more for unstable orbits.
+    harmonics : int
+        For harmonic balance: harmonics of the period of an orbit.
+    torus_harmonics : (int, int)
+        For tori: harmonics of their two frequencies, that of the orbits on which they begin first.
     transient : float, optional
         For orbits from a run: time before the motion counts as settled [s]; 200 periods of the
         excitation by default.
@@ -86,11 +90,13 @@ class BranchSettings:
     step: float = 0.01
     largest_step: float = 0.05
     points: int = 200
-    method: Literal["collocation", "shooting"] = "collocation"
+    method: Literal["collocation", "shooting", "harmonic balance"] = "collocation"
     intervals: int = 50
     tolerance: float = 1e-7
     state_tolerance: float = 1e-5
     segments: int = 4
+    harmonics: int = 9
+    torus_harmonics: tuple[int, int] = (7, 7)
     transient: Annotated[float | None, Unit("s")] = None
     longest_period: Annotated[float | None, Unit("s")] = None
     point: str | int | None = None
@@ -106,8 +112,10 @@ class BranchSettings:
             if getattr(self, name) is not None:
                 require_positive("BranchSettings", **{name: getattr(self, name)})
         as_count(self.depth, "BranchSettings: depth", 0)
-        for name in ("points", "intervals", "segments"):
+        for name in ("points", "intervals", "segments", "harmonics"):
             as_count(getattr(self, name), f"BranchSettings: {name}")
+        for count in self.torus_harmonics:
+            as_count(count, "BranchSettings: torus_harmonics")
         if self.poincare_scan < 0 or self.poincare_scan == 1:
             raise InputError(f"BranchSettings: poincare_scan = {self.poincare_scan} must be zero, "
                              f"for none, or at least 2.")
@@ -121,7 +129,7 @@ class BranchSettings:
         if self.start is not None:
             require_finite("BranchSettings", start=self.start)
         for name, most in (("intervals", _MOST_PIECES), ("segments", _MOST_PIECES),
-                           ("poincare_scan", _MOST_RUNS)):
+                           ("harmonics", _MOST_PIECES), ("poincare_scan", _MOST_RUNS)):
             if getattr(self, name) > most:
                 raise InputError(f"BranchSettings: {name} = {getattr(self, name)} must be at most "
                                  f"{most}.")

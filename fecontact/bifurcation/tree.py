@@ -27,6 +27,7 @@ from fecontact.system.fields.vector_field import VectorField, require_field
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.orbit_methods import Method
+    from fecontact.bifurcation.tori.method import TorusBalance
 
 # Distance within which two points are the same: in widths of the diagram, ranges of the states, and
 # parts of a period.
@@ -73,6 +74,13 @@ class Task(NamedTuple):
     generation: int
     follow: Callable[[ContinuationOptions], Branch] = _followed
     start: BranchPoint | None = None
+
+
+class Methods(NamedTuple):
+    """Methods of orbits born at Hopf points and of tori; None for the usual ones."""
+
+    orbits: "Method | None" = None
+    tori: "TorusBalance | None" = None
 
 
 def branch_tree(
@@ -139,7 +147,7 @@ def branch_tree(
     chosen = options_of(options, bounds)
 
     def beyond(task: Task, branch: Branch) -> Iterator[Task]:
-        return tasks_beyond(field, branch, task, kinds, method, both,
+        return tasks_beyond(field, branch, task, kinds, Methods(method), both,
                             "" if len(roots) == 1 and not task.generation else f"{task.title}, ")
 
     tasks = [task for name, branch in roots.items() if depth
@@ -203,7 +211,7 @@ def grow(
 
 
 def tasks_beyond(
-    field: VectorField, branch: Branch, task: Task, kinds: Iterable[str], method: "Method | None",
+    field: VectorField, branch: Branch, task: Task, kinds: Iterable[str], methods: Methods,
     both: bool, before: str,
 ) -> Iterator[Task]:
     """The branches that begin at the special points of one; ``before`` their orbits' names.
@@ -218,25 +226,25 @@ def tasks_beyond(
                      "period doubling": f"{task.title}, doubled{count}",
                      "branch point": f"{task.title}, crossing{count}",
                      "Neimark-Sacker": f"{task.title}, tori{count}"}[kind]
-            halves = partial(_beyond, field, point, method, 1.0, both)
+            halves = partial(_beyond, field, point, methods, 1.0, both)
             yield Task(title, task.generation + 1, halves, point)
             if kind == "branch point" and point.is_orbit and both:
                 yield Task(f"{title}, other half", task.generation + 1,
-                           partial(_beyond, field, point, method, -1.0, both), point)
+                           partial(_beyond, field, point, methods, -1.0, both), point)
 
 
 def _beyond(
-    field: VectorField, point: BranchPoint, method: "Method | None", direction: float,
-    both: bool, options: ContinuationOptions,
+    field: VectorField, point: BranchPoint, methods: Methods, direction: float, both: bool,
+    options: ContinuationOptions,
 ) -> Branch:
     """The branch that begins at a special point."""
     from fecontact.bifurcation.orbits.branches import orbit_branch
     from fecontact.bifurcation.tori.branches import torus_branch
 
     if point.kind == "Hopf":
-        return orbit_branch(field, point, method=method, options=options)
+        return orbit_branch(field, point, method=methods.orbits, options=options)
     if point.kind == "Neimark-Sacker":
-        return torus_branch(field, point, options=options)
+        return torus_branch(field, point, method=methods.tori, options=options)
     if point.is_orbit:
         return orbit_branch(field, point, options=options, direction=direction)
     return equilibrium_branch(field, point, options=options, both=both)

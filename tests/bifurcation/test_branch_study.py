@@ -192,15 +192,41 @@ def test_no_branches_no_file(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_study_follows_tori(tmp_path):
+def on_waves():
+    """The oscillator on a wavy ground, with friction that falls more slowly, without branches."""
     text = STUDY[: STUDY.index("[branch]")]
     for old, new in (("decay = 1000.0", "decay = 50.0"), ("slope = 1e6", "slope = 1e3"),
                      ("speed = 12e-3", "speed = 20e-3\namplitude = 37e-6\nwavelength = 4.4e-3"),
                      ("damping_x = 0.768", "damping_x = 20.0")):
         assert old in text
         text = text.replace(old, new)
+    return text
+
+
+def test_a_study_follows_orbits_by_harmonic_balance(tmp_path):
+    path, ranges = tmp_path / "waves.toml", []
+    path.write_text(on_waves() + """
+[branch]
+parameter = "ground.amplitude"
+bounds = [31e-6, 37e-6]
+start = 37e-6
+kind = "orbits"
+transient = 60.0
+points = 3
+harmonics = 15
+""")
+    for method in ("collocation", "harmonic balance"):
+        assert execute(["branch", str(path), "--set", f'branch.method="{method}"']) == 0
+        found = read_branches(tmp_path / "results" / "waves-branch.h5")["orbits of the run"]
+        assert (found.attributes.get("harmonics") == 15) == (method == "harmonic balance")
+        first = max(found.points, key=lambda point: point.parameter)
+        ranges.append([first.values[f"observed_{end}"] for end in ("minimum", "maximum")])
+    assert ranges[0] == pytest.approx(ranges[1], rel=1e-3)
+
+
+def test_a_study_follows_tori(tmp_path):
     path = tmp_path / "waves.toml"
-    path.write_text(text + """
+    path.write_text(on_waves() + """
 [simulation]
 t_end = 20.0
 
@@ -213,11 +239,13 @@ switch = ["Neimark-Sacker"]
 transient = 60.0
 step = 0.01
 largest_step = 0.2
+torus_harmonics = [6, 5]
 """)
     assert execute(["branch", str(path)]) == 0
     found = read_branches(tmp_path / "results" / "waves-branch.h5")
     orbits, tori = found["orbits of the run"], found["orbits of the run, tori"]
     born, = orbits.of_kind("Neimark-Sacker")
+    assert list(tori.attributes["torus_harmonics"]) == [6, 5]
     assert tori.points[0].parameter == pytest.approx(born.parameter, rel=1e-3)
     # Beside the point, tori and orbits have about the same range.
     assert tori.points[0].values["observed_maximum"] == pytest.approx(
