@@ -1,3 +1,4 @@
+from .fitting.report import report_fit
 from .measured.read_measurements import read_measurement, read_measurements
 from .measured.uff_functions import write_uff
 from .output.files.branches import (
@@ -58,6 +59,7 @@ __all__ = [
     "read_wear",
     "report",
     "report_branches",
+    "report_fit",
     "report_frame",
     "report_modes",
     "report_response",

@@ -1,4 +1,4 @@
-from .fitting.plots import plot_fit, plot_profile
+from .fitting.plots import plot_fit, plot_posterior, plot_profile
 from .output.diagrams.colours import COLOURS, STATE_COLOURS
 from .output.plots.amplitude_curve import plot_amplitude_curve
 from .output.plots.analysis import (
@@ -62,6 +62,7 @@ __all__ = [
     "plot_phase_space",
     "plot_poincare",
     "plot_poincare_scan",
+    "plot_posterior",
     "plot_profile",
     "plot_receptance",
     "plot_resonance_curve",

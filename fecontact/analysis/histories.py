@@ -64,28 +64,23 @@ def history(
         point that is not a contact node; for the pressure, if the basis has no thickness.
     """
     require_kind("history", Trajectory, trajectory=trajectory)
-    if quantity not in QUANTITIES:
-        raise InputError(f"quantity = {quantity!r} is not known{nearest(str(quantity), QUANTITIES)}"
-                         f"; choose from {choices(QUANTITIES)}.")
+    unit = quantity_unit(quantity, component)
     title, basis = quantity.replace("_", " "), trajectory.system.basis
     if quantity in _TOTALS:
-        name = _TOTALS[quantity]
-        return History(getattr(trajectory, name).sum(axis=1), _OF_NODES[name], title)
+        return History(getattr(trajectory, _TOTALS[quantity]).sum(axis=1), unit, title)
     if quantity in _OF_NODES:
         if isinstance(point, bool) or not isinstance(point, int | np.integer):
             raise InputError(f"The {title} is one of contact nodes, not of point = {point!r}; give "
                              f"the number of a node, from 0 to "
                              f"{basis.contact_nodes - 1}.")
         node = basis.point_index(int(point)) - 2
-        return History(getattr(trajectory, quantity)[:, node], _OF_NODES[quantity],
+        return History(getattr(trajectory, quantity)[:, node], unit,
                        f"{title} of {point_name(point, basis)}")
     motion = getattr(trajectory, quantity)(point)
     components = basis.components[: motion.shape[1]]
     if component not in components:
         raise InputError(f"component = {component!r} is not one of {point_name(point, basis)}; "
                          f"choose from {choices(components)}.")
-    unit = _OF_POINTS[quantity]
-    unit = unit.replace("m", "rad") if component.startswith("phi") else unit
     if is_relative(point, basis):
         title = f"relative {title}"
         ways = {"x": "along t", "y": "along n"} if basis.dimension == 2 else {
@@ -95,6 +90,16 @@ def history(
         way = component
     return History(motion[:, components.index(component)], unit,
                    f"{title} {way} of {point_name(point, basis)}")
+
+
+def quantity_unit(quantity: str, component: str = "x") -> str:
+    """SI unit of a quantity of :func:`history`; InputError for one that is not known."""
+    if quantity not in QUANTITIES:
+        raise InputError(f"quantity = {quantity!r} is not known{nearest(str(quantity), QUANTITIES)}"
+                         f"; choose from {choices(QUANTITIES)}.")
+    turns = quantity in _OF_POINTS and component.startswith("phi")
+    unit = {**_OF_POINTS, **_OF_NODES}[_TOTALS.get(quantity, quantity)]
+    return unit.replace("m", "rad") if turns else unit
 
 
 def usual_component(system: ContactSystem) -> str:

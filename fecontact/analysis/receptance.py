@@ -68,10 +68,7 @@ class Receptance:
 
     def unit(self, response: int = 0, excitation: int = 0) -> str:
         """Unit of a response, such as m/N."""
-        moved = "rad" if self.responses[response][1].startswith("phi") else "m"
-        moved += _RATES[_POWERS[self.kind]]
-        push = "N m" if self.excitations[excitation][1].startswith("phi") else "N"
-        return f"{moved}/({push})" if " " in push else f"{moved}/{push}"
+        return response_unit(self.kind, self.responses[response], self.excitations[excitation])
 
     @property
     def magnitude(self) -> Array:
@@ -82,6 +79,13 @@ class Receptance:
     def phase(self) -> Array:
         """Phase lead (F, R, E) of the responses over the forces, from -pi to pi [rad]."""
         return np.angle(self.values)
+
+
+def response_unit(kind: Kind, response: Place, excitation: Place) -> str:
+    """SI unit of a frequency response, such as m/N."""
+    moved = "rad" if response[1].startswith("phi") else "m"
+    push = "(N m)" if excitation[1].startswith("phi") else "N"
+    return f"{moved}{_RATES[_POWERS[kind]]}/{push}"
 
 
 def receptance(

@@ -77,6 +77,8 @@ class Curve:
         Part of the numbers of the data set.
     logarithmic : bool
         Whether the abscissa has a logarithmic axis.
+    joined : bool
+        Whether the numbers of the model are joined by a line.
     """
 
     x_label: str
@@ -84,6 +86,7 @@ class Curve:
     y_label: str
     part: slice
     logarithmic: bool = False
+    joined: bool = True
 
 
 def spread(deviation: Any, n: int, owner: str) -> Array | None:

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.analysis.histories import Point, history
+from fecontact.analysis.histories import Point, history, quantity_unit
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, choices
 from fecontact.core.read_only import read_only_arrays
@@ -75,6 +75,7 @@ class HistoryData(FitData):
 
     def __post_init__(self) -> None:
         columns = finite_columns("HistoryData", time=self.time, values=self.values)
+        quantity_unit(self.quantity)
         if len(columns["time"]) < 2 or not (np.diff(columns["time"]) > 0.0).all():
             raise InputError("HistoryData: times must ascend; give two at least.")
         freeze(self, **columns, deviation=spread(self.deviation, len(columns["time"]),
@@ -109,7 +110,8 @@ class HistoryData(FitData):
 
     def curves(self) -> list[Curve]:
         """One curve over time."""
-        return [Curve("time [s]", self.time, self.name or self.quantity.replace("_", " "),
+        unit = quantity_unit(self.quantity, self.component)
+        return [Curve("time [s]", self.time, f"{self.quantity.replace('_', ' ')} [{unit}]",
                       slice(0, len(self.time)))]
 
 
@@ -183,6 +185,7 @@ class DecayData(CurveData):
 
     def __post_init__(self) -> None:
         require_kind("DecayData", AmplitudeCurve, curve=self.curve)
+        quantity_unit(self.quantity)
         if not (isinstance(self.t_end, int | float) and 0.0 < self.t_end < np.inf):
             raise InputError(f"DecayData: t_end = {self.t_end!r} must be a time above zero.")
 

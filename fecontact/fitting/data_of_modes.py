@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.analysis.complex_modes import complex_modes, prestressed_modes
-from fecontact.analysis.receptance import Kind, Place, receptance
+from fecontact.analysis.receptance import Kind, Place, receptance, response_unit
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.response import frequency_response
@@ -85,7 +85,7 @@ class FrequencyData(FitData):
         """Frequencies over the numbers of their modes."""
         assert self.modes is not None
         return [Curve("mode", self.modes.astype(float), "frequency [Hz]",
-                      slice(0, len(self.modes)))]
+                      slice(0, len(self.modes)), joined=False)]
 
 
 @read_only_arrays
@@ -200,9 +200,9 @@ class ReceptanceData(FitData):
     def curves(self) -> list[Curve]:
         """Real and imaginary part over frequency."""
         n = len(self.frequency_hz)
-        return [Curve("frequency [Hz]", self.frequency_hz, f"real {self.kind}", slice(0, n)),
-                Curve("frequency [Hz]", self.frequency_hz, f"imaginary {self.kind}",
-                      slice(n, 2 * n))]
+        unit = response_unit(self.kind, self.response, self.excitation)
+        return [Curve("frequency [Hz]", self.frequency_hz, f"{part} {self.kind} [{unit}]", where)
+                for part, where in (("real", slice(0, n)), ("imaginary", slice(n, 2 * n)))]
 
 
 @read_only_arrays

@@ -151,8 +151,9 @@ def _files(folder: Any, starts: int, overwrite: bool) -> list[Path | None]:
         raise InputError(f"fit: folder = {str(place)!r} is a file; name a folder.")
     files = [place / f"start-{k}.jsonl" for k in range(starts)]
     if overwrite:
-        for file in place.glob("start-*.jsonl"):
-            file.unlink()
+        for pattern in ("start-*.jsonl", "profile-*.jsonl"):
+            for file in place.glob(pattern):
+                file.unlink()
     return list(files)
 
 

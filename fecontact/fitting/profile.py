@@ -1,10 +1,12 @@
 """Profile likelihood of one parameter: the others are fitted anew at each of its values."""
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from fecontact.core.checks import as_count, require_kind
+from fecontact.core.checks import as_count, as_path, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
@@ -65,6 +67,14 @@ class ProfileLikelihood(Summarised):
                     break
         return ends[0], ends[1]
 
+    def table(self) -> dict[str, Any]:
+        """Values, rise of chi square and interval as plain numbers, for files."""
+        rise = self.chi_square - self.best
+        return {"name": self.name, "values": self.values.tolist(),
+                "rise": [float(one) if np.isfinite(one) else None for one in rise],
+                "level": self.level,
+                "interval": [float(end) if np.isfinite(end) else None for end in self.interval]}
+
     def summary(self) -> list[tuple[str, str]]:
         """Parameter, its values, and the interval."""
         low, high = self.interval
@@ -74,7 +84,8 @@ class ProfileLikelihood(Summarised):
 
 
 def profile_likelihood(
-    fit: Fit, name: str, *, points: int = 11, level: float = 0.95
+    fit: Fit, name: str, *, points: int = 11, level: float = 0.95,
+    folder: str | Path | None = None,
 ) -> ProfileLikelihood:
     """Profile likelihood of a parameter: an interval that needs no linear model.
 
@@ -88,6 +99,8 @@ def profile_likelihood(
         Number of its values, over 1.5 times the linear interval within the range.
     level : float
         Probability of the interval.
+    folder : path, optional
+        Folder that stores evaluations, that of the fit: a profile that was cancelled goes on there.
 
     Raises
     ------
@@ -109,7 +122,8 @@ def profile_likelihood(
                                              points), here))
     free = np.ones(len(fit.names), dtype=bool)
     free[k] = False
-    evaluator = Evaluator(fit.problem)
+    evaluator = Evaluator(fit.problem, None if folder is None else
+                          as_path(folder, "a profile") / f"profile-{name}.jsonl")
     weighted = fit.problem.weighted or fit.freedom < 1
     scale = 1.0 if weighted else fit.chi_square / fit.freedom
     found = np.full(len(places), np.nan)

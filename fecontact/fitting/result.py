@@ -187,6 +187,7 @@ class Fit(Summarised):
         """Correlation (p, p) of the parameters; NaN where the data say nothing of one."""
         found = self.place_covariance
         size = np.sqrt(np.diag(found))
+        size[~np.isfinite(size)] = np.nan
         with np.errstate(invalid="ignore"):
             return np.asarray(found / np.outer(size, size))
 

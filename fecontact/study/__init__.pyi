@@ -1,6 +1,6 @@
 from .bodies_section import BodyBasisSettings, BodySections, InterfaceSettings, Placement, Reduced
 from .convergence import study_convergence
-from .fit_section import FitDataSettings, FitParameter, FitSettings
+from .fit_section import FitDataSettings, FitParameter, FitSettings, PosteriorSettings
 from .geometry_section import MeshFile
 from .links_section import FaceWeldSettings
 from .materials_section import MaterialSettings
@@ -34,6 +34,7 @@ __all__ = [
     "MistuningSettings",
     "OutputSettings",
     "Placement",
+    "PosteriorSettings",
     "PreloadSettings",
     "Reduced",
     "RenderSettings",

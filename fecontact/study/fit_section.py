@@ -204,6 +204,36 @@ class FitDataSettings:
 
 
 @dataclass(frozen=True)
+class PosteriorSettings:
+    """``[fit.posterior]``: the posterior distribution of the parameters is sampled too.
+
+    Parameters
+    ----------
+    steps : int
+        Steps of each walker.
+    walkers : int, optional
+        Number of walkers, at least two for each parameter; by default four for each, at least 16.
+    seed : int
+        Seed of the random numbers.
+
+    Raises
+    ------
+    InputError
+        For values out of range.
+    """
+
+    steps: int = 2000
+    walkers: int | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.steps < 2 or self.seed < 0 or (self.walkers is not None and self.walkers < 2):
+            raise InputError(f"PosteriorSettings: steps = {self.steps} must be at least 2, walkers "
+                             f"= {self.walkers} at least two for each parameter, seed = "
+                             f"{self.seed} zero or above.")
+
+
+@dataclass(frozen=True)
 class FitSettings:
     """``[fit]``: parameters of the study that are fitted to measurements.
 
@@ -224,6 +254,10 @@ class FitSettings:
         Residual in standard deviations from which on it is an outlier.
     exact : bool
         Whether derivatives are exact where the data have some, else differences.
+    profile : int
+        Number of points of the profile likelihood of each parameter; 0 for none, else at least 5.
+    posterior : PosteriorSettings, optional
+        ``[fit.posterior]``: the posterior distribution is sampled too.
 
     Raises
     ------
@@ -238,6 +272,8 @@ class FitSettings:
     loss: Literal["linear", "soft_l1", "huber", "cauchy"] = "linear"
     loss_scale: float = 3.0
     exact: bool = True
+    profile: int = 0
+    posterior: PosteriorSettings | None = None
 
     def __post_init__(self) -> None:
         convert_fields(self)
@@ -250,6 +286,16 @@ class FitSettings:
             raise InputError(f"FitSettings: starts = {self.starts} must be at least 1, seed = "
                              f"{self.seed} zero or above, loss_scale = {self.loss_scale!r} above "
                              f"zero.")
+        if self.profile != 0 and self.profile < 5:
+            raise InputError(f"FitSettings: profile = {self.profile} must be 0, for none, or at "
+                             f"least 5 points.")
+        walkers = None if self.posterior is None else self.posterior.walkers
+        if walkers is not None and walkers < 2 * len(self.parameters):
+            raise InputError(f"FitSettings: posterior.walkers = {walkers} must be at least "
+                             f"{2 * len(self.parameters)}, two for each parameter.")
+        if self.posterior is not None and self.loss != "linear":
+            raise InputError(f"FitSettings: loss = '{self.loss}' is no likelihood; a posterior "
+                             f"distribution needs loss = 'linear'.")
 
 
 def flat_parameters(table: Any) -> Any:

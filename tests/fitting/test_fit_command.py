@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from report_reading import Shown
 
 import fecontact as fc
 from fecontact.fitting import LoopData, fit_study, study_data
@@ -66,11 +67,17 @@ def test_a_study_is_fitted(study, cli, tmp_path):
     assert stored["parameters"]["friction.stiffness"]["value"] == pytest.approx(
         found["friction.stiffness"])
     assert (folder / "fit.png").stat().st_size > 5000
+    page = Shown(folder / "fit.html").header
+    assert (page["title"], page["good"]) == ("joint", True)
+    assert [row[0] for row in page["parameters"]] == list(found.names)
+    assert {one["name"] for one in page["study"]} >= {"fit", "fit.parameters.friction.stiffness"}
     before = (folder / "start-0.jsonl").read_text()
     code, out, told = cli("fit", str(study), "-o", str(folder), "--posterior", "30")
     assert code == 0
     assert "posterior, in SI units" in out
     assert "shorter than 50 autocorrelation times" in told
+    assert (folder / "posterior.png").stat().st_size > 5000
+    assert len(Shown(folder / "fit.html").header["pairs"]) == 1
     chains = json.loads((folder / "fit.json").read_text())["posterior"]
     median = chains["parameters"]["friction.stiffness"]["median"]
     assert abs(median - found["friction.stiffness"]) < 4.0 * found.deviations["friction.stiffness"]
@@ -82,6 +89,31 @@ def test_a_study_is_fitted(study, cli, tmp_path):
     assert "is of a fit of another model" in told
     assert cli("fit", str(study), "-o", str(folder), "--set", "load.normal=120",
                "--overwrite")[0] == 0
+
+
+def test_profiles_and_the_posterior_distribution_of_a_study(study, cli, tmp_path):
+    text = STUDY.replace("starts = 2", "profile = 5\nposterior = { steps = 6, walkers = 5 }")
+    study.write_text(text)
+    folder = tmp_path / "found"
+    code, out, _ = cli("fit", str(study), "-o", str(folder))
+    assert code == 0
+    assert "profile likelihood, in SI units" in out
+    stored = json.loads((folder / "fit.json").read_text())
+    assert stored["posterior"]["walkers"] == 5
+    assert stored["posterior"]["steps"] + stored["posterior"]["discarded"] == 6
+    for one in stored["profiles"]:
+        found, (low, high) = stored["parameters"][one["name"]], one["interval"]
+        assert (low, high) == pytest.approx((found["low"], found["high"]),
+                                            abs=0.1 * (found["high"] - found["low"]))
+    page = Shown(folder / "fit.html").header
+    assert (len(page["profiles"]), len(page["marginals"]), len(page["pairs"])) == (2, 2, 1)
+    kept = (folder / "profile-friction.stiffness.jsonl").read_text()
+    assert cli("fit", str(study), "-o", str(folder))[0] == 0
+    assert (folder / "profile-friction.stiffness.jsonl").read_text() == kept
+    (folder / "fit.html").write_text("a page of another program")
+    code, _, said = cli("fit", str(study), "-o", str(folder))
+    assert code == 1
+    assert "exists and is no page of fecontact" in said
 
 
 @pytest.mark.long
@@ -159,6 +191,11 @@ changes = { "drive.amplitude_x" = 1e-4 }
     ("starts = 2", "starts = 0", "starts = 0 must be at least 1"),
     ("low = 0.05", "low = 2.0", "high = 1 must lie above low = 2"),
     ('kind = "loop"', 'kind = "loops"', 'must be "loop"'),
+    ("starts = 2", "profile = 3", "profile = 3 must be 0, for none, or at least 5 points"),
+    ("starts = 2", "posterior = { steps = 1 }", "steps = 1 must be at least 2"),
+    ("starts = 2", "posterior = { walkers = 3 }", "walkers = 3 must be at least 4"),
+    ("starts = 2", "posterior = { step = 9 }", "did you mean 'steps'"),
+    ("starts = 2", 'loss = "huber"\nposterior = {}', "a posterior distribution needs loss"),
     ('against = "pull"', "", "kind = 'loop' needs the key 'against'"),
     ('"loop.csv"', '"lop.csv"', "there is no such file"),
     ('"force"', '"forc"', "did you mean 'force'"),

@@ -241,7 +241,7 @@ def test_pictures(tmp_path):
     found = fc.fit(system(), RANGES, FunctionData(line, y, 0.1, PLACES, ("place [m]", "u [m]")))
     figure = plot_fit(found, path=tmp_path / "fit.png")
     assert [axis.get_ylabel() for axis in figure.axes] == ["u [m]", "residual /\ndeviation"]
-    band = figure.axes[0].collections[-1].get_paths()[0].vertices[:, 1]
+    band = figure.axes[0].collections[0].get_paths()[0].vertices[:, 1]
     below, above = found.bands()[0]
     assert (band.min(), band.max()) == pytest.approx((below.min(), above.max()))
     profile = profile_likelihood(found, SLOPE)

@@ -47,6 +47,33 @@ def test_the_picture_has_the_values_in_si_units():
         "force", "one", "two", "stable", "unstable", "fold (F)", "beyond"]
 
 
+def test_a_range_about_a_loop_is_shaded_where_it_goes_and_where_it_returns():
+    x = np.array([0.0, 1.0, 2.0, 1.0, 0.0])
+    loop = Curve("loop", "#0072b2", x, x**2, limits=(x**2 - 0.5, x**2 + 1.0), limits_name="95 %")
+    with new_figure(4.0, 3.0) as figure:
+        axes = figure.subplots()
+        draw(axes, Diagram("u [m]", "F [N]", (loop,)))
+    for shaded in axes.collections:
+        inside = shaded.get_paths()[0].contains_points([[1.5, 2.5], [1.5, 4.0], [0.5, -0.3]])
+        assert inside.tolist() == [True, False, False]
+    assert [text.get_text() for text in axes.legend().get_texts()] == ["95 %", "loop"]
+
+
+def test_bars_limits_and_levels_are_on_the_page_too():
+    y = 3e4 * X**0.5
+    one = Curve("one", "", X, y, 0.0, 3.0, bars=0.1 * y, limits=(0.5 * y, 2.0 * y))
+    header, contents = table_of(Diagram("u [m]", "F [N]", (one,), levels=(Level(1e-5, "x"),),
+                                        logarithmic="xy"))
+    table = header["one"]
+    line, = table["lines"]
+    for name, factors in (("bars", (0.9, 1.1)), ("limits", (0.5, 2.0))):
+        for end, factor in zip(line[name], factors, strict=True):
+            assert 10.0 ** stored_array(end, contents) == pytest.approx(factor * y, rel=1e-4)
+    (axis, value), = table["levels"]
+    assert (axis, 1e-6 * 10.0**value) == ("x", pytest.approx(1e-5))
+    assert (line["width"], line["marker"]) == (0.0, 3.0)
+
+
 def test_the_page_has_the_same_values_in_its_units():
     header, contents = table_of(DIAGRAM)
     table = header["one"]

@@ -18,8 +18,9 @@ from report_reading import Shown
 from synthetic import run
 from test_report import EVIL, true_fields
 
-from fecontact import ContactSystem, ElasticBody, Material, modal_basis, simulate
-from fecontact.io import report, report_frame, report_sweep
+from fecontact import ContactSystem, Drive, ElasticBody, Material, fit, modal_basis, simulate
+from fecontact.fitting import FunctionData
+from fecontact.io import report, report_fit, report_frame, report_sweep
 from fecontact.reduction import LargeDeflections
 from fecontact.sweeps import SweepTable
 
@@ -323,6 +324,34 @@ def test_a_cell_of_a_sweep_shows_its_case(browser, tmp_path):
         assert "0.005" in text
         assert not opened.complaints
         assert opened.asked == [path.as_uri()]
+
+
+def test_a_point_of_a_fit_is_read(browser, tmp_path):
+    places = np.linspace(0.0, 1.0, 5)
+    data = FunctionData(along, 1e4 * places + 30.0, 40.0, places, ("place [m]", "force [N]"))
+    held = ContactSystem(run().system.basis, drive=Drive(stiffness_x=1e4))
+    found = fit(held, {"drive.stiffness_x": (1e3, 1e5)}, data)
+    path = report_fit(found, tmp_path / "fit.html", title=EVIL)
+    with Opened(browser, path) as opened:
+        box = opened.page.locator(".plot").first.bounding_box()
+        # Abscissae begin and end 6 % of their range beside the ends of the axis.
+        x = 52.0 + (box["width"] - 62.0) * (0.06 + 0.75) / 1.12
+        opened.page.mouse.click(box["x"] + x, box["y"] + 0.3 * box["height"])
+        assert opened.page.evaluate("+document.documentElement.dataset.point") == 3
+        text = opened.page.locator("section", has_text="Point").first.inner_text()
+        shown = dict(line.split("\t") for line in text.splitlines() if "\t" in line)
+        assert float(shown["measured"]) == pytest.approx(7.53, abs=1e-3)
+        assert float(shown["fitted"]) == pytest.approx(found.predicted[3] / 1e3, rel=1e-4)
+        assert float(shown["residual / deviation"]) == pytest.approx(found.residuals[3], abs=1e-4)
+        assert opened.page.locator("h1").inner_text() == EVIL
+        # Dots, the line and its band: more colours than text and grid have.
+        assert len(np.unique(opened.picture(".plot").reshape(-1, 3), axis=0)) > 50
+        assert not opened.complaints
+        assert opened.asked == [path.as_uri()]
+
+
+def along(system):
+    return system.drive.stiffness_x * np.linspace(0.0, 1.0, 5)
 
 
 def test_a_notebook_shows_it_in_a_frame_of_its_own(browser, trajectory, tmp_path):

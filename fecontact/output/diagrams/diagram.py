@@ -36,6 +36,10 @@ class Curve:
         Whether the whole line is dashed and thin, whatever its stability.
     bars : (N,) array or None
         Half the length of a bar of uncertainty at each point.
+    limits : ((N,), (N,)) arrays or None
+        Lower and upper limits of a shaded range about the values.
+    limits_name : str
+        Entry of the shaded range in the legend; empty for none.
     """
 
     name: str
@@ -47,6 +51,8 @@ class Curve:
     stable: NDArray[np.bool_] | None = None
     dashed: bool = False
     bars: Array | None = None
+    limits: tuple[Array, Array] | None = None
+    limits_name: str = ""
 
     @property
     def solid(self) -> NDArray[np.bool_] | None:

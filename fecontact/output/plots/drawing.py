@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 _MOST_RATIO = 1e3  # of the ends of a logarithmic axis with labels between decades
 _DIGITS = 10  # of ticks, at most
 _POWERS = (-3, 5)  # of ten, beyond which ticks have a common factor
+_SHADED = 0.25  # opacity of ranges about curves
 _SIZE = 7.0  # of the markers of special points [points]
 _EMPTY: Any = {"color": INK, "markerfacecolor": "white", "linestyle": "none", "markersize": _SIZE}
 
@@ -112,6 +113,12 @@ def draw(axes: "Axes", diagram: Diagram, *, marker_size: float = _SIZE) -> None:
 
 def _draw_curve(axes: "Axes", curve: Curve) -> None:
     shown: dict[str, Any] = {"color": curve.colour or INK, "label": legend_label(curve.name)}
+    if curve.limits is not None:
+        low, high = curve.limits
+        for part in _one_way(curve.x):
+            axes.fill_between(curve.x[part], low[part], high[part], color=shown["color"],
+                              alpha=_SHADED, linewidth=0.0,
+                              label=legend_label("" if part.start else curve.limits_name))
     if curve.marker:
         shown |= {"marker": "o", "markersize": curve.marker}
     if curve.bars is not None:
@@ -128,6 +135,13 @@ def _draw_curve(axes: "Axes", curve: Curve) -> None:
             axes.plot(*thinned(curve.x[first : last + 1], curve.y[first : last + 1]),
                       linewidth=curve.width if solid else min(curve.width, WIDTH),
                       linestyle="-" if solid else DASHES, **shown)
+
+
+def _one_way(x: Array) -> list[slice]:
+    """Parts along which abscissae ascend or descend; those of a loop end where it turns."""
+    ways = np.sign(np.diff(x))
+    turns = np.flatnonzero(ways[:-1] * ways[1:] < 0.0) + 1
+    return [slice(a, b + 1) for a, b in pairwise([0, *turns.tolist(), len(x) - 1])]
 
 
 def runs_of(pieces: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -52,11 +52,16 @@ def diagram_table(
     lines = []
     for curve in diagram.curves:
         y = shown("y", curve.y)
-        step = (_OVER_TIME * diagram.largest / factor if over_time
-                else _STEP * float(np.abs(y).max(initial=0.0)))
+        step = max(_OVER_TIME * diagram.largest / factor if over_time
+                   else _STEP * float(np.abs(y).max(initial=0.0)), SMALLEST)
         line: dict[str, Any] = {"name": f"{diagram.heading} {curve.name}".strip(),
                                 "colour": curve.colour, "width": curve.width,
-                                "y": payload.add(y, max(step, SMALLEST))}
+                                "y": payload.add(y, step)}
+        if curve.marker:
+            line["marker"] = curve.marker
+        bars = None if curve.bars is None else (curve.y - curve.bars, curve.y + curve.bars)
+        line |= {name: [payload.add(shown("y", end), step) for end in ends]
+                 for name, ends in (("bars", bars), ("limits", curve.limits)) if ends is not None}
         if not over_time:
             x = shown("x", curve.x)
             size = max(float(np.ptp(x)), _ACROSS * float(np.abs(x).max()))
@@ -67,6 +72,8 @@ def diagram_table(
         lines.append(line)
     return {"title": diagram.title or name, "unit": unit, "factor": factor, "xLabel": x_label,
             "log": diagram.logarithmic, "limits": limits, "lines": lines,
+            "levels": [[level.axis, float(shown(level.axis, np.array(level.value)))]
+                       for level in diagram.levels],
             "marks": [[float(shown("x", np.array(mark.x))), float(shown("y", np.array(mark.y))),
                        mark.letters or mark.kind] for mark in diagram.marks]}
 

@@ -16,7 +16,7 @@ from fecontact.core.errors import InputError, ModelWarning
 from fecontact.core.files.atomic_write import write_text
 from fecontact.output.report.payload import as_text
 
-Kind = Literal["run", "runs", "branches", "sweep", "widget"]
+Kind = Literal["run", "runs", "branches", "sweep", "fit", "widget"]
 # In the order in which they need each other; together one script.
 _COMMON = ("payload.js", "chart.js", "widgets.js")
 SCRIPTS: Mapping[Kind, tuple[str, ...]] = {
@@ -24,6 +24,7 @@ SCRIPTS: Mapping[Kind, tuple[str, ...]] = {
     "runs": (*_COMMON, "spectrum.js", "runs.js", "start.js"),
     "branches": (*_COMMON, "player.js", "branches.js", "start.js"),
     "sweep": (*_COMMON, "sweep.js", "start.js"),
+    "fit": (*_COMMON, "fit.js", "start.js"),
     "widget": (*_COMMON, "spectrum.js", "map.js", "player.js", "run.js", "widget.js"),
 }
 LARGE = 20e6  # bytes of a file that mail and browsers take without complaint

@@ -66,8 +66,9 @@ function layer(canvas, width, height) {
 }
 
 // Lines of a diagram of the page: over the clock, or over abscissae of their own.
-const linesOf = ({ lines }) => lines.map(({ x, y, solid, ...line }) => ({
-  ...line, y: y.values, x: x?.values, solid: solid?.values }));
+const linesOf = ({ lines }) => lines.map(({ x, y, solid, bars, limits, ...line }) => ({
+  ...line, y: y.values, x: x?.values, solid: solid?.values, bars: bars?.map(({ values }) => values),
+  limits: limits?.map(({ values }) => values) }));
 
 // Letters of labels.
 function letters(c, textAlign) {
@@ -77,12 +78,13 @@ function letters(c, textAlign) {
 }
 
 class Chart {
-  // lines: [{name, colour, width?, x?, y, solid?}] with arrays; without x over the time of the clock.
+  // lines: [{name, colour, width?, x?, y, solid?, marker?, bars?, limits?}] with arrays; without x over
+  // the time of the clock; bars and shaded limits have [lower, upper] ends.
   // Logarithmic axes, named in `log`, have common logarithms; `limits` fixes ends of axes, `marks` are
-  // places with letters.
+  // places with letters, `levels` straight lines at a value of an axis.
   constructor(clock, { title, unit, xLabel, lines, legend = lines, height = 132, kind = "chart",
-    log = "", limits = {}, marks = [] }) {
-    Object.assign(this, { clock, lines, xLabel, height, log, marks, ends: limits });
+    log = "", limits = {}, marks = [], levels = [] }) {
+    Object.assign(this, { clock, lines, xLabel, height, log, marks, levels, ends: limits });
     this.base = el("canvas");
     this.top = el("canvas");
     this.box = el("div.plot", {}, this.base, this.top);
@@ -94,7 +96,7 @@ class Chart {
   }
 
   legend(lines) {
-    const named = lines.filter(({ name }, k) => lines.findIndex((line) => line.name === name) === k);
+    const named = lines.filter(({ name }, k) => name && lines.findIndex((line) => line.name === name) === k);
     if (named.length < 2) return [];
     return named.map(({ name, colour, back }) => {
       const swatch = el("i");
@@ -121,9 +123,11 @@ class Chart {
       let low = Infinity, high = -low;
       for (const line of this.lines) {
         // What is not a number is smaller and larger than nothing.
-        for (let i = i0; i <= i1; i++) {
-          if (line[name][i] < low) low = line[name][i];
-          if (line[name][i] > high) high = line[name][i];
+        for (const values of [line[name], ...name === "y" ? [...line.bars ?? [], ...line.limits ?? []] : []]) {
+          for (let i = i0; i <= i1; i++) {
+            if (values[i] < low) low = values[i];
+            if (values[i] > high) high = values[i];
+          }
         }
       }
       const room = 0.06 * (high - low) || 0.1 * abs(high) || 1, [first, last] = this.ends[name] ?? [];
@@ -155,13 +159,23 @@ class Chart {
     c.beginPath();
     c.rect(left, top - 1, right - left, bottom - top + 2);
     c.clip();
+    c.strokeStyle = css("mark");
+    c.beginPath();
+    for (const [name, value] of this.levels) {
+      if (name === "x") { c.moveTo(this.px(value), top); c.lineTo(this.px(value), bottom); }
+      else { c.moveTo(left, this.py(value)); c.lineTo(right, this.py(value)); }
+    }
+    c.stroke();
     for (const line of this.lines) {
-      c.strokeStyle = themed(line.colour);
-      c.lineWidth = line.width ?? 1.2;
+      c.strokeStyle = c.fillStyle = themed(line.colour);
+      if (line.limits) this.shaded(c, line);
+      c.lineWidth = line.width || 1.2;
       c.beginPath();
-      if (line.x) this.trace(c, line); else this.envelope(c, line.y);
+      if (line.width === 0) this.barred(c, line);
+      else if (line.x) this.trace(c, line); else this.envelope(c, line.y);
       c.stroke();
       if (line.solid) this.dashed(c, line);
+      if (line.marker) this.dotted(c, line);
     }
     c.restore();
     c.font = `600 12px ${css("font")}`;
@@ -197,6 +211,36 @@ class Chart {
       if (solid && i && !solid[i - 1]) c.moveTo(this.px(x[i]), this.py(y[i]));
       else c.lineTo(this.px(x[i]), this.py(y[i]));
     }
+  }
+
+  // The range between limits, piece by piece, each from left to right.
+  shaded(c, { x, limits: [low, high] }) {
+    c.globalAlpha = 0.25;
+    c.beginPath();
+    for (let i = 1; i < x.length; i++) {
+      const [a, b] = x[i - 1] < x[i] ? [i - 1, i] : [i, i - 1];
+      c.moveTo(this.px(x[a]), this.py(low[a]));
+      for (const [k, end] of [[b, low], [b, high], [a, high]]) c.lineTo(this.px(x[k]), this.py(end[k]));
+      c.closePath();
+    }
+    c.fill();
+    c.globalAlpha = 1;
+  }
+
+  barred(c, { x, bars }) {
+    bars?.[0].forEach((low, i) => {
+      c.moveTo(this.px(x[i]), this.py(low));
+      c.lineTo(this.px(x[i]), this.py(bars[1][i]));
+    });
+  }
+
+  dotted(c, { x, y, marker }) {
+    c.beginPath();
+    x.forEach((at, i) => {
+      c.moveTo(this.px(at), this.py(y[i]));
+      c.arc(this.px(at), this.py(y[i]), 0.6 * marker, 0, 7);
+    });
+    c.fill();
   }
 
   // Pieces that are not solid are dashed and thin.
@@ -259,6 +303,31 @@ class Chart {
       c.fillStyle = themed(line.colour);
       c.beginPath();
       c.arc(this.px(line.x ? line.x[index] : axis[index]), this.py(line.y[index]), 3.5, 0, 7);
+      c.fill();
+    }
+  }
+}
+
+// A chart over abscissae of its own; a click gives the number of the nearest point of its first line.
+class StillChart extends Chart {
+  constructor(diagram, pick = () => {}) {
+    const lines = linesOf(diagram), longest = max(...lines.map(({ x }) => x.length)) - 1;
+    super({ window: () => [0, longest], set: pick }, { ...diagram, lines });
+  }
+
+  timeAt(x, y) {
+    const [line] = this.lines, away = Array.from(line.x, (at, i) => hypot(this.px(at) - x, this.py(line.y[i]) - y));
+    return away.indexOf(min(...away));
+  }
+
+  point() {
+    const c = this.cursor, { chosen } = this;
+    c.clearRect(0, 0, this.width, this.height);
+    if (chosen === undefined) return;
+    c.fillStyle = css("accent");
+    for (const { x, y } of this.lines) {
+      c.beginPath();
+      c.arc(this.px(x[chosen]), this.py(y[chosen]), 4, 0, 7);
       c.fill();
     }
   }

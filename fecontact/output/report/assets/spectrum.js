@@ -1,9 +1,8 @@
 // Amplitude spectra over frequency; a click reads a frequency.
 
-class Spectrum extends Chart {
+class Spectrum extends StillChart {
   constructor(diagram) {
-    const lines = linesOf(diagram), longest = max(...lines.map(({ x }) => x.length)) - 1;
-    super({ window: () => [0, longest], set: (hertz) => { this.at = hertz; this.point(); } }, { ...diagram, lines });
+    super(diagram, (hertz) => { this.at = hertz; this.point(); });
   }
 
   timeAt(x) {
