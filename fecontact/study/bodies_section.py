@@ -39,7 +39,7 @@ from fecontact.study.geometry_section import (
     geometry_mesh,
     geometry_table,
 )
-from fecontact.study.links_section import LinkSettings, made_links
+from fecontact.study.links_section import LinkSettings, made_links, shaker_bases
 from fecontact.study.sections import BasisSettings, BodySettings
 from fecontact.system.gap import Crown
 
@@ -472,5 +472,6 @@ def reduced_bodies(
     with located(f"{title}:"):
         made = made_links(links, bodies, title)
         springs = np.zeros(len(nonlinear_springs(made)))
-        return Reduced(assembled_basis(bases, faces, made), np.concatenate(
+        shakers = shaker_bases(links, next(iter(bodies.values())).dimension, title)
+        return Reduced(assembled_basis({**bases, **shakers}, faces, made), np.concatenate(
             [*(one.gaps for one in faces.values()), springs]))

@@ -9,6 +9,7 @@ from fecontact.core.tables import convert_fields, from_table, located, shown, to
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.pairing import pair_faces
+from fecontact.measured.shaker import Shaker
 from fecontact.reduction.assembly.face_weld import FaceWeld
 from fecontact.reduction.assembly.links import (
     Bushing,
@@ -23,6 +24,7 @@ from fecontact.reduction.assembly.nonlinear_springs import (
     PlaySpring,
     PolynomialSpring,
 )
+from fecontact.reduction.modal_basis import ModalBasis
 
 
 @dataclass(frozen=True)
@@ -49,11 +51,51 @@ class FaceWeldSettings:
         convert_fields(self)
 
 
-LinkSettings = Spring | Bushing | Hinge | NonlinearSpring | FaceWeldSettings
+@dataclass(frozen=True, kw_only=True)
+class ShakerSettings(Shaker):
+    """Electrodynamic shaker, a further body NAME, whose stinger drives a point of a body.
+
+    A load at its point ``NAME.coil`` with component = "x" is the current [A], or the voltage [V] of
+    a shaker with a resistance. Force gauges name the stinger by ``link = "NAME"``.
+
+    Parameters
+    ----------
+    first : str
+        'BODY.POINT', the point that is driven.
+    armature_mass : float
+        Mass of armature and coil [kg].
+    suspension_stiffness, suspension_damping : float
+        Suspension of the armature in the frame, which stands.
+    stinger_stiffness, stinger_damping : float
+        Stinger along ``direction``, without bending moments.
+    direction : list
+        Direction of the force, [x, y] or [x, y, z].
+    force_factor : float
+        Force per current; 1 for a drive that is a force in N.
+    resistance : float, optional
+        Resistance of the coil: the drive is a voltage.
+    inductance : float
+        Inductance of the coil.
+    """
+
+    first: str
+
+    def __post_init__(self) -> None:
+        convert_fields(self)
+        super().__post_init__()
+
+    @property
+    def second(self) -> None:
+        """No further body of the study: the other end of the stinger is the armature."""
+
+
+SimpleLink = Spring | Bushing | Hinge | NonlinearSpring
+LinkSettings = SimpleLink | FaceWeldSettings | ShakerSettings
 
 LINKS: Mapping[str, type] = {
     "spring": Spring, "bushing": Bushing, "hinge": Hinge, "weld": Weld,
-    "face-weld": FaceWeldSettings, "polynomial-spring": PolynomialSpring,
+    "face-weld": FaceWeldSettings, "shaker": ShakerSettings,
+    "polynomial-spring": PolynomialSpring,
     "play-spring": PlaySpring, "piecewise-spring": PiecewiseSpring}
 
 
@@ -91,7 +133,7 @@ def made_links(
         For faces that cannot be welded, naming the section.
     """
     found: dict[str, Link] = {}
-    for name, one in links.items():
+    for name, one in with_stingers(links).items():
         if isinstance(one, FaceWeldSettings):
             with located(f"{title}: [links.{name}]:", "FaceWeld", "pair_faces"):
                 found[name] = FaceWeld(pair_faces(bodies, one.first, one.second, nodes=one.nodes,
@@ -99,3 +141,27 @@ def made_links(
         else:
             found[name] = one
     return found
+
+
+def with_stingers(links: Mapping[str, LinkSettings]) -> dict[str, FaceWeldSettings | SimpleLink]:
+    """Links with the stinger, a spring, in place of each shaker."""
+    return {name: one.stinger(one.first, name) if isinstance(one, ShakerSettings) else one
+            for name, one in links.items()}
+
+
+def shaker_bases(
+    links: Mapping[str, LinkSettings], dimension: int, title: str
+) -> dict[str, ModalBasis]:
+    """Bodies of the shakers by the names of their links.
+
+    Raises
+    ------
+    InputError
+        For a direction that is not one of the bodies, naming the section.
+    """
+    shakers = {name: one for name, one in links.items() if isinstance(one, ShakerSettings)}
+    for name, one in shakers.items():
+        if len(one.direction) != dimension:
+            raise InputError(f"{title}: [links.{name}]: direction = {shown(list(one.direction))} "
+                             f"must have {dimension} components, as the bodies have.")
+    return {name: one.basis() for name, one in shakers.items()}

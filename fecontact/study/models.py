@@ -33,7 +33,7 @@ from fecontact.study.bodies_section import (
     reduced_bodies,
 )
 from fecontact.study.geometry_section import Geometry, geometry_mesh
-from fecontact.study.links_section import LinkSettings
+from fecontact.study.links_section import LinkSettings, with_stingers
 from fecontact.study.measurement_section import MeasurementSettings, masses_of_sensors
 from fecontact.study.sections import BasisSettings, BodySettings
 from fecontact.study.sector_section import (
@@ -296,7 +296,8 @@ class StudyModels:
         if self.measurement is None:
             return bare
         with located(f"{self.title}: [measurement]:", "with_sensors", "with_masses"):
-            return replace(bare, basis=self.measurement.loaded(bare.basis, self.links))
+            return replace(bare, basis=self.measurement.loaded(
+                bare.basis, with_stingers(self.links)))
 
     @property
     def _bare(self) -> Reduced:

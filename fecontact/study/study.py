@@ -58,7 +58,12 @@ from fecontact.study.geometry_section import (
     geometry_from_table,
     geometry_table,
 )
-from fecontact.study.links_section import LinkSettings, link_table, links_from_tables
+from fecontact.study.links_section import (
+    LinkSettings,
+    link_table,
+    links_from_tables,
+    with_stingers,
+)
 from fecontact.study.measurement_section import MeasurementSettings
 from fecontact.study.models import StudyModels
 from fecontact.study.preload_section import PreloadSettings
@@ -464,7 +469,8 @@ class Study(Summarised, StudyModels):
         """
         title, settings = _title(self.path), self.require_sensors()
         with located(f"{title}: [measurement]:", "measure"):
-            return settings.of(self.run() if run is None else run, self.links, title)
+            return settings.of(self.run() if run is None else run, with_stingers(self.links),
+                               title)
 
     def require_sensors(self) -> MeasurementSettings:
         """Section ``[measurement]``; InputError without it, or without sensors in it."""

@@ -62,6 +62,8 @@ def body_labels(basis: ModalBasis) -> tuple[tuple[str, int], ...]:
         ~basis.ground_nodes & ~basis.spring_nodes]
     for part in basis.parts:
         first, count = part.nodes
+        if not count:
+            continue  # a body without a mesh, such as a shaker
         nodes = field.nodes[first : first + count]
         edge = np.unique(field.outline)
         edge = edge[(first <= edge) & (edge < first + count)]
