@@ -33,18 +33,10 @@ from fecontact.fem.mesh_files.ansys import read_cdb
 from fecontact.fem.mesh_files.gmsh import read_msh, write_msh
 from fecontact.fem.mesh_files.groups import Box, named_boundaries, named_constraints, named_points
 from fecontact.fem.mesh_files.med import read_med
-from fecontact.fem.mesh_files.nastran_cards import grid_rows
-from fecontact.fem.mesh_files.nastran_constraints import add_constraints
-from fecontact.fem.mesh_files.nastran_loads import add_load_groups
+from fecontact.fem.mesh_files.nastran import read_nastran
 from fecontact.fem.mesh_files.raw import RawMesh, body_mesh
 from fecontact.fem.pretension import cut_along
 
-# Cards of Nastran that stiffen a mesh of plane and solid elements, as regular expressions. Bars
-# without properties name lines.
-_STIFFENING = (r"PBARL?", r"PBE(?:AML?|AM3|ND)", "PROD", "CONROD", "PTUBE", r"CBUSH(?:1D|2D)?",
-               r"CELAS\d", r"CDAMP\d", "CVISC", "CGAP", "CWELD", "CFAST", "CSEAM", r"CMASS\d",
-               r"CONM\d", "RBE1", "RBAR1?", "RROD", "RTRPLT1?", "RSPLINE", "RJOINT", "MPCADD",
-               "DMIG")
 _BYTES_OF_A_GRID_POINT = 200.0  # coordinates and a cell of eight nodes, with copies
 
 
@@ -255,7 +247,7 @@ def _reader(path: Path) -> tuple[Callable[[Path], RawMesh], str]:
         ".med": (read_med, "MED"),
         ".vtk": (_read_vtk, "VTK"),
         ".vtu": (_read_vtu, "VTU"),
-        **dict.fromkeys((".bdf", ".fem", ".nas"), (_read_nastran, "Nastran")),
+        **dict.fromkeys((".bdf", ".fem", ".nas"), (read_nastran, "Nastran")),
     }
     if path.suffix.lower() not in readers:
         raise InputError(f"{path}: files of this kind are not read; the suffixes that are: "
@@ -329,47 +321,16 @@ def _read_vtu(path: Path) -> RawMesh:
     return _raw_mesh(_by_meshio("vtu", path))
 
 
-def _read_nastran(path: Path) -> RawMesh:
-    text = path.read_text(encoding="utf-8", errors="replace").upper()
-    if re.search(r"^C(?:TRIA|QUAD|TRAX|TETRA|HEXA|PENTA|PYRAM)\w*\s*\*", text, re.MULTILINE):
-        raise MeshError("The file has elements in large fields (CQUAD4*), which are not read; "
-                        "write elements in small fields.")
-    # Shells beside solids stiffen these; alone in a plane they are the body.
-    solid = re.search(r"^C(?:TETRA|HEXA|PENTA|PYRAM)", text, re.MULTILINE)
-    found = re.search(rf"^(?:{'|'.join(_STIFFENING)}{'|PSHELL|PCOMP' if solid else ''})\b", text,
-                      re.MULTILINE)
-    if found:
-        raise MeshError(f"The file holds {found[0]}, which is not read and would stiffen the mesh "
-                        f"or give it mass; mesh stiffeners with solid elements, or give a deck of "
-                        f"Abaqus or CalculiX, which may have couplings, equations, springs and "
-                        f"masses, or the matrices of a superelement (EXTSEOUT, read_matrix).")
-    if not re.search(r"^\s*BEGIN BULK", text, re.MULTILINE):
-        text = "BEGIN BULK\n" + text
-    if not re.search(r"^ENDDATA", text, re.MULTILINE):
-        raise MeshError("The file has no line ENDDATA, so it may be cut off; add one if it is "
-                        "complete.")
-    raw = _raw_mesh(_by_meshio("nastran", io.StringIO(text)))
-    row = grid_rows(path)
-    raw.numbers = np.array(list(row), np.int64)
-    add_constraints(path, text, row, raw)
-    add_load_groups(path, text, row, raw)
-    return raw
-
-
-def _by_meshio(format_name: str, source: Path | io.StringIO) -> Any:
+def _by_meshio(format_name: str, source: Path) -> Any:
     """Mesh of meshio read from a file, without what meshio prints."""
     import meshio
 
     with _silence() as printed:
         # meshio.read exits the process if a reader raises.
-        found = meshio.read(source, format_name) if isinstance(source, io.StringIO) else \
-            getattr(meshio, format_name).read(source)
+        found = getattr(meshio, format_name).read(source)
     if "cannot handle" in printed.getvalue():
         raise MeshError("The file holds elements of a kind that meshio does not read; mesh with "
                         "triangles, quadrilaterals, tetrahedra, pyramids, wedges or hexahedra.")
-    if np.any(found.point_data.get("nastran:ref", 0)):
-        raise MeshError("The file gives nodes in local coordinate systems; export them in the "
-                        "basic one.")
     return found
 
 

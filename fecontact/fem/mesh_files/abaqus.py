@@ -38,6 +38,7 @@ from fecontact.fem.mesh_files.abaqus_keywords import Deck, Options
 from fecontact.fem.mesh_files.abaqus_loads import LOADS, add_loads, groups_of_nodes
 from fecontact.fem.mesh_files.abaqus_materials import Given, material, orientation
 from fecontact.fem.mesh_files.abaqus_temperatures import is_temperature, temperature_of
+from fecontact.fem.mesh_files.coordinates import cartesian
 from fecontact.fem.mesh_files.distributed_loads import DistributedLoads
 from fecontact.fem.mesh_files.raw import NODES, PLANE, SOLID, RawMesh
 
@@ -359,19 +360,6 @@ def _local_system(lines: list[str]) -> tuple[Array, Array] | None:
     return origin, np.array([x, np.cross(z, x), z])
 
 
-def _cartesian(places: Array, system: str) -> Array:
-    """Cartesian coordinates of (r, theta, z) for C, of (r, theta, phi) in degrees for S."""
-    if system == "R":
-        return places
-    r, theta, z = places[:, 0], np.radians(places[:, 1]), places[:, 2]
-    if system == "S":  # phi is the angle above the x-y plane
-        r, z = r * np.cos(np.radians(z)), r * np.sin(np.radians(z))
-    elif system != "C":
-        raise MeshError(f"The line *NODE, SYSTEM={system} names an unknown system; it may be R "
-                        f"(rectangular), C (cylindrical) or S (spherical).")
-    return np.column_stack([r * np.cos(theta), r * np.sin(theta), z])
-
-
 @dataclass(frozen=True, eq=False)
 class _Placement:
     """A translation, and then a rotation about an axis through two points [degrees]."""
@@ -683,7 +671,11 @@ class _Part:
 
     def add_nodes(self, options: Options, lines: list[str]) -> None:
         numbers, places = _numbered_places(lines)
-        places = _cartesian(places, options.get("SYSTEM", "R").upper())
+        system = options.get("SYSTEM", "R").upper()
+        if system not in ("R", "C", "S"):
+            raise MeshError(f"The line *NODE, SYSTEM={system} names an unknown system; it may be R "
+                            f"(rectangular), C (cylindrical) or S (spherical).")
+        places = cartesian(places, system)
         if self.system is not None:
             origin, axes = self.system
             places = origin + places @ axes

@@ -1,32 +1,81 @@
 """Cards of Nastran's bulk data and punch files: fields of 8 or 16 characters, or by commas."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
+from fecontact.core.checks import require_regular_file
+from fecontact.core.errors import InputError, MeshError, shown
 
-from fecontact.core.errors import InputError, MeshError
-from fecontact.core.types import Integers
+_INCLUDE = re.compile(r"\s*INCLUDE\s+['\"]?([^'\"]+)", re.IGNORECASE)
+
+# Line of the begin of a card, in an included file with its name, and the fields behind its name.
+Line = int | str
+Card = tuple[Line, list[str]]
 
 
-def cards(path: Path, name: str) -> Iterator[tuple[int, list[str]]]:
-    """Line of its begin, and fields of each card of a name, with those of its continuations."""
-    card: list[str] | None = None
-    begin = 0
-    text = path.read_text(encoding="utf-8", errors="replace")
-    for number, raw in enumerate(text.splitlines(), start=1):
-        line = raw.partition("$")[0].rstrip()
-        if not line.strip():
-            continue
+def all_cards(path: Path, case: list[str] | None = None) -> Iterator[tuple[Line, str, list[str]]]:
+    """Line, name and fields of each card, with those of its continuations.
+
+    Lines before BEGIN BULK, the case control, are added to ``case``.
+
+    Raises
+    ------
+    MeshError
+        For a file that includes itself or a missing one.
+    """
+    begin: Line = 0
+    name, card = "", list[str]()
+    for place, line in _lines(path, (), [] if case is None else case):
         head, fields = _parted(line)
-        if card is not None and head[:1] in ("", "+", "*"):
+        if name and head[:1] in ("", "+", "*"):
             card += fields
             continue
-        if card is not None:
-            yield begin, card
-        card, begin = (fields if head.rstrip("*").upper() == name else None), number
-    if card is not None:
-        yield begin, card
+        if name:
+            yield begin, name, card
+        begin, name, card = place, head.rstrip("*").upper(), fields
+        if name == "ENDDATA":
+            break
+    if name:
+        yield begin, name, card
+
+
+def cards(path: Path, name: str) -> Iterator[Card]:
+    """Line and fields of each card of a name."""
+    return ((line, fields) for line, of, fields in all_cards(path) if of == name)
+
+
+def _lines(
+    path: Path, outer: tuple[Path, ...], case: list[str]
+) -> Iterator[tuple[Line, str]]:
+    """Lines without comments; those of an included file stand in place of its INCLUDE."""
+    rows = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    start = next((number for number, row in enumerate(rows)
+                  if row[:40].strip().upper().startswith("BEGIN BULK")), -1)
+    case += rows[: max(start, 0)]
+    for number, row in enumerate(rows[start + 1 :], start=start + 2):
+        line = row.partition("$")[0].rstrip().expandtabs()
+        if not line.strip():
+            continue
+        if row[:5].upper() == "BEGIN":
+            raise MeshError(f"Line {number} begins a superelement ({shown(line)}), which is not "
+                            f"read; give one file for each body.")
+        if match := _INCLUDE.match(line):
+            yield from _lines(_included(path, match[1].strip(), outer), (*outer, path), [])
+        else:
+            yield f"{number} of {path.name}" if outer else number, line
+
+
+def _included(path: Path, name: str, outer: tuple[Path, ...]) -> Path:
+    found = path.parent / name.replace("\\", "/")
+    if not found.is_file():
+        raise MeshError(f"{path.name} includes the file {shown(name)}, but there is no file "
+                        f"{found}; put it there, or correct the line INCLUDE.")
+    require_regular_file(found, "a mesh")
+    if any(found.samefile(one) for one in (*outer, path)):
+        names = " -> ".join(one.name for one in (*outer, path, found))
+        raise MeshError(f"The file includes itself, {names}; remove one of these lines INCLUDE.")
+    return found
 
 
 def _parted(line: str) -> tuple[str, list[str]]:
@@ -40,7 +89,7 @@ def _parted(line: str) -> tuple[str, list[str]]:
     return head, [line[8 + width * k : 8 + width * (k + 1)].strip() for k in range(count)]
 
 
-def whole(line: int, word: str) -> int:
+def whole(line: Line, word: str) -> int:
     """A number of a point or component; InputError, with the line, for another word."""
     try:
         return int(word)
@@ -49,7 +98,7 @@ def whole(line: int, word: str) -> int:
                          f"component.") from None
 
 
-def real(line: int, word: str) -> float:
+def real(line: Line, word: str) -> float:
     """A number, also with D for E, or without either, as 1.5-3; InputError for another word."""
     plain = word.upper().replace("D", "E")
     sign = max(plain.rfind("+"), plain.rfind("-"))
@@ -61,26 +110,6 @@ def real(line: int, word: str) -> float:
         raise InputError(f"Card of line {line}: {word[:40]!r} is not a number.") from None
 
 
-def grid_rows(path: Path) -> dict[int, int]:
-    """Rows of the grid points by their numbers, in the order of the cards GRID."""
-    return {whole(line, fields[0]): row for row, (line, fields) in enumerate(cards(path, "GRID"))}
-
-
-def point_rows(line: int, words: list[str], row: dict[int, int], card: str) -> Integers:
-    """Rows of points, which may be ranges (THRU); words that are reals end them."""
-    found: list[int] = []
-    wanted = [word for word in words if word]
-    while wanted:
-        word = wanted.pop(0)
-        if "." in word:
-            break
-        if word.upper() == "THRU":
-            last = whole(line, wanted.pop(0)) if wanted else found[-1]
-            found += [point for point in range(found[-1] + 1, last + 1) if point in row]
-            continue
-        found.append(whole(line, word))
-    missing = [point for point in found if point not in row]
-    if missing or not found:
-        what = f"the point {missing[0]}, which the file does not hold" if missing else "no points"
-        raise MeshError(f"The card {card} of line {line} names {what}; correct its numbers.")
-    return np.array([row[point] for point in found], np.int64)
+def reals(line: Line, words: list[str], count: int) -> list[float]:
+    """So many numbers; words that are left out are zero."""
+    return [real(line, word) if word else 0.0 for word in [*words, *[""] * count][:count]]

@@ -4,40 +4,33 @@ RBE2 lets nodes follow a grid point as a rigid body, RBE3 gives a grid point the
 nodes, MPC are linear equations.
 """
 
-import re
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
 from fecontact.core.errors import MeshError, choices
 from fecontact.fem.constraints import Constraint, Coupling, LinearEquation, Term
-from fecontact.fem.mesh_files.nastran_cards import cards, point_rows, real, whole
+from fecontact.fem.mesh_files.nastran_bulk import BulkData
+from fecontact.fem.mesh_files.nastran_cards import Line, real, whole
 from fecontact.fem.mesh_files.raw import RawMesh
 
-_CARDS = re.compile(r"^(?:RBE[23]|MPC)\b", re.MULTILINE | re.IGNORECASE)
 
-
-def add_constraints(path: Path, text: str, row: dict[int, int], raw: RawMesh) -> None:
+def add_constraints(bulk: BulkData, raw: RawMesh) -> None:
     """Add constraints of a file to its contents, and groups of nodes that these name.
-
-    The points of ``raw`` have the rows ``row`` by their numbers; ``text`` is that of the file.
 
     Raises
     ------
     MeshError
         For points that the file does not hold, and constraints of kinds that are not read.
     """
-    if not _CARDS.search(text):
-        return
-    found = [*_rigid(path, row, raw), *_means(path, row, raw), *_equations(path, row, raw)]
+    found = [*_rigid(bulk, raw), *_means(bulk, raw), *_equations(bulk, raw)]
     raw.constraints += found
     raw.apart = raw.apart or bool(found)
 
 
-def _reference(line: int, word: str, row: dict[int, int], raw: RawMesh, card: str) -> str:
+def _reference(bulk: BulkData, line: Line, word: str, raw: RawMesh, card: str) -> str:
     """Name of the group of a point that others follow."""
-    node = point_rows(line, [word], row, card)
+    node = bulk.rows(line, [word], card)
     raw.nodes.setdefault(f"point {word}", node)
     return f"point {word}"
 
@@ -48,22 +41,23 @@ def _axes(components: str) -> list[list[float]] | None:
     return None if len(chosen) == 3 else np.eye(3)[chosen].tolist()
 
 
-def _rigid(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constraint]:
-    for line, fields in cards(path, "RBE2"):
+def _rigid(bulk: BulkData, raw: RawMesh) -> Iterator[Constraint]:
+    for line, fields in bulk.cards["RBE2"]:
         name, components = f"RBE2 {fields[0]}", fields[2]
-        reference = _reference(line, fields[1], row, raw, name)
+        reference = _reference(bulk, line, fields[1], raw, name)
         if not set(components) & set("123"):
             raise MeshError(f"The card {name} of line {line} holds the components {components!r}, "
                             f"no displacements, which are 1, 2 and 3.")
-        raw.nodes[name] = point_rows(line, fields[3:], row, name)
+        raw.nodes[name] = bulk.rows(line, fields[3:], name)
+        bulk.require_basic(f"{name} of line {line}", raw.nodes[name], components)
         yield Coupling(name, reference, tuple(raw.points[raw.nodes[reference][0]]),
                        axes=_axes(components), name=name)
 
 
-def _means(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constraint]:
-    for line, fields in cards(path, "RBE3"):
+def _means(bulk: BulkData, raw: RawMesh) -> Iterator[Constraint]:
+    for line, fields in bulk.cards["RBE3"]:
         name = f"RBE3 {fields[0]}"
-        reference = _reference(line, fields[2], row, raw, name)
+        reference = _reference(bulk, line, fields[2], raw, name)
         parts: list[tuple[float, list[str]]] = []
         words = [word for word in fields[4:] if word]
         while words and words[0].upper() not in ("UM", "ALPHA"):
@@ -78,16 +72,16 @@ def _means(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constraint
         if not parts or "UM" in map(str.upper, words):
             raise MeshError(f"The card {name} of line {line} has no weight or a list UM, which is "
                             f"not read; give a weight such as 1.0, and leave UM out.")
-        rows = [point_rows(line, points, row, name) for _, points in parts]
+        rows = [bulk.rows(line, points, name) for _, points in parts]
         weights = np.repeat([weight for weight, _ in parts], [len(one) for one in rows])
         raw.nodes[name] = np.concatenate(rows)
         yield Coupling(name, reference, tuple(raw.points[raw.nodes[reference][0]]), "distributing",
                        name=name, weights=None if np.ptp(weights) == 0.0 else tuple(weights))
 
 
-def _equations(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constraint]:
-    sets: dict[str, int] = {}
-    for line, fields in cards(path, "MPC"):
+def _equations(bulk: BulkData, raw: RawMesh) -> Iterator[Constraint]:
+    sets: dict[str, Line] = {}
+    for line, fields in bulk.cards["MPC"]:
         name = f"MPC of line {line}"
         sets.setdefault(fields[0], line)
         words = [word for k in range(0, len(fields), 8) for word in fields[k + 1 : k + 7]]
@@ -95,13 +89,14 @@ def _equations(path: Path, row: dict[int, int], raw: RawMesh) -> Iterator[Constr
         for point, component, factor in zip(*(words[k::3] for k in range(3)), strict=False):
             if not point:
                 continue
-            node, way = int(point_rows(line, [point], row, name)[0]), whole(line, component) - 1
+            (node,), way = bulk.rows(line, [point], name).tolist(), whole(line, component) - 1
+            bulk.require_basic(name, np.array([node]), component)
             if not 0 <= way < 6:
                 raise MeshError(f"The card {name} has the component {component}, which must be 1 "
                                 f"to 6.")
             value = (real(line, factor) * np.eye(6)[way]).tolist()
             if way > 2:
-                _reference(line, point, row, raw, name)
+                _reference(bulk, line, point, raw, name)
             terms.append(Term(node, tuple(value[:3]), tuple(value[3:]) if way > 2 else ()))
         yield LinearEquation(tuple(terms), name)
     if len(sets) > 1:

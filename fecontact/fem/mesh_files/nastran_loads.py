@@ -20,39 +20,33 @@ from fecontact.core.errors import choices
 from fecontact.fem.elements.cell_kinds import CELL_KINDS
 from fecontact.fem.mesh_files.deck_contents import COMPONENTS, DeckContents
 from fecontact.fem.mesh_files.distributed_loads import DistributedLoads
-from fecontact.fem.mesh_files.nastran_cards import cards, grid_rows, point_rows, real, whole
+from fecontact.fem.mesh_files.nastran_bulk import BulkData
+from fecontact.fem.mesh_files.nastran_cards import Line, real, reals, whole
 from fecontact.fem.mesh_files.raw import RawMesh
 
 _READ, _SUPPORTS = ("FORCE", "MOMENT", "PLOAD4", "GRAV"), ("SPC", "SPC1")
 _UNREAD = ("FORCE1", "FORCE2", "MOMENT1", "MOMENT2", "PLOAD", "PLOAD1", "PLOAD2", "RFORCE",
            "ACCEL", "ACCEL1", "SPCD", "SLOAD", "TEMP", "TEMPD")
-_CARDS = re.compile(rf"^(?:{'|'.join((*_READ, *_SUPPORTS, *_UNREAD))})\b",
-                    re.MULTILINE | re.IGNORECASE)
-_SOLIDS = {"CTETRA": 4, "CPYRAM": 5, "CPENTA": 6, "CHEXA": 8}
 
 
-def add_load_groups(path: Path, text: str, row: dict[int, int], raw: RawMesh) -> None:
+def add_load_groups(bulk: BulkData, raw: RawMesh) -> None:
     """Add the sides, points and supports that :func:`nastran_contents` names to those of a file.
 
-    The points of ``raw`` have the rows ``row`` by their numbers; ``text`` is that of the file.
     Nodes of SPC and SPC1 are the group ``SPC 7`` of set 7; those of one of several combinations of
-    components are ``SPC 7 123`` too.
+    components are ``SPC 7 123`` too. Components that cards GRID hold are in groups ``PS 123``.
 
     Raises
     ------
     MeshError, InputError
         For points that the file does not hold, and words that are no numbers.
     """
-    if not _CARDS.search(text):
-        return
-    found = _Loads(path, row)
+    found = _Loads(bulk)
     for name, sides in found.sides.items():
         for width in (3, 4):
             if held := [side for side in sides if len(side) == width]:
-                raw.faces.setdefault(name, []).append(
-                    np.vectorize(row.__getitem__)(np.array(held, np.int64)))
+                raw.faces.setdefault(name, []).append(np.array(held, np.int64))
     for point in {point for point, *_ in found.forces}:
-        raw.nodes.setdefault(f"point {point}", np.array([row[point]], np.int64))
+        raw.nodes.setdefault(f"point {point}", np.array([bulk.row[point]], np.int64))
     for name, (nodes, _) in found.supports.items():
         raw.nodes.setdefault(name, np.array(sorted(nodes), np.int64))
 
@@ -65,10 +59,7 @@ def nastran_contents(path: Path) -> DeckContents:
     MeshError, InputError
         As in :func:`add_load_groups`.
     """
-    text = path.read_text(encoding="utf-8", errors="replace")
-    if not _CARDS.search(text):
-        return DeckContents()
-    found = _Loads(path, grid_rows(path))
+    found = _Loads(BulkData(path))
     return DeckContents(
         found.keywords, supports=tuple(
             (name, " ".join(COMPONENTS[int(k) - 1] for k in components))
@@ -86,13 +77,13 @@ class _Loads:
     forces : list of (int, str, float)
         Grid points, components and values.
     sides : mapping of str to list of tuples
-        Grid points at the corners of the sides of each surface under pressure.
+        Rows of the points at the corners of the sides of each surface under pressure.
     supports : mapping of str to (set of int, str)
         Rows of nodes, and the digits of the components that are held; none if they do not act.
     """
 
-    def __init__(self, path: Path, row: dict[int, int]) -> None:
-        self._path, self._row = path, row
+    def __init__(self, bulk: BulkData) -> None:
+        self._bulk = bulk
         self.keywords: Counter[str] = Counter()
         self.distributed = DistributedLoads(
             kinds="FORCE, MOMENT and GRAV along the axes of the model, and equal pressures of "
@@ -102,29 +93,29 @@ class _Loads:
         self._factors = self._chosen()
         for name, first in (("FORCE", 0), ("MOMENT", 3)):
             for line, fields, factor in self._acting(name):
-                point_rows(line, fields[1:2], row, name)
+                bulk.rows(line, fields[1:2], name)
                 for component, value in zip(COMPONENTS[first:first + 3],
-                                            _vector(line, fields[3:7]), strict=True):
+                                            _vector(line, fields[3:]), strict=True):
                     if value:
                         self.forces.append((whole(line, fields[1]), component, factor * value))
         for line, fields, factor in self._acting("GRAV"):
-            x, y, z = _vector(line, fields[2:6])
+            x, y, z = _vector(line, fields[2:])
             self.distributed.gravity.append(("", (factor * x, factor * y, factor * z)))
         self._add_pressures()
         for name in _UNREAD:
-            if any(True for _ in cards(path, name)):
+            if bulk.cards[name]:
                 self.distributed.unread.append(name)
         self.supports = self._supports()
 
     def _chosen(self) -> dict[str, float]:
         """Factors of the sets that act."""
         sums: dict[str, dict[str, float]] = {}
-        for line, fields in cards(self._path, "LOAD"):
+        for line, fields in self._bulk.cards["LOAD"]:
             sums[fields[0]] = {of: real(line, fields[1]) * real(line, factor)
                                for factor, of in zip(fields[2::2], fields[3::2], strict=False)
                                if of}
-        held = {fields[0] for name in _READ for _, fields in cards(self._path, name)}
-        wanted = _of_case(self._path, "LOAD") or (
+        held = {fields[0] for name in _READ for _, fields in self._bulk.cards[name]}
+        wanted = _of_case(self._bulk.case, "LOAD") or (
             next(iter(sums or held)) if len(sums or held) == 1 else None)
         if wanted is None and held:
             self.distributed.unread.append(
@@ -132,9 +123,9 @@ class _Loads:
                 f"the case control names the one that acts,")
         return sums.get(wanted, {wanted: 1.0}) if wanted is not None else {}
 
-    def _acting(self, name: str) -> Iterator[tuple[int, list[str], float]]:
+    def _acting(self, name: str) -> Iterator[tuple[Line, list[str], float]]:
         """Line, fields and factor of the cards of a name that act."""
-        for line, fields in cards(self._path, name):
+        for line, fields in self._bulk.cards[name]:
             self.keywords[name] += 1
             place = {"GRAV": 1, "PLOAD4": 8}.get(name, 2)
             axes = fields[place] if len(fields) > place else ""
@@ -150,13 +141,13 @@ class _Loads:
                  for line, fields, factor in self._acting("PLOAD4")]
         if not loads:
             return
-        elements = {fields[0]: tuple(whole(line, word) for word in fields[2:2 + corners])
-                    for name, corners in _SOLIDS.items()
-                    for line, fields in cards(self._path, name)}
+        row, elements = self._bulk.row, self._bulk.corners(whole(line, fields[1])
+                                                           for line, fields, _ in loads)
         for line, fields, factor in loads:
             values = [real(line, word) for word in fields[2:6] if word]
-            corners = elements.get(fields[1], ())
-            side = _side(corners, *(whole(line, word) if word else None for word in fields[6:8])
+            corners = elements.get(whole(line, fields[1]), ())
+            side = _side(corners, *(row.get(whole(line, word)) if word else None
+                                    for word in fields[6:8])
                          ) if corners and fields[6].upper() != "THRU" else None
             if any(fields[9:12]) or not values or len({*values}) > 1:
                 self.distributed.unread.append("PLOAD4 with a direction or a pressure that varies")
@@ -170,38 +161,45 @@ class _Loads:
     def _supports(self) -> dict[str, tuple[set[int], str]]:
         nodes: dict[str, dict[str, set[int]]] = {}
         moved = False
-        for line, fields in cards(self._path, "SPC1"):
+        for line, fields in self._bulk.cards["SPC1"]:
             self.keywords["SPC1"] += 1
-            nodes.setdefault(fields[0], {}).setdefault(fields[1], set()).update(
-                point_rows(line, fields[2:], self._row, "SPC1").tolist())
-        for line, fields in cards(self._path, "SPC"):
+            held = self._bulk.rows(line, fields[2:], "SPC1")
+            self._bulk.require_basic(f"SPC1 of line {line}", held, fields[1])
+            nodes.setdefault(fields[0], {}).setdefault(fields[1], set()).update(held.tolist())
+        for line, fields in self._bulk.cards["SPC"]:
             self.keywords["SPC"] += 1
             for point, components, value in zip(fields[1::3], fields[2::3], fields[3::3],
                                                 strict=False):
                 if not point:
                     continue
                 moved |= bool(value and real(line, value))
+                held = self._bulk.rows(line, [point], "SPC")
+                self._bulk.require_basic(f"SPC of line {line}", held, components)
                 nodes.setdefault(fields[0], {}).setdefault(components, set()).update(
-                    point_rows(line, [point], self._row, "SPC").tolist())
-        wanted = _of_case(self._path, "SPC") or (next(iter(nodes)) if len(nodes) == 1 else None)
+                    held.tolist())
+        wanted = _of_case(self._bulk.case, "SPC") or (
+            next(iter(nodes)) if len(nodes) == 1 else None)
         if moved:
             self.distributed.unread.append("SPC with displacements other than zero")
         found: dict[str, tuple[set[int], str]] = {}
-        for number, held in nodes.items():
+        for number, by_components in nodes.items():
             acts = number == wanted and not moved
-            only = next(iter(held)) if len(held) == 1 else ""
-            found[f"SPC {number}"] = set().union(*held.values()), _digits(only) if acts else ""
-            if len(held) > 1:
+            only = next(iter(by_components)) if len(by_components) == 1 else ""
+            found[f"SPC {number}"] = (set().union(*by_components.values()),
+                                      _digits(only) if acts else "")
+            if len(by_components) > 1:
                 found |= {f"SPC {number} {components}": (rows, _digits(components) if acts else "")
-                          for components, rows in held.items()}
+                          for components, rows in by_components.items()}
+        for components, points in self._bulk.permanent.items():
+            if {*"123"} & {*components}:
+                self._bulk.require_basic("GRID", np.array(points), components)
+                found[f"PS {components}"] = {*points}, _digits(components)
         return found
 
 
-def _of_case(path: Path, key: str) -> str | None:
+def _of_case(case: str, key: str) -> str | None:
     """Number of the first set of a key in the case control, if there is one."""
-    text = path.read_text(encoding="utf-8", errors="replace").upper()
-    case, bulk, _ = text.partition("BEGIN BULK")
-    found = re.search(rf"^\s*{key}\s*=\s*(\d+)", case if bulk else "", re.MULTILINE)
+    found = re.search(rf"^\s*{key}\s*=\s*(\d+)", case, re.MULTILINE)
     return found[1] if found else None
 
 
@@ -210,9 +208,9 @@ def _digits(components: str) -> str:
     return "".join(sorted({*components} & {*"123456"}))
 
 
-def _vector(line: int, words: list[str]) -> list[float]:
+def _vector(line: Line, words: list[str]) -> list[float]:
     """Components of a vector by its scale and direction."""
-    scale, *along = (real(line, word) if word else 0.0 for word in words)
+    scale, *along = reals(line, words, 4)
     return [scale * one for one in along]
 
 

@@ -22,7 +22,7 @@ from fecontact.core.checks import as_path, require_regular_file
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.extras import optional
 from fecontact.core.types import Array, Integers
-from fecontact.fem.mesh_files.nastran_cards import cards, real, whole
+from fecontact.fem.mesh_files.nastran_cards import Line, cards, real, whole
 from fecontact.reduction.matrix_files.names import chosen_name
 
 _SYMMETRIC, _SQUARE = "6", "1"
@@ -195,7 +195,7 @@ def grid_places(path: str | Path, scale: float = 1.0) -> dict[int, Array]:
     return found
 
 
-def _column(line: int, fields: list[str]) -> Iterator[tuple[int, int, int, int, float]]:
+def _column(line: Line, fields: list[str]) -> Iterator[tuple[int, int, int, int, float]]:
     """Point and component of a column, then of a row, and the value, of one card."""
     point, component = (whole(line, word) for word in fields[:2])
     # Rows have four fields: point, component, real and imaginary part.
