@@ -123,7 +123,9 @@ def written(path, load, scale):
     held = "".join(f"D,{node:8d},{label}  ,  0.00000000    ,  0.00000000    \n" for node in HELD
                    for label in ("UX", "UY", "UZ"))
     return archive(path, 185, MESH.nodes / scale, MESH.cells + 1,
-                   f"{material(EX=E, NUXY=0.3, DENS=rho)}\n{held}{load.rstrip()}")
+                   f"{material(EX=E, NUXY=0.3, DENS=rho)}\n{held}{load.rstrip()}" if (
+                       path.stem == "a") else f"{material(EX=E, NUXY=0.3, DENS=rho)}\n"
+                   + in_blocks(held + load.rstrip()))
 
 
 def pload4(pressure, *elements, side=5, number=7):
@@ -131,6 +133,29 @@ def pload4(pressure, *elements, side=5, number=7):
     facet = HEXAHEDRON.facets[side]
     return "".join(f"PLOAD4,{number},{element},{pressure},,,,{row[facet[1]]},{row[facet[3]]}\n"
                    for element, row in ((one, MESH.cells[one - 1] + 1) for one in elements))
+
+
+def in_blocks(text):
+    """Commands D, F and SFE of a block as recent archives write them."""
+    rows = {"D": [], "F": [], "SFE": []}
+    others = []
+    lines = iter(text.splitlines())
+    for line in lines:
+        words = [word.strip() for word in line.split(",")]
+        if words[0] == "SFE":
+            values = next(lines).split()
+            rows["SFE"] += [f"{words[1]:>9}{words[2]:>4}   1{''.join(f'{x:>20}' for x in values)}",
+                            f"{words[1]:>9}{words[2]:>4}   2{'  0.00000000          ' * 4}"]
+        elif words[0] in ("D", "F"):
+            rows[words[0]].append(f"{words[1]:>9}{words[2]:>4}  {words[3]:>16}    0.00000000")
+        else:
+            others.append(line)
+    heads = {"D": f"DBLOCK,{len(rows['D']):10d}\n(i9,a6,2(pg16.9))",
+             "F": f"FBLOCK,{len(rows['F']):10d}\n(i9,a6,2(pg16.9))",
+             "SFE": "SFEBLOCK,4,PRES,        24,        24,0\n(i9,i4,i4,6(pg20.9))"}
+    ends = {"D": "", "F": "", "SFE": "SFE,end,LOC,       -1,\n"}
+    return "\n".join(others) + "\n" + "".join(
+        "\n".join([heads[name], *held, ends[name]]) for name, held in rows.items() if held)
 
 
 def sfe(pressure, *elements, face=6, inline=False):
@@ -157,6 +182,7 @@ GRAVITY = 9.81 / 7.0  # along 3, -2, -6
     ("a.bdf", "LOAD = 12\nBULK\nLOAD,12,2.0,.5,7,-.25,8\n" + pload4(2.0, *UP, side=TOP)
      + "GRAV,8,0,19620.,0.,0.,1.\nGRAV,9,,5.,1.,0.,0.\n", 1e-3, "MM"),
     ("a.cdb", sfe(2e6, *UP), 1.0, "ROOF"),
+    ("blocks.cdb", sfe(2e6, *UP), 1.0, "ROOF"),
     ("a.cdb", sfe(2e6, *UP, inline=True) + sfe(-3e6, 1, 3, face=1) + sfe(2.5e6, 24, face=4)
      + sfe(2e6, 24, face=3) + sfe(2.5e5, 1, face=2), 1.0, "SIDES"),
     ("a.cdb", f"ACEL,  {-3 * GRAVITY:.8E}    ,  {2 * GRAVITY:.8E}    ,  {6 * GRAVITY:.8E}\n", 1.0,
@@ -228,8 +254,8 @@ def test_sums_of_forces_of_nastran_are_those_of_another_reader(tmp_path):
 @pytest.mark.parametrize(("file", "load"), [
     ("a.bdf", "LOAD = 12\nBULK\nLOAD,12,4.0,.5,7\n"
      f"FORCE,7,{TIP},0,10.,3.,0.,-10.\nFORCE*,7,{HIGH},,5.0\n*,0.,5.,0.\n"),
-    ("a.cdb", f"F,{TIP:8d},FX  ,  60.0000000    ,  0.00000000    \nF,{TIP},FZ,-200.\n"
-              f"F,{HIGH},FY,50.\n"),
+    *((name, f"F,{TIP:8d},FX  ,  60.0000000    ,  0.00000000    \nF,{TIP},FZ,-200.\n"
+       f"F,{HIGH},FY,50.\n") for name in ("a.cdb", "blocks.cdb")),
 ])
 def test_forces_of_nastran_and_ansys_are_those_of_a_deck(file, load, tmp_path):
     """The deck names nodes by their numbers, and holds them so in place of their set."""

@@ -54,7 +54,7 @@ _REFUSED = {"CE": "constraint equations (CE)", "CP": "coupled degrees of freedom
 _COMMAND = re.compile(r"^\s*([A-Za-z/*]+)\s*,", re.MULTILINE)
 _DATA = re.compile(r"^\s*MPDATA\s*,\s*R5\.0\s*,\s*(\d+)\s*,\s*(\w+)\s*,\s*(\d+)\s*,\s*\d+\s*,"
                    r"\s*([^,\s]+)", re.MULTILINE | re.IGNORECASE)
-_ONE = re.compile(r"^\s*MP\s*,\s*(\w+)\s*,\s*(\d+)\s*,\s*([^,\s]+)\s*,?\s*$",
+_ONE = re.compile(r"^\s*MP\s*,\s*(\w+)\s*,\s*(\d+)\s*,\s*([-+.\dED]+)\s*,?\s*$",
                   re.MULTILINE | re.IGNORECASE)
 
 

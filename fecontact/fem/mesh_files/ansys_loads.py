@@ -1,4 +1,4 @@
-"""Loads and supports of Ansys archives: SFE, ACEL, OMEGA, F and D.
+"""Loads and supports of Ansys archives: SFE, ACEL, OMEGA, F and D, alone or in blocks.
 
 SFE gives a pressure on a face of a solid element, positive into it, ACEL the acceleration of the
 frame, so that gravity acts the opposite way, OMEGA an angular velocity about the axes of the model,
@@ -19,6 +19,9 @@ _AT_NODE = re.compile(r"^\s*([DF])\s*,\s*(\d+)\s*,\s*(\w+)\s*,([^\n]*)",
                       re.MULTILINE | re.IGNORECASE)
 _ON_FACE = re.compile(r"^\s*SFE\s*,\s*(\d+)\s*,\s*(\d+)\s*,\s*(\w+)\s*,\s*(\d*)\s*,([^\n]*)"
                       r"(?:(?=\n([^\n]*)))?", re.MULTILINE | re.IGNORECASE)
+# Blocks of recent archives: a line of formats, then a row for each node, or face and kind of value.
+_BLOCK = re.compile(r"^\s*(DBLOCK|FBLOCK|SFEBLOCK)\s*,([^\n]*)\n\([^\n]*\n((?:[ \t]*\d[^\n]*\n)*)",
+                    re.MULTILINE | re.IGNORECASE)
 _OF_ALL = re.compile(r"^\s*(ACEL|OMEGA)\s*,([^\n]*)", re.MULTILINE | re.IGNORECASE)
 _LABELS = {"F": ("FX", "FY", "FZ", "MX", "MY", "MZ"),
            "D": ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")}
@@ -59,7 +62,17 @@ def archive_loads(text: str) -> ArchiveLoads:
     found = ArchiveLoads()
     held: dict[int, set[str]] = {}
     unread = found.distributed.unread
-    for command, node, label, rest in _AT_NODE.findall(text):
+    at_nodes, on_faces = _AT_NODE.findall(text), [
+        (element, face, label, key, following if rest.strip().upper().startswith("R") else rest)
+        for element, face, label, key, rest, following in _ON_FACE.findall(text)]
+    for command, head, rows in _BLOCK.findall(text):
+        for row in map(str.split, rows.splitlines()):
+            if command.upper() == "SFEBLOCK":
+                on_faces.append((row[0], row[1], head.split(",")[1].strip(), row[2],
+                                 ",".join(row[3:])))
+            else:
+                at_nodes.append((command[0], row[0], row[1], ",".join(row[2:])))
+    for command, node, label, rest in at_nodes:
         found.counts[command.upper()] += 1
         value = (_numbers(command, rest) or [0.0])[0]
         known = _LABELS[command.upper()]
@@ -75,10 +88,11 @@ def archive_loads(text: str) -> ArchiveLoads:
     for point, labels in held.items():
         name = " ".join(["D", *(one for one in _LABELS["D"] if one in labels)])
         found.supports.setdefault(name, []).append(point)
-    for element, face, label, key, rest, following in _ON_FACE.findall(text):
+    for element, face, label, key, rest in on_faces:
+        values = _numbers("SFE", ",".join(rest.split()))
+        if key == "2" and not any(values):  # the imaginary part
+            continue
         found.counts["SFE"] += 1
-        blocked = rest.strip().upper().startswith("R")
-        values = _numbers("SFE", following.replace(" ", ",") if blocked else rest)
         if label.upper() != "PRES" or key not in ("", "0", "1") or len({*values}) != 1:
             unread.append("SFE of another label, or with a pressure that varies")
         elif values[0]:
@@ -92,8 +106,9 @@ def archive_loads(text: str) -> ArchiveLoads:
             found.distributed.gravity.append(("", (-x, -y, -z)))
         elif square:
             found.distributed.rotations.append(("", square, (0.0, 0.0, 0.0), (x, y, z)))
-    found.counts["BF"] = len(re.findall(r"^\s*BF\s*,", text, re.MULTILINE | re.IGNORECASE))
-    unread += ["BF"] * bool(found.counts["BF"])
+    if body_loads := re.findall(r"^\s*BF(?:BLOCK)?\s*,", text, re.MULTILINE | re.IGNORECASE):
+        found.counts["BF"] = len(body_loads)
+        unread.append("BF")
     return found
 
 
@@ -116,9 +131,9 @@ def archive_contents(path: Path) -> DeckContents:
 
 
 def _numbers(command: str, text: str) -> list[float]:
-    """Numbers between commas, without empty places."""
+    """Numbers between commas, without empty places, and what follows them after spaces."""
     try:
-        return [float(word) for word in text.split(",") if word.strip()]
+        return [float(word.split()[0]) for word in text.split(",") if word.strip()]
     except ValueError:
         raise MeshError(f"A command {command.upper()} holds the values '{text.strip()[:60]}', "
                         f"which are no numbers.") from None
