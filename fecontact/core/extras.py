@@ -10,7 +10,7 @@ from fecontact.core.errors import MissingLibraryError
 EXTRAS = {"gmsh": "mesh", "pyvista": "render", "imageio_ffmpeg": "render",
           "pyuff": "data", "emcee": "posterior", "sdypy.EMA": "modal",
           "ansys.mapdl.reader": "ansys", "mapdl_archive": "ansys", "pyyeti.nastran.op4": "nastran",
-          "pyyeti.nastran.op2": "nastran"}
+          "pyyeti.nastran.op2": "nastran", "SurfaceTopography": "topography", "x3pio": "topography"}
 
 
 def installed(module: str) -> bool:

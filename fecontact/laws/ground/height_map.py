@@ -14,6 +14,7 @@ from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array, ArrayLike
 from fecontact.core.units import Unit
 from fecontact.laws.data_columns import read_columns
+from fecontact.laws.ground.scanned_heights import is_scan, read_scan
 from fecontact.laws.signatures import ground_surface, surface_at
 
 # Leading parameters of the kernel: level, origin, spacing, numbers of points.
@@ -106,7 +107,9 @@ class HeightMap:
     file : str, optional
         Text or CSV file with columns x, y and height in metres, one line for each point of the grid
         in any order, instead of all the others; lines before the first of numbers are a header.
-        It is read once; then ``file`` is None.
+        Or a scan: SDF, X3P, OPD and other formats of profilometers, whose first point is the
+        origin, by ``pip install 'fecontact[topography]'``; points that were not measured are
+        interpolated. It is read once; then ``file`` is None.
 
     Raises
     ------
@@ -141,6 +144,10 @@ class HeightMap:
             if np.size(given := getattr(self, name)) and np.any(given):
                 raise InputError(f"HeightMap: file = {file!r} cannot be combined with {name}; give "
                                  f"the file alone, or the heights and their spacing.")
+        if is_scan(file):
+            heights, dx, dy = read_scan("HeightMap", file)
+            self._take(heights, dx, dy, 0.0, 0.0)
+            return
         x, y, z = read_columns("HeightMap", file, ("x", "y", "height"))
         where = f"HeightMap: file = '{file}'"
         first, step, n = _even_places(where, "x", x)
@@ -149,9 +156,11 @@ class HeightMap:
         if len(z) != n * m or len(np.unique(at)) != n * m:
             raise InputError(f"{where} has {len(z)} lines, but its {n} different x and {m} "
                              f"different y make a grid of {n * m} points; give each point once.")
-        heights = z[np.argsort(at)].reshape(n, m)
-        for name, value in (("heights", heights), ("spacing_x", step), ("spacing_y", step_y),
-                            ("origin_x", first), ("origin_y", first_y), ("file", None)):
+        self._take(z[np.argsort(at)].reshape(n, m), step, step_y, first, first_y)
+
+    def _take(self, heights: Array, dx: float, dy: float, x: float, y: float) -> None:
+        for name, value in (("heights", heights), ("spacing_x", dx), ("spacing_y", dy),
+                            ("origin_x", x), ("origin_y", y), ("file", None)):
             object.__setattr__(self, name, value)
 
     def parameters(self) -> Array:
