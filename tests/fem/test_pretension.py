@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from bolted_clamp import STEP, clamp_deck, clamp_mesh
 from meshes_for_tests import rectangle
-from solid_blocks import block_mesh
+from solid_blocks import block_mesh, mixed_mesh
 
 from fecontact import (
     BoundaryLoad,
@@ -25,6 +25,7 @@ from fecontact import (
     static_solution,
 )
 from fecontact.fem import PretensionSection, Ring, Tie, pair_faces, with_pretension
+from fecontact.fem.elements.cell_kinds import widths
 from fecontact.laws import ConstantFriction, LinearContact
 from fecontact.reduction import (
     assembled_basis,
@@ -59,8 +60,26 @@ def test_a_bar_between_walls(tetrahedra, degree):
         ElasticBody(whole, BAR, degree=degree, fixed={"left": "xyz"}), 4), rel=1e-8)
 
 
-def test_a_plane_strip_and_a_turned_mesh():
-    strip = with_pretension(rectangle(L, A, 10, 2), "bolt", PretensionSection((0.2, 0.0), (-1, 0)))
+@pytest.mark.parametrize("degree", [1, 2])
+def test_a_section_of_triangles_and_quadrilaterals(degree):
+    """A bar along z of all kinds of cells: shortening and stress as of any other."""
+    whole = mixed_mesh((1, 2, 6), (A, A, L))
+    mesh = with_pretension(whole, "bolt", PretensionSection((0.0, 0.0, 0.17), (0.0, 0.0, 1.0)))
+    assert sorted({*widths(mesh.boundaries["bolt-below"]).tolist()}) == [3, 4]
+    body = ElasticBody(mesh, BAR, degree=degree, fixed={"contact": "xyz", "top": "xyz"})
+    found = static_solution(body, tension(1e4))
+    moved = body.motion_rows("bolt") @ found.displacement.ravel()
+    assert moved == pytest.approx([1e4 * L / (E * A**2), 0.0, 0.0, 0.0, 0.0, 0.0], rel=1e-9)
+    assert found.stress[:, 2] == pytest.approx(1e4 / A**2, rel=1e-6)
+    held = ElasticBody(mesh, BAR, degree=degree, fixed={"contact": "xyz", "bolt": "x"})
+    assert eigenfrequencies_hz(held, 4) == pytest.approx(eigenfrequencies_hz(
+        ElasticBody(whole, BAR, degree=degree, fixed={"contact": "xyz"}), 4), rel=1e-8)
+
+
+@pytest.mark.parametrize("triangles", [False, lambda at: at[:, 1] > 0.5 * A])
+def test_a_plane_strip_and_a_turned_mesh(triangles):
+    strip = with_pretension(rectangle(L, A, 10, 2, triangles=triangles), "bolt",
+                            PretensionSection((0.2, 0.0), (-1, 0)))
     for mesh in (strip, strip.placed((0.1, -0.2), 35.0), strip.placed((0.0, 0.0), 0.0, "x")):
         body = ElasticBody(mesh, BAR, A, fixed={"left": "xy", "right": "xy"})
         found = static_solution(body, tension(1e4))

@@ -8,6 +8,7 @@ import pytest
 import fecontact as fc
 from fecontact.core.errors import InputError
 from fecontact.fem import Coupling, SolidBlock, pair_faces
+from fecontact.fem.elements.cell_kinds import padded, widths
 from fecontact.half_space import half_space_contact, half_space_friction
 from fecontact.laws import ConstantFriction, HeightMap, LinearContact
 from fecontact.reduction import reduce_bodies, with_half_space
@@ -67,6 +68,27 @@ def test_even_load_on_tetrahedra(degree, error, before):
     found = uniform(with_half_space(basis, body))
     assert (np.abs(found / SQUARE - 1.0) < error).all()
     assert (uniform(alone) / SQUARE - 1.0 < -before).all()
+
+
+@pytest.mark.parametrize(("nx", "nz", "degree", "error", "before"), [
+    (6, 4, 1, [0.015, 0.015, 0.01], 0.1), (6, 4, 2, [0.004, 0.004, 0.003], 0.01)])
+def test_even_load_on_triangles_and_quadrilaterals(nx, nz, degree, error, before):
+    """Hexahedra beside wedges: half of the patch are triangles."""
+    whole = block(nx, nz)
+    left = whole.nodes[whole.cells].mean(axis=1)[:, 1] < 0.0
+    cells = padded([whole.cells[left], *(whole.cells[~left][:, list(part)] for part in (
+        (0, 1, 2, 4, 5, 6), (0, 2, 3, 4, 6, 7)))])
+    outline = fc.Mesh(whole.nodes, cells).outline
+    at = np.array([whole.nodes[np.unique(row)].mean(axis=0) for row in outline])
+    bottom = (at[:, 2] < 1e-9) & (np.abs(at[:, :2]) < 2e-3).all(axis=1)
+    mesh = fc.Mesh(whole.nodes, cells, {"contact": outline[bottom], "top": outline[
+        at[:, 2] > 8e-3 - 1e-9]})
+    assert sorted({*widths(mesh.boundaries["contact"]).tolist()}) == [3, 4]
+    body = fc.ElasticBody(mesh, degree=degree, fixed={"top": "xyz"})
+    found = uniform(with_half_space(fc.modal_basis(body, 8), body))
+    assert (np.abs(found / SQUARE - 1.0) < error).all()
+    alone = uniform(fc.modal_basis(body, 8, reduction="residual", tolerance=0.0))
+    assert (alone / SQUARE - 1.0 < -before).all()
 
 
 def test_nothing_is_counted_twice():
