@@ -147,3 +147,34 @@ def test_names_with_spaces(tmp_path):
     assert "some nodes" in mesh.points
     assert len(mesh.boundaries["the face"]) == 1
     assert list(mesh.materials) == ["all of it"]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), [
+    ("0.3", "0.7", "material 'STEEL' cannot be read: .* poisson_ratio = 0.7 must be above -1"),
+    ("2.1e11", "steel", "material 'STEEL' cannot be read: could not convert string to float"),
+    ("1, 1, 2", "x, 1, 2", r"below a line \*ELEMENT, which begin with 'x, 1, .* cannot be read"),
+    (", TYPE=C3D8", "", r"A line \*ELEMENT lacks TYPE=; add it"),
+    ("7, 8", "7, 88", "element 1 names node 88, which the file does not hold; 1 of its elements"),
+    ("1, S1", "1, S9", "has the side S9 of elements whose last one is S6"),
+    ("GENERATE\n1, 8", "GENERATE\n1", r"data below a line \*NSET, which begin with '1', cannot be"),
+])
+def test_words_in_wrong_places_are_named_with_their_keyword(tmp_path, old, new, message):
+    text = (NODES + BRICK + STEEL + "*SURFACE, NAME=A\n1, S1\n*NSET, NSET=N, GENERATE\n1, 8\n")
+    assert len(read_mesh(written(tmp_path, "a.inp", text)).boundaries["A"]) == 1
+    assert old in text
+    with pytest.raises(MeshError, match=message):
+        read_mesh(written(tmp_path, "b.inp", text.replace(old, new, 1)))
+
+
+def test_files_that_are_cut_anywhere_say_so(tmp_path):
+    """Within a line of data, or of bulk data wherever it is."""
+    deck, bulk = (NODES + BRICK + STEEL).encode(), f"{HEXA}ENDDATA\n".encode()
+    for end in range(20, len(NODES + BRICK) - 1, 7):
+        if deck[end - 1 : end] != b"\n" and not deck[:end].splitlines()[-1].startswith(b"*"):
+            (tmp_path / "a.inp").write_bytes(deck[:end])
+            with pytest.raises(MeshError, match="may be cut off"):
+                read_mesh(tmp_path / "a.inp")
+    for end in range(1, len(bulk) - 8, 11):
+        (tmp_path / "a.bdf").write_bytes(bulk[:end])
+        with pytest.raises(MeshError, match="no line ENDDATA, so it may be cut off"):
+            read_mesh(tmp_path / "a.bdf")

@@ -7,6 +7,8 @@ sets named on *ELEMENT, surfaces, local coordinate systems, displaced instances 
 import re
 import warnings
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.checks import whole_number
-from fecontact.core.errors import MeshError, ModelWarning, choices, nearest, shown
+from fecontact.core.errors import (
+    FecontactError,
+    InputError,
+    MeshError,
+    ModelWarning,
+    choices,
+    nearest,
+    shown,
+)
 from fecontact.core.types import Array, Integers
 from fecontact.fem.constraints import Constraint, LinearEquation
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial
@@ -118,15 +128,17 @@ def read_inp(path: Path) -> RawMesh:
     deck, assembly = Deck(path), _Assembly()
     try:
         for keyword, options, lines in deck.blocks():
-            assembly.add(keyword, options, lines)
+            with _named(keyword, lines):
+                assembly.add(keyword, options, lines)
     except MeshError:
         if deck.is_read:  # a cut file explains why its last block is wrong
             deck.require_end()
         raise
+    if deck.keywords["NODE"]:
+        deck.require_end()
     bodies = assembly.bodies()
     if not bodies:
         raise MeshError("The file holds no *NODE or no *ELEMENT data.")
-    deck.require_end()
     joining = [f"{deck.keywords[name]} *{name}" for name in _UNREAD if deck.keywords[name]]
     if joining:
         raise MeshError(f"The file holds {', '.join(joining)}, which join or stiffen bodies and "
@@ -285,6 +297,21 @@ def _joined(parts: dict[str, RawMesh]) -> RawMesh:
             joined.faces.setdefault(title, []).extend(block + first for block in blocks)
         first += len(raw.points)
     return joined
+
+
+@contextmanager
+def _named(keyword: str, lines: list[str]) -> Iterator[None]:
+    """Begin messages of words that are no numbers, and of what lacks, with the keyword."""
+    try:
+        yield
+    except FecontactError:
+        raise
+    except KeyError as error:
+        raise MeshError(f"A line *{keyword} lacks {str(error).strip(chr(39))}=; add it.") from None
+    except (ValueError, IndexError) as error:
+        raise MeshError(f"The data below a line *{keyword}, which begin with "
+                        f"{shown(lines[0] if lines else '')}, cannot be read ({error}); correct "
+                        f"them.") from None
 
 
 def _words(line: str) -> list[str]:
@@ -524,7 +551,10 @@ class _Assembly:
                 raise MeshError(f"The section of '{name}' names the material '{wanted}', which the "
                                 f"file does not hold{nearest(wanted.upper(), self.materials)}; its "
                                 f"materials are: {choices(self.materials)}.")
-            made = material(wanted, self.materials[wanted.upper()])
+            try:
+                made = material(wanted, self.materials[wanted.upper()])
+            except (InputError, ValueError) as error:
+                raise MeshError(f"The material '{wanted}' cannot be read: {error}") from None
             if isinstance(made, AnisotropicMaterial):
                 made = self._oriented(made, part, options.get("ORIENTATION", ""), name, bodies)
             if isinstance(made, str):
@@ -623,8 +653,8 @@ class _Assembly:
                     word for word in words if whole_number(word) is not None or word in known])
 
     def _add_surface(self, name: str, lines: list[str]) -> None:
-        rows = [(words[0], int(words[1][1])) for words in map(_words, lines)
-                if len(words) > 1 and re.fullmatch(r"[SE][1-6]", words[1].upper())]
+        rows = [(words[0], int(words[1][1:])) for words in map(_words, lines)
+                if len(words) > 1 and re.fullmatch(r"[SE]\d+", words[1].upper())]
         for one in self.instances if self.current is None else (self.current,):
             # In the assembly, numbers belong to the only instance.
             own = [row for row in rows if one is self.current
@@ -860,8 +890,12 @@ class _NumberedMesh:
         for kind, numbers, nodes in part.element_blocks:
             kept, last = last[:len(numbers)], last[len(numbers):]
             rows = self.nodes(nodes[kept])
-            if (rows < 0).any():
-                raise MeshError("The elements name nodes that the file does not hold.")
+            if (lost := (rows < 0).any(axis=1)).any():
+                first = int(np.flatnonzero(lost)[0])
+                node = nodes[kept][first][rows[first] < 0][0]
+                raise MeshError(f"The element {numbers[kept][first]} names node {node}, which the "
+                                f"file does not hold; {np.count_nonzero(lost)} of its elements "
+                                f"name such nodes.")
             blocks.setdefault(kind, []).append((numbers[kept], rows))
         self.cells = {kind: np.concatenate([rows for _, rows in found])
                       for kind, found in blocks.items()}
@@ -912,7 +946,12 @@ class _NumberedMesh:
         """Edges (k, 2) and faces (k, 3), (k, 4) of (elements, number of the side)."""
         found: dict[int, list[Integers]] = {}
         for members, side in rows:
-            for kind, nodes in self.held(members):
+            held = self.held(members)
+            if held and all(kind in SOLID and side > len(_FACES[SOLID[kind]]) for kind, _ in held):
+                raise MeshError(f"A surface has the side S{side} of elements whose last one is "
+                                f"S{max(len(_FACES[SOLID[kind]]) for kind, _ in held)}; correct "
+                                f"the number of the side.")
+            for kind, nodes in held:
                 if kind in SOLID and side <= len(_FACES[SOLID[kind]]):
                     corners = _FACES[SOLID[kind]][side - 1]
                 elif kind in PLANE and side <= PLANE[kind]:

@@ -82,16 +82,15 @@ class BulkData:
         # Number, property and nodes of each element in turn.
         self._found: defaultdict[tuple[str, int], array[int]] = defaultdict(lambda: array("q"))
         self._numbers: set[int] = set()
+        _require_end(path)
         for line, name, fields in all_cards(path, case):
+            fields += [""] * (8 - len(fields))  # wide ones may end with the fourth
             if name == "GRID":
                 self._add_point(line, fields)
             elif name in _ELEMENTS:
                 self._add_element(line, name, fields)
             else:
                 self.cards[name].append((line, fields))
-        if "ENDDATA" not in self.cards:
-            raise MeshError("The file has no line ENDDATA, so it may be cut off; add one if it is "
-                            "complete.")
         self.case = "\n".join(case).upper()
         self.numbers = np.fromiter(self.row, np.int64, len(self.row))
         self.systems = Systems(self.cards, self._given_place)
@@ -265,3 +264,11 @@ class BulkData:
                     raw.parts.setdefault(str(of), []).append((kind, nodes))
         raw.edges = {name: np.concatenate(nodes) for name, nodes in lines.items()}
         return raw
+
+
+def _require_end(path: Path) -> None:
+    """MeshError for a file without ENDDATA, but one that includes others, which may have it."""
+    text = path.read_text(encoding="utf-8", errors="replace")
+    if not re.search(r"^\s*(?:ENDDATA|INCLUDE)\b", text, re.MULTILINE | re.IGNORECASE):
+        raise MeshError("The file has no line ENDDATA, so it may be cut off; add one if it is "
+                        "complete.")
