@@ -11,8 +11,10 @@ from report_reading import Shown
 
 import fecontact as fc
 from fecontact import Study
+from fecontact.bifurcation import nonlinear_mode
 from fecontact.cli import execute
 from fecontact.cli.app import COMMANDS, app
+from fecontact.core.errors import AnalysisError
 from fecontact.laws import check_law
 from fecontact.plot import rendering_problem
 from fecontact.reduction import BasisReport
@@ -438,7 +440,30 @@ def check_quasi_periodic(names, printed, folder):
     assert names["over_frequency"].points[-1].parameter == pytest.approx(3.8)
 
 
+def check_bolted_joint(names, printed, folder):
+    joint, mode, response = (names[name] for name in ("joint", "mode", "response"))
+    # What the lap carries is the tension of both bolts.
+    q = names["rest"].modal_coordinates
+    tensions = [2725.0 + 1e8 * float(q @ (joint.basis.point_row(f"upper.head{k}", "z")
+                                          - joint.basis.point_row(f"lower.nut{k}", "z")))
+                for k in (1, 2)]
+    assert tensions == pytest.approx([2000.0, 2000.0], rel=0.01)
+    assert names["rest"].normal_force.sum() == pytest.approx(sum(tensions), rel=1e-6)
+    assert mode.frequency_hz[0] == pytest.approx(names["stuck"].frequencies_hz[0], rel=1e-6)
+    # At a resonance the work of the shaker is the loss.
+    for level, force in enumerate(response.levels):
+        amplitude = response.amplitude(level).max()
+        assert np.pi * force * amplitude == pytest.approx(
+            np.interp(amplitude, mode.amplitude, mode.loss), rel=2e-3)
+        assert names["estimate"].peak(level).amplitude == pytest.approx(amplitude, rel=2e-3)
+    with pytest.raises(AnalysisError, match="of the 16 contact nodes 8 are at their friction lim"):
+        nonlinear_mode(joint, (1e-4, 1e-3), observe=("upper.free", "z"), preload=names["tight"],
+                       method=names["method"])
+    assert all((folder / name).stat().st_size > 10000 for name in ("shear.png", "response.png"))
+
+
 CHECKS = {"README.md": check_readme, "start.md": check_start, "analysis.md": check_analysis,
+          "bolted-joint.md": check_bolted_joint,
           "laws.md": check_laws, "frequency-responses.md": check_frequency_responses,
           "bifurcation.md": check_bifurcation, "orbits.md": check_orbits, "runs.md": check_runs,
           "sweeps.md": check_sweeps, "integrator.md": check_integrator,

@@ -202,6 +202,14 @@ def panel(folder: Path) -> dict[str, Path]:
     return {"bolted_panel": folder / "bolted_panel.png"}
 
 
+def joint(folder: Path) -> dict[str, Path]:
+    """Responses of a bolted joint, by the code of its page."""
+    page = (ROOT / "docs" / "bolted-joint.md").read_text(encoding="utf-8")
+    _written(folder / "page.py", "\n".join(re.findall(r"```python\n(.*?)```", page, re.DOTALL)))
+    subprocess.run([sys.executable, "page.py"], cwd=folder, check=True)
+    return {"bolted_joint": folder / "response.png"}
+
+
 MAKERS: dict[Callable[[Path], dict[str, Path]], tuple[str, ...]] = {
     beam: ("beam_on_wavy_ground", "contact_map", "report"),
     solid: ("solid_on_belt", "report-solid"), squeal: ("flutter_modes",), tori: ("tori",),
@@ -211,7 +219,7 @@ MAKERS: dict[Callable[[Path], dict[str, Path]], tuple[str, ...]] = {
     responses: ("friction_damper_response", "hardening_response"),
     blades: ("blade_pair", "platform_damper"),
     many_runs: ("million_starts", "hundred_thousand_frequencies"),
-    panel: ("bolted_panel",),
+    panel: ("bolted_panel",), joint: ("bolted_joint",),
     modes: ("damped_beam_mode", "damped_beam_responses", "internal_resonance")}
 
 

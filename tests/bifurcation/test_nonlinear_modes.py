@@ -26,6 +26,7 @@ from fecontact.bifurcation.nonlinear_modes.linear_start import (
     unforced,
     with_mass_damping,
 )
+from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import returned_noted
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.laws import FourParameterIwanFriction, Harmonic, JenkinsFriction, PrescribedForce
 from fecontact.reduction import PolynomialSpring, point_masses
@@ -151,6 +152,14 @@ def test_a_stalled_mode_of_springs_blames_no_contact(resonant):
     field = contact_field(unforced(system), {XI: (0.0, with_mass_damping)})
     stalled = replace(mode.branch, status=BranchStatus.STALLED)
     assert stall_reason(field, stalled) == ""
+
+
+def test_a_mode_that_came_back_to_its_start_says_so(resonant):
+    _, mode = resonant
+    assert returned_noted(mode) is mode
+    back = replace(mode.branch, points=(*mode.branch.points, *mode.branch.points[::-1]))
+    assert returned_noted(replace(mode, branch=back)).branch.message.startswith(
+        f"The mode turned back at the amplitude {mode.amplitude.max():.4g} and")
 
 
 def test_modes_without_stability_are_those_with_it():

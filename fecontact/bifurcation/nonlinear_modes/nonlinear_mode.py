@@ -44,6 +44,7 @@ from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.initial_state import initial_state
+from fecontact.system.contact_quantities import ContactState
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.quasistatic.history import LoadHistory
@@ -330,9 +331,31 @@ def nonlinear_mode(
     except FecontactError as error:
         raise AnalysisError(f"No nonlinear mode was followed from the linear one at "
                             f"{start.angular_frequency / (2.0 * np.pi):.5g} Hz and the amplitude "
-                            f"{low:g}; begin at a smaller one, where the motion is linear "
-                            f"({error})") from None
-    return NonlinearMode(_ended(branch, further), mode, observed)
+                            f"{low:g}; {_remedy(preload)} ({error})") from None
+    return returned_noted(NonlinearMode(_ended(branch, further), mode, observed))
+
+
+def returned_noted(mode: NonlinearMode) -> NonlinearMode:
+    """The mode; the message of its branch says if it came back to the amplitude of its start."""
+    A = mode.amplitude
+    if mode.branch.status is not BranchStatus.BOUND or A[-1] > A[0]:
+        return mode
+    note = (f"The mode turned back at the amplitude {A.max():.4g} and returned to its start; if it "
+            f"turned at a kink of a contact law, take more samples or smaller steps.")
+    message = f"{mode.branch.message} {note}".strip()
+    return replace(mode, branch=replace(mode.branch, message=message))
+
+
+def _remedy(preload: LoadHistory | RestState | Array | None) -> str:
+    """Advice if a mode cannot be followed from the linear one."""
+    if isinstance(preload, LoadHistory | RestState):
+        states = np.atleast_2d(preload.contact_state)[-1]
+        slips = np.count_nonzero(states == ContactState.SLIP)
+        if slips:
+            return (f"of the {len(states)} contact nodes {slips} are at their friction limit in "
+                    f"the preload, and slip at any amplitude: leave preload out, or give one in "
+                    f"which all nodes stick")
+    return "begin at a smaller one, where the motion is linear"
 
 
 def _followed(
