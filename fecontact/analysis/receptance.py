@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest
 from fecontact.core.read_only import read_only_arrays
-from fecontact.core.types import Array, ArrayLike
+from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.integrate.initial_state import Initial, initial_state
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.contact_system import ContactSystem
@@ -164,6 +164,25 @@ def receptance(
     values = _response(2.0 * np.pi * f, terms, into, out)
     values *= ((2j * np.pi * f) ** _POWERS[kind])[:, None, None]
     return Receptance(f, values, outputs, inputs, kind, growing)
+
+
+def receptance_derivative(
+    system: ContactSystem, frequency_hz: Array, excitation: Place, response: Place, kind: Kind,
+    stiffness: Array, damping: Array,
+) -> ComplexArray:
+    r"""Derivatives (F,) of a response without contact, from those of K and D over a parameter.
+
+    .. math:: \frac{dH}{dp} = -(i \omega)^k\, T_r Z^{-1} \Big(\frac{dK}{dp} + i \omega
+        \frac{dD}{dp}\Big) Z^{-1} T_e^T, \qquad Z = K + i \omega D - \omega^2 I
+    """
+    K, D, one = system.arrays.stiffness, system.arrays.damping, np.eye(system.basis.modes)
+    w = 2.0 * np.pi * frequency_hz
+    moved = _response(w, (K, D, one), _rows(system.basis, (excitation,)).T, one)[:, :, 0]
+    seen = _response(w, (K.T, D.T, one), _rows(system.basis, (response,)).T, one)[:, :, 0]
+    s = 1j * w
+    change = (np.einsum("fi,ij,fj->f", seen, stiffness, moved)
+              + s * np.einsum("fi,ij,fj->f", seen, damping, moved))
+    return np.asarray(-(s ** _POWERS[kind]) * change)
 
 
 def _growing(matrix: Array) -> NDArray[np.complex128]:

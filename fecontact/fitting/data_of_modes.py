@@ -6,7 +6,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.analysis.complex_modes import complex_modes, prestressed_modes
-from fecontact.analysis.receptance import Kind, Place, receptance, response_unit
+from fecontact.analysis.receptance import (
+    Kind,
+    Place,
+    receptance,
+    receptance_derivative,
+    response_unit,
+)
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.response import frequency_response
@@ -23,6 +29,10 @@ from fecontact.system.quasistatic.loading import load_history
 from fecontact.system.quasistatic.path import LoadPath
 
 _MARGIN = 1.05  # by which a computed mode reaches beyond the measured amplitudes
+_RIGID = 1e-6  # part of the highest frequency up to which a mode counts as rigid
+# Relative distance of frequencies below which their derivatives are not those of single modes;
+# second differences of matrices that depend linearly, and their rounding.
+_APART, _BENT, _ROUNDED = 1e-6, 1e-6, 1e-13
 
 
 @read_only_arrays
@@ -74,12 +84,32 @@ class FrequencyData(FitData):
             found = prestressed_modes(system, load_history(system, self.about))
         else:
             found = complex_modes(system, self.about)
-        hertz = np.sort(found.frequencies_hz[found.frequencies_hz > 1e-6 * float(
+        hertz = np.sort(found.frequencies_hz[found.frequencies_hz > _RIGID * float(
             found.frequencies_hz.max(initial=0.0))])
         if len(hertz) < self.modes.max():
             raise AnalysisError(f"The model has {len(hertz)} vibrating modes, fewer than the mode "
                                 f"{self.modes.max()} that was measured.")
         return np.asarray(hertz[self.modes - 1])
+
+    def derivative(self, system: ContactSystem, parameter: str) -> Array | None:
+        """Derivative (n,) of the eigenvalues, s^T (dA/dp) r, if the contact is left out.
+
+        None at frequencies that coincide, and for parameters on which K and C do not depend
+        linearly.
+        """
+        changes = _matrix_changes(system, parameter) if self.about is None else None
+        if changes is None:
+            return None
+        assert self.modes is not None
+        found = complex_modes(system)
+        hertz = found.frequencies_hz
+        kept = np.flatnonzero(hertz > _RIGID * float(hertz.max(initial=0.0)))
+        kept = kept[np.argsort(hertz[kept])]
+        if len(kept) < self.modes.max() or (np.diff(hertz[kept]) < _APART * hertz[kept[1:]]).any():
+            return None
+        zero = np.zeros_like(changes[0])
+        moved = found.sensitivity(np.block([[zero, zero], [-changes[0], -changes[1]]]))
+        return np.asarray(moved.imag[kept[self.modes - 1]] / (2.0 * np.pi))
 
     def curves(self) -> list[Curve]:
         """Frequencies over the numbers of their modes."""
@@ -197,6 +227,18 @@ class ReceptanceData(FitData):
                        kind=self.kind, linearised_at=self.about).values[:, 0, 0]
         return np.concatenate([H.real, H.imag])
 
+    def derivative(self, system: ContactSystem, parameter: str) -> Array | None:
+        """Derivative (2 F,) of the response, if the contact is left out.
+
+        None for parameters on which K and C do not depend linearly.
+        """
+        changes = _matrix_changes(system, parameter) if self.about is None else None
+        if changes is None:
+            return None
+        H = receptance_derivative(system, self.frequency_hz, self.excitation, self.response,
+                                  self.kind, *changes)
+        return np.concatenate([H.real, H.imag])
+
     def curves(self) -> list[Curve]:
         """Real and imaginary part over frequency."""
         n = len(self.frequency_hz)
@@ -275,6 +317,28 @@ class ResponseData(FitData):
         """Amplitude over frequency."""
         return [Curve("frequency [Hz]", self.frequency_hz, "amplitude [m]",
                       slice(0, len(self.amplitude)))]
+
+
+def _matrix_changes(system: ContactSystem, parameter: str) -> tuple[Array, Array] | None:
+    """Derivatives of stiffness and damping (m, m) over a parameter on which they depend linearly.
+
+    Differences over a half of its value, which are exact then; None for other parameters, those of
+    the study that the system does not have, and those that are zero.
+    """
+    try:
+        value = system.parameter(parameter)
+        if not isinstance(value, float) or value == 0.0:
+            return None
+        low, here, high = (np.stack([one.arrays.stiffness, one.arrays.damping]) for one in (
+            system.with_({parameter: factor * value}) for factor in (0.5, 1.0, 1.5)))
+    except InputError:
+        return None
+    bent = np.abs(high - 2.0 * here + low).max(axis=(1, 2))
+    size = np.abs(here).max(axis=(1, 2))
+    if (bent > _BENT * np.abs(high - low).max(axis=(1, 2)) + _ROUNDED * size).any():
+        return None
+    stiffness, damping = (high - low) / value
+    return stiffness, damping
 
 
 def _spline(f: Array, A: Array) -> tuple[Array, Any]:
