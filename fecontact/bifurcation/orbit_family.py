@@ -1,7 +1,7 @@
 """Families of periodic orbits of conservative systems."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,22 +10,15 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of, sizes_of
-from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.harmonic import starts as harmonic_starts
-from fecontact.bifurcation.harmonic.branches import attributes_of as harmonic_attributes
-from fecontact.bifurcation.harmonic.method import HarmonicBalance
-from fecontact.bifurcation.harmonic.problem import HarmonicProblem
-from fecontact.bifurcation.orbit_methods import Collocation, Method, Shooting
+from fecontact.bifurcation.orbit_methods import Collocation, Method
 from fecontact.bifurcation.orbits import starts
-from fecontact.bifurcation.orbits.branches import as_motion, attributes_of
-from fecontact.bifurcation.orbits.collocation import CollocationProblem
+from fecontact.bifurcation.orbits.branches import as_motion
+from fecontact.bifurcation.orbits.discretisation import MotionStart, first_that_goes
+from fecontact.bifurcation.orbits.discretisations import DISCRETISATIONS, discretisation_by
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.same_orbit import VANISHING
-from fecontact.bifurcation.orbits.shooting import ShootingProblem
-from fecontact.bifurcation.orbits.shooting_branches import attributes_of as shooting_attributes
-from fecontact.bifurcation.orbits.shooting_branches import start_of as shooting_start
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import FecontactError, InputError, require_finite
+from fecontact.core.errors import InputError, require_finite
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.integrate.field_runs.field_run import FieldRun
@@ -85,19 +78,11 @@ class _FamilyTests:
         return {"fold"}
 
 
-@dataclass(frozen=True, eq=False)
-class _ByCollocation(_FamilyTests, CollocationProblem):
-    """Families by collocation."""
-
-
-@dataclass(frozen=True, eq=False)
-class _ByHarmonics(_FamilyTests, HarmonicProblem):
-    """Families by harmonic balance."""
-
-
-@dataclass(frozen=True, eq=False)
-class _ByShooting(_FamilyTests, ShootingProblem):
-    """Families by shooting."""
+@cache
+def _family_of(kind: Any) -> type[Any]:
+    """The problem of families for a kind of problems of orbits."""
+    made: type[Any] = type(f"Family{kind.__name__}", (_FamilyTests, kind), {})
+    return dataclass(frozen=True, eq=False)(made)
 
 
 def _others(multipliers: ComplexArray) -> ComplexArray:
@@ -163,14 +148,11 @@ def orbit_family(
     require_field(field)
     require_kind("orbit_family", (HopfPoint, PeriodicMotion, Trajectory, FieldRun, tuple),
                  start=start)
-    require_kind("orbit_family", (Collocation, HarmonicBalance, Shooting, type(None)),
+    require_kind("orbit_family", (*(one.options for one in DISCRETISATIONS), type(None)),
                  method=method)
-    if isinstance(method, HarmonicBalance) and (method.stability is None or method.refines):
-        raise InputError("orbit_family: harmonic balance needs stability, and takes the harmonics "
-                         "and samples that it is given; leave out stability = None and tolerances.")
-    if isinstance(method, Shooting) and not isinstance(field, ContactField):
-        raise InputError("orbit_family: shooting is for contact systems; take Collocation() or "
-                         "HarmonicBalance().")
+    how = method or Collocation()
+    by = discretisation_by(how)
+    by.require_family(how, field)
     require_finite("orbit_family", direction=direction)
     free = field.index(field.parameter_or_only(unfolding))
     if field.forcing_period(field.values) is not None:
@@ -179,21 +161,21 @@ def orbit_family(
     chosen = options_of(options, bounds)
     chosen = replace(chosen, bounds=(-np.inf, np.inf), second_bounds=chosen.bounds,
                      tolerance=min(chosen.tolerance, _TOLERANCE))
-    how = method if isinstance(method, Collocation) else Collocation()
     if isinstance(start, HopfPoint):
         if both or field.index(start.branch.parameter_name) != free:
             raise InputError(f"{start.place} has a family to one side, over "
                              f"{start.branch.parameter_name!r}; leave out both, and name that "
                              f"parameter.")
-        begun = starts.at_hopf(field, start, how.intervals, how.degree, chosen, scales, 1.0)
-        return _stays(field, free, _first(begun, chosen, method))
+        begun = starts.at_hopf(field, start, *by.mesh(how), chosen, scales, 1.0)
+        return _stays(field, free, first_that_goes(
+            begun, lambda found: _followed(found[0], chosen, how, found[1])))
     motion = as_motion(start)
     values = field.values if motion.parameter_values is None else motion.parameter_values.copy()
     sizes, limits = sizes_of(scales, motion.amplitudes + 1e-300)
+    given = MotionStart(replace(motion, periods=1), values, free, np.append(sizes, 1.0), limits)
+    intervals, degree = by.mesh(how)
     problem, u = starts.corrected_samples(
-        lambda intervals: starts.from_samples(
-            field, values, free, motion.times, motion.states, motion.period, intervals, how.degree,
-            1, np.append(sizes, 1.0)), how.intervals, family=True)
+        lambda intervals: given.on_mesh(field, intervals, degree), intervals, family=True)
     low, high = chosen.second_bounds
     if not low <= problem.period(u) <= high:
         raise InputError(f"The start has the period {problem.period(u):.6g} s, outside the bounds "
@@ -202,48 +184,23 @@ def orbit_family(
     unit[-1] = 1.0
     tangent = problem.linearise(u).solve(starts.size_row(problem, u), unit)
     tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
-    return _stays(field, free, _followed((problem, u, tangent), chosen, method, limits,
-                                         both))
-
-
-def _first(
-    begun: Iterator[tuple[starts.Start, Array | None]], options: ContinuationOptions,
-    method: Method | None,
-) -> Branch:
-    """The branch of the first start that leads anywhere."""
-    failed: FecontactError = InputError("There is nothing to start from.")
-    for found, limits in begun:
-        try:
-            return _followed(found, options, method, limits)
-        except FecontactError as error:
-            failed = error
-    raise failed
+    return _stays(field, free, _followed((problem, u, tangent), chosen, how, limits, both))
 
 
 def _followed(
-    start: starts.Start, options: ContinuationOptions, method: Method | None,
-    limits: Array | None, both: bool = False,
+    start: starts.Start, options: ContinuationOptions, method: Method, limits: Array | None,
+    both: bool = False,
 ) -> Branch:
-    """Follow a family from a start by collocation."""
-    problem: Any
-    tangent: Array | None
-    problem, u, tangent = start
-    kind: Any = _ByCollocation
-    if isinstance(method, HarmonicBalance):
-        problem, u, tangent = harmonic_starts.start_of(start, method, limits)
-        kind = _ByHarmonics
-        attributes = harmonic_attributes(problem)
-    elif isinstance(method, Shooting):
-        problem, u, tangent = shooting_start(start, method, limits)
-        kind, attributes = _ByShooting, shooting_attributes(problem)
-    else:
-        attributes = attributes_of(problem, limits)
+    """Follow a family from a start on a mesh."""
+    problem, u, tangent = discretisation_by(method).projected(start, method, limits)
     kept = {entry.name: getattr(problem, entry.name) for entry in fields(problem)}
     if "precision" in kept:
         kept["precision"] = _PRECISION
-    family = kind(**kept | {"limits": limits})
+    kind: Any = type(problem)
+    family = _family_of(kind)(**kept)
     return continue_branch(family, u, options, name=list(problem.field.parameters)[problem.free],
-                           tangent=tangent, both=both, attributes=attributes | {"family": True})
+                           tangent=tangent, both=both,
+                           attributes=problem.attributes() | {"family": True})
 
 
 def _stays(field: VectorField, free: int, family: Branch) -> Branch:

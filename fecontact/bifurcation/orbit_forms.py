@@ -9,7 +9,7 @@ from fecontact.bifurcation.continuation.points import (
     require_no_family,
     with_details,
 )
-from fecontact.bifurcation.orbits.collocation import require_mesh
+from fecontact.bifurcation.orbits.mesh import require_mesh
 from fecontact.bifurcation.orbits.normal_forms import examined, verdict
 from fecontact.bifurcation.orbits.starts import corrected_samples, from_samples
 from fecontact.core.checks import require_kind

@@ -1,13 +1,12 @@
 """Options of the methods that follow periodic orbits."""
 
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
-from fecontact.bifurcation.orbits.collocation import require_mesh
-from fecontact.bifurcation.orbits.mesh import require_segments
+from fecontact.bifurcation.orbits.mesh import require_mesh, require_segments
 from fecontact.core.errors import InputError, require_positive
 from fecontact.integrate.solvers import AUTO, Solver, require_solver
 
@@ -45,6 +44,9 @@ class Collocation:
     tolerance: float = 1e-7
     most_intervals: int = 800
     state_tolerance: float | None = 1e-5
+
+    solver: ClassVar[Solver] = AUTO
+    repeats: ClassVar[None] = None
 
     def __post_init__(self) -> None:
         require_mesh(self.intervals, self.degree)
@@ -90,6 +92,8 @@ class Shooting:
     rtol: float = 1e-9
     derivative_rtol: float | None = None
     solver: Solver = AUTO
+
+    repeats: ClassVar[None] = None
 
     def __post_init__(self) -> None:
         require_segments(self.segments)

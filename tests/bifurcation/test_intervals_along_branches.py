@@ -24,7 +24,7 @@ from fecontact.bifurcation import (
     vector_field,
 )
 from fecontact.bifurcation.continuation import pseudo_arclength
-from fecontact.bifurcation.orbits import branches
+from fecontact.bifurcation.orbits import by_collocation
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, Intervals
 from fecontact.bifurcation.orbits.restored import restored
 from fecontact.io import read_branch, write_branch
@@ -331,7 +331,7 @@ def test_a_branch_says_where_newtons_method_fails_on_finer_meshes(monkeypatch):
 def test_a_branch_tells_of_special_points_as_they_are_in_the_end(monkeypatch):
     """The points' own meshes decide, not those on which they were met."""
     monkeypatch.setattr(
-        branches, "_sharpened", lambda field, branch, index, accuracy: replace(
+        by_collocation, "_sharpened", lambda field, branch, index, accuracy: replace(
             branch.points[index],
             values={**branch.points[index].values, "state_error": 2e-5 * (index + 1)}))
     branch = circles(Collocation(16))

@@ -203,7 +203,7 @@ def test_shooting_goes_on_and_is_solved_at_a_value():
     few = ContinuationOptions(step=0.01, points=4)
     shot = orbit_branch(field, start, method=Shooting(segments=2, rtol=1e-10), options=few,
                         bounds=(5.9, 6.3))
-    assert shot.points[0].by_shooting
+    assert isinstance(shot.points[0].method, Shooting)
     with pytest.raises(InputError, match="give the field"):
         shot.points[0].orbit()
     on = orbit_branch(field, shot.points[-1], options=ContinuationOptions(step=0.05),

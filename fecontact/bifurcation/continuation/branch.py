@@ -272,15 +272,12 @@ class Branch(Summarised):
     def _restored(self, field: VectorField, point: BranchPoint) -> tuple[Problem, Array, Array]:
         """Problem, unknowns and tangent of a point."""
         from fecontact.bifurcation.equilibria.problem import restored_equilibrium
-        from fecontact.bifurcation.harmonic.starts import restored as restored_series
-        from fecontact.bifurcation.orbits.restored import restored, restored_shooting
+        from fecontact.bifurcation.orbits.restored import restored_orbit
 
         if not point.is_orbit:
             width = float(np.ptp(self.parameter)) or abs(point.parameter) or 1.0
             return restored_equilibrium(field, point, width)
-        if point.by_harmonics:
-            return restored_series(field, point)
-        return restored_shooting(field, point) if point.by_shooting else restored(field, point)
+        return restored_orbit(field, point)
 
     def reversed(self) -> "Branch":
         """The branch in the other direction."""

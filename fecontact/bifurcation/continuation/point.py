@@ -21,6 +21,7 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField, require_field
 
 if TYPE_CHECKING:
+    from fecontact.bifurcation.orbit_methods import Method
     from fecontact.bifurcation.orbits.motions import PeriodicMotion
     from fecontact.integrate.trajectory import Trajectory
 
@@ -127,7 +128,30 @@ class BranchPoint(Summarised):
     @property
     def is_orbit(self) -> bool:
         """Whether the point is a periodic orbit."""
-        return "period" in self.values and ("mesh" in self.values or self.by_harmonics)
+        from fecontact.bifurcation.orbits.orbit_points import holder_of
+
+        return "period" in self.values and holder_of(self) is not None
+
+    @property
+    def stores_orbit(self) -> bool:
+        """Whether the point holds its whole orbit; :meth:`orbit` runs others again."""
+        from fecontact.bifurcation.orbits.orbit_points import orbit_points_of
+
+        return orbit_points_of(self).stores_orbits
+
+    @property
+    def method(self) -> "Method":
+        """The method by which an orbit was computed, with its options.
+
+        Raises
+        ------
+        InputError
+            If the point is no orbit of a branch.
+        """
+        from fecontact.bifurcation.orbits.orbit_points import orbit_points_of
+
+        found: Method = orbit_points_of(self).method_of(self)
+        return found
 
     @property
     def is_homoclinic(self) -> bool:
@@ -138,16 +162,6 @@ class BranchPoint(Summarised):
     def is_torus(self) -> bool:
         """Whether the point is a torus: a quasi-periodic motion."""
         return self.header is not None and "torus_harmonics" in self.header.attributes
-
-    @property
-    def by_shooting(self) -> bool:
-        """Whether the point is an orbit found by shooting."""
-        return self.header is not None and "segments" in self.header.attributes
-
-    @property
-    def by_harmonics(self) -> bool:
-        """Whether the point is an orbit found by harmonic balance."""
-        return self.header is not None and "harmonics" in self.header.attributes
 
     @property
     def branch(self) -> BranchHeader:
@@ -221,9 +235,8 @@ class BranchPoint(Summarised):
         InputError
             If the point is no orbit, or was found by shooting and there is no field.
         """
-        from fecontact.bifurcation.harmonic.layout import balanced
         from fecontact.bifurcation.homoclinic.open_mesh import sampled
-        from fecontact.bifurcation.orbits.motions import collocated, of_runs
+        from fecontact.bifurcation.orbits.orbit_points import orbit_points_of
 
         self._require_orbit("orbit: samples", samples)
         if field is not None:
@@ -234,17 +247,7 @@ class BranchPoint(Summarised):
             return found if field is None else replace(
                 found, parameter_values=self._curve_values(field), state_names=field.state_names)
         values = None if field is None else self.parameter_values(field)
-        period = float(self.values["period"])
-        mesh = np.asarray(self.values.get("mesh", ()), dtype=float)
-        if self.by_harmonics:
-            found = balanced(self.u, self.values, self.branch.attributes, samples)
-        elif not self.by_shooting:
-            found = collocated(self.u, mesh, len(self.values["minimum"]), period, samples)
-        elif field is None:
-            raise InputError(f"{self.place} was found by shooting, whose orbits are run again; "
-                             f"give the field: point.orbit(field).")
-        else:
-            found = of_runs(self._runs(field, samples), period)
+        found = orbit_points_of(self).motion(self, field, samples)
         periods = int(self.branch.attributes["periods"]) if self.header is not None else 1
         return replace(found, periods=periods, parameter_values=values,
                        state_names=() if field is None else field.state_names)
@@ -270,30 +273,19 @@ class BranchPoint(Summarised):
             If the point is no orbit, or the field is not that of a contact system.
         """
         from fecontact.bifurcation.fields.contact_field import ContactField
-        from fecontact.bifurcation.orbits.motions import joined, sampled_run
+        from fecontact.bifurcation.orbits.orbit_points import orbit_points_of
 
         require_kind("trajectory", (ContactField, ContactSystem), field=field)
         self._require_orbit("trajectory: outputs", outputs)
-        field = as_field(field, self.branch.attributes)
-        if self.by_shooting:
-            return joined(self._runs(field, outputs))
-        system = field.system(self.parameter_values(field))  # type: ignore[attr-defined]
-        return sampled_run(system, self.orbit(field, outputs))
+        known = as_field(field, self.branch.attributes)
+        assert isinstance(known, ContactField)
+        return orbit_points_of(self).trajectory(self, known, outputs)
 
     def _require_orbit(self, name: str, samples: int) -> None:
         if not (isinstance(samples, int | np.integer) and samples >= 2):
             raise InputError(f"{name} = {samples!r} must be a whole number from 2 on.")
         if not (self.is_orbit or self.is_homoclinic):
             raise InputError(f"{self.place} is no periodic orbit.")
-
-    def _runs(self, field: VectorField, samples: int) -> "list[Trajectory]":
-        """Runs of the segments of an orbit by shooting."""
-        from fecontact.bifurcation.orbits.motions import run_again, solver_of
-
-        # Shooting is for contact fields alone, the only ones with a system.
-        system = field.system(self.parameter_values(field))  # type: ignore[attr-defined]
-        return run_again(system, self.u, np.asarray(self.values["mesh"], dtype=float),
-                         float(self.values["period"]), samples, solver_of(self.branch.attributes))
 
     @property
     def located(self) -> bool:

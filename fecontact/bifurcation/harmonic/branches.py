@@ -8,7 +8,6 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
-from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
@@ -18,16 +17,19 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.method import MOST, MOST_SAMPLED, HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
+from fecontact.bifurcation.orbits import starts as orbit_starts
+from fecontact.bifurcation.orbits.discretisation import Discretisation, Request, stepped_off
+from fecontact.bifurcation.orbits.orbit_points import BalancedPoints
 from fecontact.bifurcation.orbits.restored import rescaled
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.bifurcation.orbits.starts import Begun
-from fecontact.core.errors import AnalysisError, FecontactError, InputError
-from fecontact.core.types import Array, ArrayLike
+from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.model_limits import beyond_fit, warn_of_limits
 
-# Factors of the first step, tried in this order to leave a special point.
-_FIRST_STEPS = (1.0, 0.2, 0.04)
+# Steps to each side within which a special point is found again with few harmonics.
+_AROUND = 4
 # Factor by which harmonics grow until the tolerance is met.
 _MORE = 1.5
 # Size below which orbits are at rest, in that of the largest on the branch, means included.
@@ -45,97 +47,107 @@ _OFF_AT_FOLD = 0.1
 _ON_TWO = ("branch point", HALVING)
 
 
-def followed(
-    start: Begun, method: HarmonicBalance, options: ContinuationOptions, limits: Array | None,
-    **how: Any,
-) -> Branch:
-    """Branch from a start by collocation; ``limits`` (d,) are those of the growth of scales."""
-    problem, u, tangent = starts.start_of(start, method, limits)
-    if tangent is None:
-        problem, u = starts.converged_orbit(problem, u)
-    return follow(problem, u, tangent, method, options, **how)
+class ByHarmonics(BalancedPoints, Discretisation):
+    """Harmonic balance."""
 
+    own_starts = frozenset({"period doubling", "branch point"})
+    finds_responses = True
 
-def beyond(
-    field: VectorField, point: BranchPoint, method: HarmonicBalance | None,
-    options: ContinuationOptions, scales: ArrayLike | None, width: float | None, direction: float,
-) -> Branch:
-    """The other orbits at a period doubling or branch point; doubled ones have 2 H harmonics."""
-    problem, u, tangent = starts.restored(field, point)
-    problem = _rescaled(problem, scales, width)
-    if problem.orders is not None:
-        # The other orbits may have harmonics that these leave out.
-        every = replace(_method_of(problem), harmonics=problem.harmonics)
-        _, tangent = starts.with_more(problem, tangent, every)
-        problem, u = starts.with_more(problem, u, every)
-    problem, u, tangent = (starts.doubled(problem, u) if point.kind == "period doubling"
-                           else starts.crossing(problem, u, tangent))
-    own = _method_of(problem)
-    if method is not None:
-        _, tangent = starts.with_more(problem, tangent, method)
-        problem, u = starts.with_more(problem, u, method)
-        own = method
-    tangent = np.copysign(1.0, direction) * heading(tangent, problem.weights())
-    failed: FecontactError = InputError("There is nothing to start from.")
-    for part in _FIRST_STEPS:
-        step = max(part * options.step, options.smallest_step)
-        try:
-            return follow(problem, u + step * tangent, tangent, own, replace(options, step=step))
-        except FecontactError as error:
-            failed = error
-    raise failed
+    def suits(self, point: BranchPoint, method: HarmonicBalance) -> bool:
+        """Whether unknowns of a point are those of the options, but for their number."""
+        return True
 
+    def require_family(self, method: HarmonicBalance, field: VectorField) -> None:
+        """Raise InputError for a field or options without families."""
+        if method.stability is None or method.refines:
+            raise InputError("orbit_family: harmonic balance needs stability, and takes the "
+                             "harmonics and samples that it is given; leave out stability = None "
+                             "and tolerances.")
 
-def goes_on(
-    field: VectorField, point: BranchPoint, method: HarmonicBalance | None,
-    options: ContinuationOptions, scales: ArrayLike | None, width: float | None, sign: float,
-    both: bool,
-) -> Branch:
-    """Continue a branch from one of its points, or backwards if ``sign`` is -1."""
-    problem, u, tangent = starts.restored(field, point)
-    problem = _rescaled(problem, scales, width)
-    if method is None:
-        return follow(problem, u, sign * tangent, _method_of(problem), options, both=both)
-    _, tangent = starts.with_more(problem, tangent, method)
-    problem, u = starts.with_more(problem, u, method)
-    return follow(problem, u, sign * tangent, method, options, both=both)
+    def projected(
+        self, start: Begun, method: HarmonicBalance, limits: Array | None
+    ) -> tuple[HarmonicProblem, Array, Array | None]:
+        """Problem, unknowns and direction of a start on a mesh."""
+        return starts.start_of(start, method, limits)
 
+    def followed(
+        self, start: Begun, method: HarmonicBalance, options: ContinuationOptions,
+        limits: Array | None, **how: Any,
+    ) -> Branch:
+        """Branch from a start on a mesh."""
+        problem, u, tangent = starts.start_of(start, method, limits)
+        if tangent is None:
+            problem, u = starts.converged_orbit(problem, u)
+        return follow(problem, u, tangent, method, options, **how)
 
-def method_of(point: BranchPoint) -> HarmonicBalance:
-    """Harmonic balance as the branch of a point has it."""
-    return starts.method_of(point.branch.attributes)
+    def goes_on(self, point: BranchPoint, request: Request) -> Branch:
+        """Branch that continues from one of its own points."""
+        problem, u, tangent = self._rescaled(point, request)
+        method = request.method
+        if method is None:
+            method = _method_of(problem)
+        else:
+            _, tangent = starts.with_more(problem, tangent, method)
+            problem, u = starts.with_more(problem, u, method)
+        return follow(problem, u, request.sign * tangent, method, request.options,
+                      both=request.both)
+
+    def beyond(self, point: BranchPoint, request: Request) -> Branch:
+        """The other orbits at one of its points; doubled ones have 2 H harmonics."""
+        problem, u, tangent = self._rescaled(point, request)
+        if problem.orders is not None:
+            # The other orbits may have harmonics that these leave out.
+            every = replace(_method_of(problem), harmonics=problem.harmonics)
+            _, tangent = starts.with_more(problem, tangent, every)
+            problem, u = starts.with_more(problem, u, every)
+        problem, u, tangent = (starts.doubled(problem, u) if point.kind == "period doubling"
+                               else starts.crossing(problem, u, tangent))
+        own = _method_of(problem)
+        if request.method is not None:
+            own = request.method
+            _, tangent = starts.with_more(problem, tangent, own)
+            problem, u = starts.with_more(problem, u, own)
+        return stepped_off(
+            (problem, u, tangent), request,
+            lambda u, tangent, options: follow(problem, u, tangent, own, options))
+
+    def beyond_on_mesh(
+        self, point: BranchPoint, start: orbit_starts.Start, request: Request,
+        method: HarmonicBalance,
+    ) -> Branch:
+        """The other orbits at a point whose orbit was put on a mesh."""
+        there = self._found_again(point, start, method, request.options)
+        return self.beyond(there, replace(request, method=method))
+
+    def _found_again(
+        self, point: BranchPoint, start: orbit_starts.Start, method: HarmonicBalance,
+        options: ContinuationOptions,
+    ) -> BranchPoint:
+        """A special point as few harmonics have it, a little beside that of all of them."""
+        problem, u, tangent = start
+        how = replace(method, harmonics=max(method.highest // 2, 1)
+                      if point.kind == "period doubling" else method.highest)
+        step = options.step
+        near = replace(options, points=2 * _AROUND + 1, largest_step=step,
+                       bounds=(-np.inf, np.inf), stop_at=(), events={}, progress=None, locate=True)
+        found = self.followed((problem, u - _AROUND * step * tangent, tangent), how, near,
+                              None).of_kind(str(point.kind))
+        if not found:
+            raise AnalysisError(f"{point.place} is none with {how.highest} harmonics; take more.")
+        return min(found, key=lambda one: abs(one.parameter - point.parameter))
+
+    def _rescaled(self, point: BranchPoint, request: Request) -> starts.Start:
+        """A point with other scales and width, if given; given scales no longer grow."""
+        problem, u, tangent = starts.restored(request.field, point)
+        limits = problem.limits if request.scales is None else None
+        return (replace(rescaled(problem, request.scales, request.width), limits=limits), u,
+                tangent)
 
 
 def _method_of(problem: HarmonicProblem) -> HarmonicBalance:
     return HarmonicBalance(problem.orders or problem.harmonics, problem.samples,
                            stability=problem.stability,
                            repeats=None if problem.waves is None else problem.waves.repeats)
-
-
-def _rescaled(
-    problem: HarmonicProblem, scales: ArrayLike | None, width: float | None
-) -> HarmonicProblem:
-    """The problem with other scales and width, if given; given scales no longer grow."""
-    return replace(rescaled(problem, scales, width),
-                   limits=problem.limits if scales is None else None)
-
-
-def attributes_of(problem: HarmonicProblem) -> dict[str, Any]:
-    """Attributes of a branch from which the problem of its points is restored."""
-    field, layout = problem.field, problem.layout
-    found: dict[str, Any] = {} if problem.limits is None else {"limits": problem.limits}
-    if problem.orders is not None:
-        found["orders"] = np.array(problem.orders)
-    if problem.waves is not None:
-        found |= problem.waves.repeats.attributes()
-    return {**found, "state_names": list(field.state_names),
-            "parameter_names": list(field.parameters),
-            "parameter_values": problem.values, "scales": problem.scales,
-            "harmonics": problem.harmonics, "samples": problem.samples,
-            "stability": problem.stability or "none", "periods": problem.periods,
-            "displacements": layout.displacements, "memory": layout.memory,
-            "memory_nodes": layout.nodes,
-            **({"kept_deflections": problem.kept.offsets} if layout.memory else {})}
 
 
 def follow(
@@ -190,7 +202,7 @@ def _followed(
     stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
     branch = continue_branch(
         problem, u, replace(options, stop_at=[*stops, HALVING]), name=name, tangent=tangent,
-        attributes={**attributes_of(problem), **(further or {})}, **how)
+        attributes={**problem.attributes(), **(further or {})}, **how)
     if branch.points[-1].kind == HALVING and HALVING not in stops:
         branch = replace(branch, status=BranchStatus.CLOSED)
     return branch

@@ -1,11 +1,12 @@
 """Observed values of orbits by harmonic balance: range and harmonics of one displacement."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from fecontact.bifurcation.harmonic.estimates import peaks
-from fecontact.bifurcation.harmonic.layout import Layout
+from fecontact.bifurcation.harmonic.layout import Layout, layout_from
 from fecontact.bifurcation.harmonic.series import differentiated, uniform_basis
 from fecontact.core.types import Array
 
@@ -41,3 +42,13 @@ def observed_of_orbits(
     harmonics[:, 1 : H + 1] = (observes[1::2] - 1j * observes[2::2]).T
     return dict(zip(OBSERVED, (low.tolist(), high.tolist(), ((high - low) / 2.0).tolist(),
                                harmonics[:, : OBSERVED_HARMONICS + 1]), strict=True))
+
+
+def observed_of_series(points: Sequence[Any], row: Array) -> dict[str, Any]:
+    """Values (N, ...) by name of orbits of one branch by harmonic balance."""
+    known = points[0].branch.attributes
+    layout, H = layout_from(known), int(known["harmonics"])
+    b = layout.harmonic
+    X = np.array([point.u[: (2 * H + 1) * b] for point in points]).reshape(-1, 2 * H + 1, b)
+    periods = np.array([float(point.values["period"]) for point in points])
+    return observed_of_orbits(layout, X, periods, row)

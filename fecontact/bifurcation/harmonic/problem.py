@@ -193,6 +193,23 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
     keeps_matrix: ClassVar[bool] = True
     ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
 
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of a branch from which the problem of its points is restored."""
+        field, layout = self.field, self.layout
+        found: dict[str, Any] = {} if self.limits is None else {"limits": self.limits}
+        if self.orders is not None:
+            found["orders"] = np.array(self.orders)
+        if self.waves is not None:
+            found |= self.waves.repeats.attributes()
+        return {**found, "state_names": list(field.state_names),
+                "parameter_names": list(field.parameters),
+                "parameter_values": self.values, "scales": self.scales,
+                "harmonics": self.harmonics, "samples": self.samples,
+                "stability": self.stability or "none", "periods": self.periods,
+                "displacements": layout.displacements, "memory": layout.memory,
+                "memory_nodes": layout.nodes,
+                **({"kept_deflections": self.kept.offsets} if layout.memory else {})}
+
     @property
     def kinked(self) -> bool:
         """See :attr:`Problem.kinked`; vector fields that are no contact systems count as smooth."""

@@ -1,6 +1,6 @@
 """Nonlinear frequency responses: branches of forced orbits at several levels."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from numbers import Real
 from types import NoneType
@@ -30,22 +30,23 @@ from fecontact.bifurcation.fields.contact_field import (
 from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.compiled.arrays import RESTS
-from fecontact.bifurcation.harmonic.engine_order import EngineOrder, WaveField
-from fecontact.bifurcation.harmonic.estimates import peaks
+from fecontact.bifurcation.harmonic.engine_order import WaveField
 from fecontact.bifurcation.harmonic.layout import Layout, layout_from, layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import (
-    OBSERVED,
-    OBSERVED_HARMONICS,
-    OBSERVED_SAMPLES,
-    observed_of_orbits,
+    observed_of_series,
 )
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.stalled import NO_WAVE, stall_reason
-from fecontact.bifurcation.orbit_methods import Collocation, Method, Shooting
+from fecontact.bifurcation.orbit_methods import Method
 from fecontact.bifurcation.orbits.branches import orbit_branch
+from fecontact.bifurcation.orbits.discretisations import (
+    DISCRETISATIONS,
+    discretisation_by,
+)
 from fecontact.bifurcation.orbits.from_run import periodic_motion
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.orbits.orbit_points import orbit_points_of
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.read_only import read_only_arrays
@@ -53,7 +54,6 @@ from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.initial_state import initial_state
-from fecontact.integrate.solvers import AUTO
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.model_limits import unresisted_motion
@@ -166,8 +166,7 @@ class FrequencyResponse(Summarised):
         row, observed = observed_row(field, observe)
         _require_observable(layout_of(field), row)
         return replace(self, observed=observed, branches=tuple(
-            _with_values(branch, _observed_along(branch, field, row),
-                         {"observed": observed, "observed_row": row})
+            _observed_along(branch, field, row, {"observed": observed, "observed_row": row})
             for branch in self.branches))
 
     def peak(self, level: int = 0) -> BranchPoint:
@@ -257,7 +256,7 @@ def frequency_response(
     require_kind("frequency_response", (ContactSystem, VectorField), system=system)
     require_kind("frequency_response", (str, NoneType), parameter=parameter)
     require_kind("frequency_response", (Real, NoneType), start=start)
-    require_kind("frequency_response", (HarmonicBalance, Collocation, Shooting, type(None)),
+    require_kind("frequency_response", (*(one.options for one in DISCRETISATIONS), NoneType),
                  method=method)
     held = preloaded(system, preload)
     chosen = options_of(
@@ -271,8 +270,9 @@ def frequency_response(
         field: VectorField = field_between(system, tuple(ranges.items()))
     else:
         field, name = system, system.parameter_or_only(parameter)
-    if isinstance(method, HarmonicBalance) and isinstance(method.repeats, EngineOrder):
-        field = method.repeats.field(field)
+    how = method or HarmonicBalance()
+    if how.repeats is not None:
+        field = how.repeats.field(field)
     if isinstance(field, WaveField) and held is not None:
         held = field.waves.state(field, held)
     row, observed = observed_row(field, observe)
@@ -284,13 +284,10 @@ def frequency_response(
         try:
             further = _with_level(field, observed, row, level_name, float(value))
             both = low < first < high
-            if method is None or isinstance(method, HarmonicBalance):
-                branch = branch_of_response(
-                    field, given, field.index(name), level_name, first, method or HarmonicBalance(),
-                    chosen, held, both=both, row=row, further=further)
-            else:
-                branch = _by_orbit_method(field, given, field.index(name), level_name, first,
-                                          method, chosen, held, row, further, both=both)
+            follow = (branch_of_response if discretisation_by(how).finds_responses
+                      else _by_orbit_method)
+            branch = follow(field, given, field.index(name), level_name, first, how, chosen, held,
+                            row, further, both=both)
         except KeyboardInterrupt:
             if not found:
                 raise
@@ -337,8 +334,8 @@ def levels_of(levels: Mapping[str, ArrayLike] | None) -> tuple[str | None, Array
 
 def branch_of_response(
     field: VectorField, values: Array, free: int, level_name: str | None, first: float,
-    method: HarmonicBalance, options: ContinuationOptions, held: Array | None = None, *,
-    both: bool, row: Array | None = None, further: Mapping[str, Any] | None = None,
+    method: Any, options: ContinuationOptions, held: Array | None = None,
+    row: Array | None = None, further: Mapping[str, Any] | None = None, *, both: bool,
 ) -> Branch:
     """The branch at one level; ``held`` (d,) is the state of a preload.
 
@@ -398,7 +395,7 @@ def _started(
 
 def _by_orbit_method(
     field: VectorField, values: Array, free: int, level_name: str | None, first: float,
-    method: Collocation | Shooting, options: ContinuationOptions, held: Array | None, row: Array,
+    method: Any, options: ContinuationOptions, held: Array | None, row: Array,
     further: Mapping[str, Any], *, both: bool,
 ) -> Branch:
     """The branch at one level by collocation or shooting, from the orbit of harmonic balance.
@@ -408,7 +405,7 @@ def _by_orbit_method(
     """
     _require_observable(layout_of(field), row)
     name, begin = list(field.parameters)[free], first
-    solver = method.solver if isinstance(method, Shooting) else AUTO
+    solver = method.solver
     try:
         if not solver.smooth:
             raise AnalysisError("Harmonic balance knows no set-valued laws.")
@@ -436,31 +433,14 @@ def _by_orbit_method(
         raise AnalysisError(f"{error} Friction elements that never slide keep any deflection, so "
                             f"that their orbits are not isolated: follow them by "
                             f"HarmonicBalance(), or start where they slide.") from error
-    return _with_values(branch, _observed_along(branch, field, row), further)
+    return _observed_along(branch, field, row, further)
 
 
-def _observed_along(branch: Branch, field: VectorField, row: Array) -> list[dict[str, Any]]:
-    """Values of an observed quantity at all points of a branch of orbits."""
-    if not branch.points[0].by_harmonics:
-        return [_observed_of(point.orbit(field, OBSERVED_SAMPLES), row) for point in branch.points]
-    # The numbers of states and parameters are those of the field.
-    _ = branch.points[0].parameter_values(field)
-    found = _observed_of_series(branch, row)
-    return [{name: values[k] for name, values in found.items()} for k in range(len(branch))]
-
-
-def _observed_of(motion: PeriodicMotion, row: Array) -> dict[str, Any]:
-    """Values of an observed quantity along an orbit, for its point."""
-    low, high = peaks((motion.evenly() @ row)[None])
-    return dict(zip(OBSERVED, (
-        float(low[0]), float(high[0]), float(high[0] - low[0]) / 2.0,
-        motion.harmonics(OBSERVED_HARMONICS, observe=row)), strict=True))
-
-
-def _with_values(
-    branch: Branch, seen: Sequence[Mapping[str, Any]], further: Mapping[str, Any]
+def _observed_along(
+    branch: Branch, field: VectorField, row: Array, further: Mapping[str, Any]
 ) -> Branch:
-    """The branch with more values at its points and further attributes."""
+    """The branch with values of an observed quantity at its points, and further attributes."""
+    seen = orbit_points_of(branch.points[0]).observed_along(branch.points, field, row)
     attributes = {**branch.attributes, **further}
     header = BranchHeader(branch.parameter_name, attributes)
     points = [special_point(point.u, point.tangent, {**point.values, **values}, point.kind,
@@ -614,15 +594,7 @@ def _taken(
 def observed_amplitudes(branch: Branch, row: Array) -> Array:
     """Half the range (N,) of an observed quantity at the points of a branch of orbits."""
     _require_observable(layout_from(branch.attributes), row)
-    return np.array(_observed_of_series(branch, row)["observed_amplitude"])
-
-
-def _observed_of_series(branch: Branch, row: Array) -> dict[str, Any]:
-    """Values (N, ...) of an observed quantity of orbits by harmonic balance."""
-    layout, H = layout_from(branch.attributes), int(branch.attributes["harmonics"])
-    b = layout.harmonic
-    X = np.array([point.u[: (2 * H + 1) * b] for point in branch.points]).reshape(-1, 2 * H + 1, b)
-    return observed_of_orbits(layout, X, np.asarray(branch.column("period")), row)
+    return np.array(observed_of_series(branch.points, row)["observed_amplitude"])
 
 
 def _require_observable(layout: Layout, row: Array) -> None:

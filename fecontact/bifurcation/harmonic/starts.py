@@ -3,9 +3,7 @@
 A start is a problem, its unknowns u and the direction in which the branch leaves.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +19,7 @@ from fecontact.bifurcation.harmonic.layout import (
     memory_blocks,
 )
 from fecontact.bifurcation.harmonic.memory import Kept
-from fecontact.bifurcation.harmonic.method import HarmonicBalance, require_wave
+from fecontact.bifurcation.harmonic.method import HarmonicBalance, method_from, require_wave
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.series import with_harmonics
 from fecontact.bifurcation.harmonic.timing import timing_of
@@ -150,10 +148,10 @@ def restored(field: VectorField, point: BranchPoint) -> Start:
         order = known["engine_order"]
         raise InputError(f"{point.place} is a wave of a wheel under engine order {order}; give the "
                          f"field EngineOrder(wheel, {order}).field(...).")
-    if not point.by_harmonics:
+    if "harmonics" not in known or "period" not in point.values:
         raise InputError(f"{point.place} is no periodic orbit by harmonic balance.")
     values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
-    problem = problem_for(field, values, free, method_of(known),
+    problem = problem_for(field, values, free, method_from(known),
                           np.asarray(known["scales"], dtype=float), int(known["periods"]),
                           known.get("kept_deflections"))
     if len(point.u) != problem.size + problem.common:
@@ -162,15 +160,6 @@ def restored(field: VectorField, point: BranchPoint) -> Start:
     return (replace(problem, reference=problem.coefficients(point.u).copy(),
                     limits=known.get("limits"), row=known.get("observed_row")), point.u,
             point.tangent)
-
-
-def method_of(attributes: Mapping[str, Any]) -> HarmonicBalance:
-    """Harmonic balance as a branch has it, from its attributes."""
-    stability = str(attributes["stability"])
-    orders = attributes.get("orders")
-    return HarmonicBalance(int(attributes["harmonics"]) if orders is None else
-                           np.asarray(orders).tolist(), int(attributes["samples"]),
-                           stability=None if stability == "none" else stability)
 
 
 def converged_orbit(

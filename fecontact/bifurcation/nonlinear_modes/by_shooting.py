@@ -19,7 +19,6 @@ from fecontact.bifurcation.nonlinear_modes.mode_problem import (
 )
 from fecontact.bifurcation.orbit_methods import Shooting
 from fecontact.bifurcation.orbits.shooting import ShootingProblem
-from fecontact.bifurcation.orbits.shooting_branches import attributes_of
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ComplexArray
 
@@ -131,9 +130,11 @@ def leaving_by_shooting(
 
 
 def followed_by_shooting(
-    problem: ShootingMode, u: Array, leaving: Array, options: ContinuationOptions
+    start: LinearStart, begin: tuple[ShootingMode, Array, Array], method: Shooting,
+    options: ContinuationOptions,
 ) -> Branch:
     """The branch of a mode from its start."""
+    problem, u, leaving = begin
     return continue_branch(
         problem, u, options, name=XI, tangent=leaving,
-        attributes=attributes_of(problem) | {"conservative": problem.conservative})
+        attributes=problem.attributes() | {"conservative": problem.conservative})

@@ -19,7 +19,6 @@ from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import starts
-from fecontact.bifurcation.harmonic.branches import attributes_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.response import (
     FrequencyResponse,
@@ -116,7 +115,7 @@ def controlled_response(
             found.append(continue_branch(
                 problem, u, chosen, name=name, direction=1.0 if first < high else -1.0,
                 both=low < first < high, attributes={
-                    **attributes_of(problem.orbit), "parameters": [name, force],
+                    **problem.orbit.attributes(), "parameters": [name, force],
                     "observed": observed, "condition": HELD, "level": amplitude,
                     "level_name": "amplitude", "level_label": amplitude_label(observed)}))
         except KeyboardInterrupt:

@@ -1,6 +1,6 @@
 """Nonlinear modes: frequency, damping and shape of a system's own motion over its amplitude."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from types import NoneType
 from typing import Any
@@ -20,7 +20,7 @@ from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.engine_order import EngineOrder
 from fecontact.bifurcation.harmonic.layout import layout_from
-from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.harmonic.method import HarmonicBalance, method_from
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.nonlinear_modes.by_shooting import (
@@ -314,7 +314,7 @@ def nonlinear_mode(
     require_kind("nonlinear_mode", (str, NoneType), unfolding=unfolding)
     low, high = _amplitudes(bounds)
     chosen = method or HarmonicBalance()
-    start = _begun(system, mode, preload, unfolding, _wave_of(chosen))
+    start = _begun(system, mode, preload, unfolding, chosen.repeats)
     # Of proportional coordinates each adds to the length of a step.
     longer = max(1.0, np.sqrt(0.5 * start.displacements))
     given = options_of(options or ContinuationOptions(
@@ -323,11 +323,10 @@ def nonlinear_mode(
     ends = _between(given, low, high)
     further = {"observed": observed, "mode_number": int(mode), "rest": start.state[
         : start.displacements]}
-    begin = (leaving_by_shooting(start, *_first_motion(start, row, observed, low), row,
-                                 _lossless(start), chosen) if isinstance(chosen, Shooting)
-             else _leaving(start, row, observed, low, chosen))
+    leave, follow = _WAYS[type(chosen)]
+    begin = leave(start, row, observed, low, chosen)
     try:
-        branch = _followed(start, begin, chosen, ends)
+        branch = follow(start, begin, chosen, ends)
     except FecontactError as error:
         raise AnalysisError(f"No nonlinear mode was followed from the linear one at "
                             f"{start.angular_frequency / (2.0 * np.pi):.5g} Hz and the amplitude "
@@ -359,14 +358,11 @@ def _remedy(preload: LoadHistory | RestState | Array | None) -> str:
 
 
 def _followed(
-    start: LinearStart, begin: tuple[ModeProblem | ShootingMode, Array, Array],
-    method: HarmonicBalance | Shooting, options: ContinuationOptions,
+    start: LinearStart, begin: tuple[ModeProblem, Array, Array], method: HarmonicBalance,
+    options: ContinuationOptions,
 ) -> Branch:
-    """The branch of a mode from its start by either method."""
+    """The branch of a mode from its start by harmonic balance."""
     problem, u, leaving = begin
-    if isinstance(problem, ShootingMode):
-        return followed_by_shooting(problem, u, leaving, options)
-    assert isinstance(method, HarmonicBalance)
     branch = branches.follow(problem, u, leaving, method, options)
     return replace(branch, message=stall_reason(start.field, branch), attributes={
         **branch.attributes, "conservative": problem.conservative, "rigid_motions": problem.loose})
@@ -396,11 +392,6 @@ def _begun(
     return linear_start_of_field(system, unfolding, mode)
 
 
-def _wave_of(method: HarmonicBalance | Shooting) -> EngineOrder | None:
-    """The travelling wave that a method is for, if it is for one."""
-    return method.repeats if isinstance(method, HarmonicBalance) else None
-
-
 def continued_mode(
     system: ContactSystem, mode: NonlinearMode, bounds: tuple[float, float],
     observe: tuple[str | int, str], options: ContinuationOptions,
@@ -419,7 +410,7 @@ def continued_mode(
         loose=np.asarray(known["rigid_motions"]).reshape(-1, plain.layout.displacements),
         home=np.asarray(known["rest"]))
     left = max(2, options.points - len(points) + 1)
-    rest = branches.follow(problem, u, tangent, starts.method_of(known),
+    rest = branches.follow(problem, u, tangent, method_from(known),
                            _between(replace(options, points=left), low, high))
     ended = _ended(replace(rest, message=stall_reason(field, rest)), {})
     return replace(mode, branch=replace(
@@ -523,6 +514,13 @@ def _leaving(
     return problem, u, leaving / np.sqrt(problem.weights() @ leaving**2)
 
 
+def _leaving_by_shooting(
+    start: LinearStart, row: Array, observed: str, amplitude: float, method: Shooting
+) -> tuple[ShootingMode, Array, Array]:
+    return leaving_by_shooting(start, *_first_motion(start, row, observed, amplitude), row,
+                               _lossless(start), method)
+
+
 def _first_motion(
     start: LinearStart, row: Array, observed: str, amplitude: float
 ) -> tuple[ComplexArray, Array]:
@@ -599,3 +597,8 @@ def _integral(rate: Array, over: Array) -> Array:
     parts = half * ((rates(places) * overs(places, 1)) @ weights)
     whole = np.append(0.0, np.cumsum(parts))
     return np.asarray(first + whole[np.cumsum(kept) - 1])
+
+
+# How each method leaves the linear mode, and follows it.
+_WAYS: Mapping[type, tuple[Callable[..., Any], Callable[..., Branch]]] = {
+    HarmonicBalance: (_leaving, _followed), Shooting: (_leaving_by_shooting, followed_by_shooting)}

@@ -14,7 +14,6 @@ from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import starts
-from fecontact.bifurcation.harmonic.branches import attributes_of
 from fecontact.bifurcation.harmonic.layout import layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.response import (
@@ -184,7 +183,7 @@ def resonance_curve(
     branch = continue_branch(
         problem, u, chosen, name=parameter, direction=1.0 if u[-1] < high else -1.0,
         both=low < u[-1] < high, attributes={
-            **attributes_of(problem.orbit), "parameters": [parameter, frequency],
+            **problem.orbit.attributes(), "parameters": [parameter, frequency],
             "observed": observed, "condition": condition})
     return ResonanceCurve(branch, observed, condition)
 

@@ -12,7 +12,10 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
 from fecontact.bifurcation.fields.fast_modes import unresolved_modes
 from fecontact.bifurcation.fields.jumps import missed_jumps
-from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
+from fecontact.bifurcation.orbits.collocation_equations import (
+    CollocationEquations,
+    CollocationLinearisation,
+)
 from fecontact.bifurcation.orbits.floquet import FloquetTests
 from fecontact.bifurcation.orbits.mesh import carry_over, equidistributed, extremes, rule
 from fecontact.bifurcation.orbits.normal_forms import examined
@@ -26,7 +29,6 @@ from fecontact.bifurcation.orbits.same_orbit import (
     vanishing,
 )
 from fecontact.bifurcation.orbits.state_error import state_error
-from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 
 # Largest distance of a guess from the tangent, in steps.
@@ -124,8 +126,8 @@ def _whole(wanted: float) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class CollocationProblem(FloquetTests, Discretisation, Problem):
-    """The problem of following orbits by collocation; see :class:`Discretisation`.
+class CollocationProblem(FloquetTests, CollocationEquations, Problem):
+    """The problem of following orbits by collocation; see :class:`CollocationEquations`.
 
     Attributes
     ----------
@@ -191,6 +193,15 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
                 "unstable": stability.unstable, "stable": stability.stable,
                 "trivial_error": stability.trivial_error, "mesh": self.mesh, "minimum": low,
                 "maximum": high, "state_error": error}
+
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of a branch from which its points are restored."""
+        kept: dict[str, Any] = {
+            "state_names": list(self.field.state_names),
+            "parameter_names": list(self.field.parameters), "parameter_values": self.values,
+            "scales": self.scales, "degree": self.degree, "periods": self.periods,
+            "intervals": self.intervals}
+        return kept if self.limits is None else kept | {"limits": self.limits}
 
     def note(self, points: Sequence[BranchPoint]) -> str:
         """Note on multipliers that are lost, miss jumps of forces, or are of modes too fast."""
@@ -344,11 +355,3 @@ class CollocationProblem(FloquetTests, Discretisation, Problem):
         out = np.empty((len(vectors), nodal + vectors.shape[1] - self.size))
         carry_over(self.mesh, mesh, self.degree, vectors, out)
         return out
-
-
-def require_mesh(intervals: int, degree: int) -> None:
-    """Raise :class:`InputError` unless this many intervals of this degree can be used."""
-    if not (isinstance(intervals, int | np.integer) and intervals >= 2):
-        raise InputError(f"intervals = {intervals!r} must be a whole number of at least 2.")
-    if not (isinstance(degree, int | np.integer) and 2 <= degree <= 7):
-        raise InputError(f"degree = {degree!r} must be a whole number from 2 to 7.")

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
+from fecontact.bifurcation.orbits.collocation_equations import CollocationLinearisation
 from fecontact.core.types import Array, Integers
 
 # Samples of an interval in which the largest bend is sought, bisections about it, those before

@@ -320,3 +320,11 @@ def require_segments(segments: int) -> None:
     """Raise InputError for an invalid number of segments."""
     if not (isinstance(segments, int | np.integer) and segments >= 1):
         raise InputError(f"segments = {segments!r} must be a whole number of at least 1.")
+
+
+def require_mesh(intervals: int, degree: int) -> None:
+    """Raise :class:`InputError` unless this many intervals of this degree can be used."""
+    if not (isinstance(intervals, int | np.integer) and intervals >= 2):
+        raise InputError(f"intervals = {intervals!r} must be a whole number of at least 2.")
+    if not (isinstance(degree, int | np.integer) and 2 <= degree <= 7):
+        raise InputError(f"degree = {degree!r} must be a whole number from 2 to 7.")

@@ -24,6 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.linalg.bordered import solve_turned
+from fecontact.bifurcation.orbits.collocation_equations import (
+    CollocationEquations,
+    CollocationLinearisation,
+)
 from fecontact.bifurcation.orbits.curves.kernels import applied, multiplied
 from fecontact.bifurcation.orbits.curves.singularity import (
     SecondDerivatives,
@@ -33,7 +37,6 @@ from fecontact.bifurcation.orbits.curves.singularity import (
     of_fold,
     of_torus,
 )
-from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 from fecontact.bifurcation.orbits.kinks import JacobianKinks
 
 Array = NDArray[Any]
@@ -49,7 +52,7 @@ _DECIDED = 0.25
 
 
 def examined(
-    kind: str, problem: Discretisation, u: Array, linearised: CollocationLinearisation,
+    kind: str, problem: CollocationEquations, u: Array, linearised: CollocationLinearisation,
     details: bool = True
 ) -> dict[str, Any] | None:
     """Details of a special point of a branch of orbits; None if it is not one.
@@ -122,7 +125,7 @@ class Expansion:
     """
 
     def __init__(
-        self, problem: Discretisation, u: Array, linearised: CollocationLinearisation,
+        self, problem: CollocationEquations, u: Array, linearised: CollocationLinearisation,
         at: Singularity,
     ) -> None:
         self._problem, self._linearised, self._at = problem, linearised, at

@@ -1,7 +1,8 @@
 """Continuation problems of orbits, restored from points of branches."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -10,8 +11,16 @@ from fecontact.bifurcation.continuation.points import special_point
 from fecontact.bifurcation.continuation.problem import sizes_of
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
+from fecontact.bifurcation.harmonic.starts import restored as restored_balance
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.motions import solver_of
+from fecontact.bifurcation.orbits.orbit_points import (
+    BY_COLLOCATION,
+    BY_HARMONICS,
+    BY_SHOOTING,
+    OrbitPoints,
+    orbit_points_of,
+)
 from fecontact.bifurcation.orbits.shooting import ShootingProblem
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
@@ -67,6 +76,13 @@ def restored_shooting(
     return problem, point.u, point.tangent
 
 
+def restored_orbit(
+    field: VectorField, point: BranchPoint
+) -> tuple[Any, Array, Array]:
+    """Problem, unknowns and tangent of an orbit, by its own method."""
+    return _RESTORED[orbit_points_of(point)](field, point)
+
+
 def rescaled(problem: P, scales: ArrayLike | None, width: float | None) -> P:
     """The problem with other scales of the states and another width of the diagram, if given."""
     if scales is None and width is None:
@@ -93,3 +109,7 @@ def over_first(point: BranchPoint, kind: str) -> BranchPoint:
                           {**kept, "parameter_values": values, "scales": scales})
     return special_point(np.delete(point.u, -2), np.delete(point.tangent, -2), point.values, kind,
                          {}, header)
+
+
+_RESTORED: Mapping[OrbitPoints, Callable[..., tuple[Any, Array, Array]]] = {
+    BY_COLLOCATION: restored, BY_SHOOTING: restored_shooting, BY_HARMONICS: restored_balance}

@@ -12,8 +12,8 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.equilibria.equilibrium import newton
+from fecontact.bifurcation.orbits.collocation_equations import CollocationEquations
 from fecontact.bifurcation.orbits.collocation_kernels import amplitude_along
-from fecontact.bifurcation.orbits.discretisation import Discretisation
 from fecontact.bifurcation.orbits.mesh import compare_halves, interpolate, node_times
 from fecontact.core.types import Array
 from fecontact.system.complex_modes import sorted_eigenvalues
@@ -81,7 +81,7 @@ def same_place(
     return bool(float(row @ off) >= -_BEHIND * within * weighted_norm(weights, other[1][common]))
 
 
-def in_phase(problem: Discretisation, u: Array, like: Array) -> Array:
+def in_phase(problem: CollocationEquations, u: Array, like: Array) -> Array:
     """An orbit on the mesh of the problem, shifted in time to match another one."""
     mesh, d = problem.mesh, problem.field.dimension
     nodes, times = problem.nodes(u).copy(), node_times(mesh, problem.degree)
@@ -99,7 +99,7 @@ def in_phase(problem: Discretisation, u: Array, like: Array) -> Array:
 
 
 def _shift(
-    problem: Discretisation, nodes: Array, like: Array, shifted: Callable[[float], Array]
+    problem: CollocationEquations, nodes: Array, like: Array, shifted: Callable[[float], Array]
 ) -> float:
     """Shift in periods of the best correlation that meets the phase condition."""
     from scipy.optimize import brentq
@@ -119,7 +119,7 @@ def _shift(
     return float(brentq(off, low, high, xtol=1e-12))
 
 
-def halves_meet(problem: Discretisation, u: Array, tangent: Array) -> bool:
+def halves_meet(problem: CollocationEquations, u: Array, tangent: Array) -> bool:
     """Whether an orbit is a single orbit traversed twice whose halves separate along the branch."""
     times = np.mod(node_times(problem.mesh, problem.degree) + 0.5, 1.0)
     nodes, along = problem.nodes(u).copy(), problem.nodes(tangent).copy()
@@ -133,7 +133,7 @@ def halves_meet(problem: Discretisation, u: Array, tangent: Array) -> bool:
             and apart(along) > _HALVES_PART * float((weights * along**2).sum()))
 
 
-def vanishing(problem: Discretisation, u: Array, least: float = _VANISHED) -> float:
+def vanishing(problem: CollocationEquations, u: Array, least: float = _VANISHED) -> float:
     """See :func:`shrunk`, of an orbit by collocation."""
     return float(amplitude_along(problem.weights(), problem.nodes(u), problem.reference)) - least
 
@@ -147,7 +147,7 @@ def shrunk(weights: Array, moved: Array, before: Array, least: float = _VANISHED
     return float((weights * before * moved).sum() / (weights * before**2).sum()) - least
 
 
-def is_homoclinic(problem: Discretisation, u: Array, linearised: Any, tangent: Array) -> bool:
+def is_homoclinic(problem: CollocationEquations, u: Array, linearised: Any, tangent: Array) -> bool:
     """Whether an orbit by collocation is homoclinic to a saddle; see :func:`near_saddle`."""
     x, _ = problem.at_gauss_points(problem.nodes(u))
     shares = np.repeat(problem.widths / problem.degree, problem.degree)
@@ -155,7 +155,7 @@ def is_homoclinic(problem: Discretisation, u: Array, linearised: Any, tangent: A
                        linearised.derivatives[0])
 
 
-def halves_apart(problem: Discretisation, u: Array) -> float:
+def halves_apart(problem: CollocationEquations, u: Array) -> float:
     """Difference of the halves along that of the orbit before, see :func:`shrunk`; 1 without any.
 
     Where it vanishes a doubled orbit is a single one; beyond, the same orbits come once more, with

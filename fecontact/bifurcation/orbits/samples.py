@@ -10,20 +10,13 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.harmonic.estimates import peaks
-from fecontact.bifurcation.orbits.mesh import extremes, interpolate
-from fecontact.bifurcation.orbits.motions import nodes_on_mesh
+from fecontact.bifurcation.orbits.orbit_points import orbit_points_of
 from fecontact.bifurcation.tori.motion import torus_motion
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import InputError, shown
 from fecontact.core.types import Array, ArrayLike
 from fecontact.reduction.modal_basis import Component
 from fecontact.system.fields.vector_field import VectorField, require_field
-
-
-def _nodes(point: BranchPoint, states: int) -> tuple[Array, int]:
-    """Nodes (N m, d) and degree m of an orbit by collocation; ``states`` is d."""
-    return nodes_on_mesh(point.u, np.asarray(point.values["mesh"], dtype=float), states)
 
 
 def quantity_range(
@@ -72,20 +65,16 @@ def quantity_range(
 
 def _extremes(point: BranchPoint, weights: Array) -> tuple[float, float]:
     """The range of the quantity with so many weights."""
-    if point.is_orbit and point.by_harmonics:
-        return _peaks(point.orbit(samples=_FINE).states @ weights)
+    if point.is_orbit:
+        return orbit_points_of(point).range(point, weights)
     if point.is_torus:
         moved = torus_motion(point).grid(_ANGLES, _ANGLES) @ weights
         return float(moved.min()), float(moved.max())
-    if "mesh" not in point.values:
-        if "state" not in point.values:
-            raise InputError(f"{point.place} stores no orbit, only its extremes: take 'minimum' "
-                             f"and 'maximum' of the point.")
-        value = float(weights @ np.asarray(point.values["state"]))
-        return value, value
-    nodes, degree = _nodes(point, len(weights))
-    low, high = extremes((nodes @ weights)[:, None].copy(), degree)
-    return float(low[0]), float(high[0])
+    if "state" not in point.values:
+        raise InputError(f"{point.place} stores no orbit, only its extremes: take 'minimum' "
+                         f"and 'maximum' of the point.")
+    value = float(weights @ np.asarray(point.values["state"]))
+    return value, value
 
 
 def amplitude(row: ArrayLike) -> Callable[[BranchPoint], float]:
@@ -102,18 +91,8 @@ def amplitudes(branch: Branch, row: ArrayLike) -> Array:
     return np.array([amplitude(row)(point) for point in branch.points])
 
 
-def _peaks(moved: Array) -> tuple[float, float]:
-    """Extremes of samples over a period, the last of which is the first again."""
-    low, high = peaks(moved[None, :-1])
-    return float(low[0]), float(high[0])
-
-
-# Samples per period; the error of an extreme is of the order of their spacing squared.
-_SAMPLES = 4000
 # Samples of each angle of a torus, more than twice its harmonics at most.
 _ANGLES = 401
-# The same where extremes are those of parabolas through the samples.
-_FINE = 501
 
 
 def observe(
@@ -162,12 +141,5 @@ def _range(
     values = np.array(branch.attributes["parameter_values"], dtype=float)
     excited = field.forcing_period(values) is not None
     phases = np.arange(int(branch.attributes["periods"])) / int(branch.attributes["periods"])
-    if not (point.by_shooting or point.by_harmonics):
-        nodes, _ = _nodes(point, field.dimension)
-        section = interpolate(np.asarray(point.values["mesh"], dtype=float), nodes, phases) @ row
-        return *quantity_range(point, row), {"observed_section": section} if excited else {}
-    motion = point.orbit(field, _SAMPLES + 1)
-    moved = motion.states @ row
-    section = np.interp(phases, motion.times / motion.times[-1], moved)
-    return (float(moved.min()), float(moved.max()),
-            {"observed_section": section} if excited else {})
+    low, high, section = orbit_points_of(point).observed(point, field, row, phases)
+    return low, high, {"observed_section": section} if excited else {}

@@ -18,6 +18,7 @@ from fecontact.bifurcation.linalg.bordered import Border, Bordered
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests, floquet_of, require_same
 from fecontact.bifurcation.orbits.mesh import interpolate, require_segments
+from fecontact.bifurcation.orbits.motions import solver_text
 from fecontact.bifurcation.orbits.same_orbit import VANISHING, near_saddle, same_place, shrunk
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array
@@ -114,6 +115,20 @@ class ShootingProblem(FloquetTests, Problem):
     def common(self) -> int:
         """Number of unknowns common to all segments."""
         return 2 if self.autonomous else 1
+
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of a branch from which the problem of its points is restored."""
+        found = {"state_names": list(self.field.state_names),
+                 "parameter_names": list(self.field.parameters), "parameter_values": self.values,
+                 "scales": self.scales, "segments": len(self.mesh) - 1, "periods": self.periods,
+                 "rtol": self.rtol}
+        if self.derivative_rtol is not None:
+            found["derivative_rtol"] = self.derivative_rtol
+        if self.limits is not None:
+            found["limits"] = self.limits
+        if (solver := solver_text(self.solver)) is not None:
+            found["solver"] = solver
+        return found
 
     def starts(self, u: Array) -> Array:
         """Starts (K, d) of the segments."""

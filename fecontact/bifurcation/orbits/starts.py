@@ -12,8 +12,13 @@ import numpy as np
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
-from fecontact.bifurcation.orbits.collocation import CollocationProblem, require_mesh
-from fecontact.bifurcation.orbits.mesh import equidistributed, interpolate, node_times
+from fecontact.bifurcation.orbits.collocation import CollocationProblem
+from fecontact.bifurcation.orbits.mesh import (
+    equidistributed,
+    interpolate,
+    node_times,
+    require_mesh,
+)
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.errors import AnalysisError, InputError, require_positive
 from fecontact.core.types import Array, ArrayLike

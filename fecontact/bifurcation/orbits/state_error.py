@@ -9,6 +9,10 @@ from math import comb, factorial
 import numpy as np
 
 from fecontact.bifurcation.linalg.condensation import with_left_ends
+from fecontact.bifurcation.orbits.collocation_equations import (
+    CollocationEquations,
+    CollocationLinearisation,
+)
 from fecontact.bifurcation.orbits.collocation_kernels import (
     at_points,
     fill_carried,
@@ -16,7 +20,6 @@ from fecontact.bifurcation.orbits.collocation_kernels import (
     fill_smooth_errors,
     integrate_defect,
 )
-from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 from fecontact.bifurcation.orbits.mesh import rule
 from fecontact.core.types import Array
 
@@ -76,7 +79,7 @@ def _halves(degree: int) -> _Halves:
 
 
 def state_error(
-    problem: Discretisation, u: Array, linearisation: CollocationLinearisation | None = None,
+    problem: CollocationEquations, u: Array, linearisation: CollocationLinearisation | None = None,
     beside: Callable[[CollocationLinearisation, Array], Array] | None = None,
 ) -> float:
     r"""Largest error of a state, in its range over the orbit.

@@ -104,5 +104,5 @@ def _orbit(point: BranchPoint, field: ContactField) -> Motion:
         return sampled(times, torus.states(times))
     if not point.is_orbit:
         return 0.0, np.repeat(np.asarray(point.values["state"], dtype=float)[None], SAMPLES, 0)
-    motion = point.orbit(field if point.by_shooting else None, SAMPLES)
+    motion = point.orbit(None if point.stores_orbit else field, SAMPLES)
     return sampled(motion.times, motion.states)

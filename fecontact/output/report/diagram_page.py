@@ -133,7 +133,8 @@ def _kept(named: Mapping[str, Branch]) -> list[tuple[str, int]]:
     """Names of branches and indices of points whose orbits are stored."""
     found, total = [], sum(map(len, named.values()))
     for name, branch in named.items():
-        most = _ORBITS_RUN if any(point.by_shooting for point in branch.points) else _ORBITS
+        run = any(point.is_orbit and not point.stores_orbit for point in branch.points)
+        most = _ORBITS_RUN if run else _ORBITS
         count = min(len(branch), max(2, most * len(branch) // total))
         chosen = set(np.linspace(0, len(branch) - 1, count).astype(int).tolist())
         chosen |= {index for index, point in enumerate(branch.points) if point.kind is not None}

@@ -74,7 +74,7 @@ def report_response(
         return [*point_texts(point, usable_hz), size, *error]
 
     # Truncation is the error of harmonic balance alone.
-    balanced = all(branch.points[0].by_harmonics for branch in response.branches)
+    balanced = all("truncation_error" in branch.points[0].values for branch in response.branches)
     shown = replace(shown, columns=(*COLUMNS, "amplitude", *["truncation error"] * balanced),
                     texts=texts)
     return write_diagrams(path, path.stem if title is None else title, named, diagrams, shown,

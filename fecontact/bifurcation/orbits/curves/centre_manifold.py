@@ -21,8 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.linalg.bordered import open_side, open_solution
+from fecontact.bifurcation.orbits.collocation_equations import (
+    CollocationEquations,
+    CollocationLinearisation,
+)
 from fecontact.bifurcation.orbits.curves.singularity import at_points
-from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 from fecontact.core.ties import first_largest
 
 Array = NDArray[Any]
@@ -68,7 +71,7 @@ class CentreManifold:
     """
 
     def __init__(
-        self, problem: Discretisation, u: Array, linearised: CollocationLinearisation,
+        self, problem: CollocationEquations, u: Array, linearised: CollocationLinearisation,
         multipliers: Sequence[complex], chain: bool = False,
     ) -> None:
         self.problem, self.at, self.values = problem, linearised, problem.parameters(u)

@@ -15,6 +15,7 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.linalg.bordered import Bordered
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, Intervals
+from fecontact.bifurcation.orbits.collocation_equations import CollocationLinearisation
 from fecontact.bifurcation.orbits.curves.codim2_forms import orbit_form
 from fecontact.bifurcation.orbits.curves.singularity import (
     ContinuedSign,
@@ -27,7 +28,6 @@ from fecontact.bifurcation.orbits.curves.singularity import (
     of_torus,
     second_derivatives,
 )
-from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation
 from fecontact.bifurcation.orbits.floquet import resting
 from fecontact.bifurcation.orbits.kinks import JacobianKinks
 from fecontact.bifurcation.orbits.normal_forms import Expansion, Share

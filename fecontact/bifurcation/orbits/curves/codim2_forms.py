@@ -26,8 +26,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fecontact.bifurcation.orbits.collocation_equations import (
+    CollocationEquations,
+    CollocationLinearisation,
+)
 from fecontact.bifurcation.orbits.curves.centre_manifold import CentreManifold, Series
-from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 from fecontact.bifurcation.orbits.kinks import JacobianKinks
 from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
@@ -55,7 +58,7 @@ class Form(NamedTuple):
 
 
 def orbit_form(
-    kind: str, problem: Discretisation, u: Array, linearised: CollocationLinearisation,
+    kind: str, problem: CollocationEquations, u: Array, linearised: CollocationLinearisation,
     pair: complex = 1.0, beside: complex = 1.0,
 ) -> dict[str, Any]:
     """'normal_form' and 'normal_form_error', the coefficients of a kind in the order above.

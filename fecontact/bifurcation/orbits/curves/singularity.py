@@ -23,6 +23,10 @@ from scipy.linalg.lapack import dggev
 
 from fecontact.bifurcation.linalg.bordered import expand_open, original_rows
 from fecontact.bifurcation.linalg.condensation import CondensedFactors
+from fecontact.bifurcation.orbits.collocation_equations import (
+    CollocationEquations,
+    CollocationLinearisation,
+)
 from fecontact.bifurcation.orbits.collocation_kernels import to_nodes
 from fecontact.bifurcation.orbits.curves.kernels import (
     add_term,
@@ -30,7 +34,6 @@ from fecontact.bifurcation.orbits.curves.kernels import (
     open_values,
     unit_factor,
 )
-from fecontact.bifurcation.orbits.discretisation import CollocationLinearisation, Discretisation
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, ComplexArray
 
@@ -86,7 +89,7 @@ class ContinuedSign:
         """Let vectors that follow have the direction of these, which are given at some times."""
         self._before, self._times = term, times
 
-    def aligned(self, found: Singularity, orbit: Discretisation) -> Singularity:
+    def aligned(self, found: Singularity, orbit: CollocationEquations) -> Singularity:
         """The test function for w and v of length one, in the direction of those before."""
         term, = found.terms
         left, states = self._at(orbit.times)
@@ -241,7 +244,7 @@ def _term(at: CollocationLinearisation, left: Array, start: Array, end: Array) -
     return Term(rows, at_points(at.problem, nodes, end))
 
 
-def at_points(problem: Discretisation, nodes: Array, end: Array) -> Array:
+def at_points(problem: CollocationEquations, nodes: Array, end: Array) -> Array:
     """Values (N m, d) at the Gauss points of v with these nodes (N m, d) and this end (d,).
 
     Vectors may be complex.

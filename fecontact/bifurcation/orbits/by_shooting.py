@@ -12,8 +12,9 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbit_methods import Shooting
+from fecontact.bifurcation.orbits.discretisation import Discretisation, MotionStart, Request
 from fecontact.bifurcation.orbits.mesh import interpolate
-from fecontact.bifurcation.orbits.motions import PeriodicMotion, solver_text
+from fecontact.bifurcation.orbits.orbit_points import ShotPoints
 from fecontact.bifurcation.orbits.restored import rescaled, restored_shooting
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.bifurcation.orbits.shooting import (
@@ -21,10 +22,10 @@ from fecontact.bifurcation.orbits.shooting import (
     ShootingProblem,
     shooting_from,
 )
-from fecontact.bifurcation.orbits.starts import Start, from_samples
+from fecontact.bifurcation.orbits.starts import Begun, Start
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.ties import first_largest
-from fecontact.core.types import Array, ArrayLike
+from fecontact.core.types import Array
 from fecontact.integrate.solvers import SetValued
 from fecontact.system.fields.vector_field import VectorField
 
@@ -32,98 +33,127 @@ from fecontact.system.fields.vector_field import VectorField
 # orbits ends. Single orbits solve the equations too: closer to them the corrector may find either,
 # so the end is located on the branch of single orbits.
 _CLOSE = 0.1
-# Mesh on which a motion is sampled before it is divided into segments.
-_INTERVALS, _DEGREE = 200, 4
-
-
-def attributes_of(problem: ShootingProblem) -> dict[str, Any]:
-    """Attributes of a branch, so that its points can be restored."""
-    names = problem.field
-    found = {"state_names": list(names.state_names), "parameter_names": list(names.parameters),
-             "parameter_values": problem.values, "scales": problem.scales,
-             "segments": len(problem.mesh) - 1, "periods": problem.periods, "rtol": problem.rtol}
-    if problem.derivative_rtol is not None:
-        found["derivative_rtol"] = problem.derivative_rtol
-    if problem.limits is not None:
-        found["limits"] = problem.limits
-    if (solver := solver_text(problem.solver)) is not None:
-        found["solver"] = solver
-    return found
 
 
 def _name(problem: ShootingProblem) -> str:
     return list(problem.field.parameters)[problem.free]
 
 
-def followed(
-    start: Start, method: Shooting, options: ContinuationOptions, limits: Array | None
-) -> Branch:
-    """Branch from a start by collocation, for orbits that reach stick on steep friction.
+class ByShooting(ShotPoints, Discretisation):
+    """Multiple shooting; set-valued orbits from event to event, where that is possible."""
 
-    ``limits`` (d,) are those of the growth of the scales, here and below.
-    """
-    problem, first, tangent = start_of(start, method, limits)
-    return continue_branch(problem, first, options, name=_name(problem), tangent=tangent,
-                           attributes=attributes_of(problem))
+    own_starts = frozenset({"period doubling"})
 
+    def suits(self, point: BranchPoint, method: Shooting) -> bool:
+        """Whether unknowns of a point are those of the options, but for their number."""
+        return method.segments == self.method_of(point).segments
 
-def start_of(
-    start: Start, method: Shooting, limits: Array | None
-) -> tuple[ShootingProblem, Array, Array]:
-    """Problem, unknowns and direction by shooting, from those by collocation."""
-    found, u, leaving = start
-    problem, first = shooting_from(found, u, method.segments, method.rtol, method.derivative_rtol,
-                                   method.solver)
-    problem = replace(problem, limits=limits)
-    shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
-    tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
-    return problem, first, tangent / np.sqrt(problem.weights() @ tangent**2)
+    def require_family(self, method: Shooting, field: VectorField) -> None:
+        """Raise InputError for a field or options without families."""
+        if not isinstance(field, ContactField):
+            raise InputError("orbit_family: shooting is for contact systems; take Collocation() or "
+                             "HarmonicBalance().")
 
+    def projected(
+        self, start: Begun, method: Shooting, limits: Array | None
+    ) -> tuple[ShootingProblem, Array, Array | None]:
+        """Problem, unknowns and direction of a start on a mesh."""
+        found, u, leaving = start
+        problem, first = shooting_from(found, u, method.segments, method.rtol,
+                                       method.derivative_rtol, method.solver)
+        problem = replace(problem, limits=limits)
+        if leaving is None:
+            return problem, first, None
+        shape = interpolate(found.mesh, found.nodes(leaving), problem.mesh[:-1])
+        tangent = np.concatenate([shape.reshape(-1), leaving[found.size :]])
+        return problem, first, tangent / np.sqrt(problem.weights() @ tangent**2)
 
-def from_motion(
-    field: VectorField, values: Array, free: int, motion: PeriodicMotion, method: Shooting,
-    options: ContinuationOptions, widths: Array, limits: Array | None, direction: float, both: bool,
-) -> Branch:
-    """Branch through the orbit to which a motion of a contact system has settled.
+    def followed(
+        self, start: Begun, method: Shooting, options: ContinuationOptions, limits: Array | None,
+        **how: Any,
+    ) -> Branch:
+        """Branch from a start on a mesh."""
+        problem, first, tangent = self.projected(start, method, limits)
+        return continue_branch(problem, first, options, name=_name(problem), tangent=tangent,
+                               attributes=problem.attributes(), **how)
 
-    Orbits of unknown period start where the motion is fastest, if it covers at least two periods.
-    ``widths`` (d + 1,) are the scales of states and parameter, ``limits`` (d,) those of their
-    growth.
+    def from_motion(self, start: MotionStart, request: Request, method: Shooting) -> Branch:
+        """Branch through the orbit to which a motion of a contact system has settled.
 
-    Raises
-    ------
-    AnalysisError
-        If Newton's method finds no orbit near the motion.
-    """
-    times, states = motion.times, motion.states
-    if (motion.period is not None and isinstance(field, ContactField)
-        and states.shape == (times.size, field.dimension)
-        and field.forcing_period(values) is None):
-        times, states = _to_fastest(times, states, widths[:-1], motion.period,
-                                    field.system().basis.modes)
-    found = from_samples(field, values, free, times, states, motion.period, _INTERVALS, _DEGREE,
-                         motion.periods, widths)
-    problem, u = shooting_from(*found, method.segments, method.rtol, method.derivative_rtol,
-                               method.solver)
-    problem = replace(problem, limits=limits)
-    branch, why = _from_event_to_event(problem, u, options, direction=direction, both=both)
-    if branch is not None:
-        return branch
-    stepping = _of_stepping(problem, values)
-    try:
-        branch = continue_branch(
-            problem, u, options, name=_name(problem), direction=direction, both=both,
-            attributes=attributes_of(problem))
-    except (AnalysisError, InputError) as error:
-        remedy = stepping or (f"run it longer until it has settled, or take more than "
-                              f"{method.segments} "
-                              f"segments.")
-        raise AnalysisError(f"No periodic orbit was found at {_name(problem)} = {values[free]:.6g} "
-                            f"near the motion: Newton's method does not converge; {remedy}"
-                            ) from error
-    if stepping and branch.status is BranchStatus.STALLED:
-        why = f"{stepping[0].upper()}{stepping[1:]}"
-    return _noted(why, branch)
+        Orbits of unknown period start where the motion is fastest, if it covers at least two
+        periods.
+
+        Raises
+        ------
+        AnalysisError
+            If Newton's method finds no orbit near the motion.
+        """
+        start = _to_fastest(start, request.field)
+        found, u = start.on_mesh(request.field, *self.mesh(method))
+        problem, u, _ = self.projected((found, u, None), method, start.limits)
+        how: dict[str, Any] = {"direction": request.direction, "both": request.both}
+        branch, why = _from_event_to_event(problem, u, request.options, **how)
+        if branch is not None:
+            return branch
+        stepping = _of_stepping(problem, start.values)
+        try:
+            branch = continue_branch(problem, u, request.options, name=_name(problem),
+                                     attributes=problem.attributes(), **how)
+        except (AnalysisError, InputError) as error:
+            remedy = stepping or (f"run it longer until it has settled, or take more than "
+                                  f"{method.segments} segments.")
+            raise AnalysisError(f"No periodic orbit was found at {_name(problem)} = "
+                                f"{start.values[start.free]:.6g} near the motion: Newton's method "
+                                f"does not converge; {remedy}") from error
+        if stepping and branch.status is BranchStatus.STALLED:
+            why = f"{stepping[0].upper()}{stepping[1:]}"
+        return _noted(why, branch)
+
+    def goes_on(self, point: BranchPoint, request: Request) -> Branch:
+        """Branch that continues from one of its own points."""
+        problem, u, tangent = restored_shooting(request.field, point)
+        limits = None if request.scales is not None else point.branch.attributes.get("limits")
+        problem = replace(rescaled(problem, request.scales, request.width), limits=limits)
+        if request.method is not None:
+            problem = replace(problem, rtol=request.method.rtol)
+        ahead = float(np.copysign(1.0, request.sign * tangent[-1]))
+        branch, why = _from_event_to_event(problem, u, request.options, direction=ahead,
+                                           both=request.both)
+        if branch is not None:
+            return branch
+        return _noted(why, continue_branch(
+            problem, u, request.options, name=_name(problem), tangent=request.sign * tangent,
+            both=request.both, attributes=problem.attributes()))
+
+    def beyond(self, point: BranchPoint, request: Request) -> Branch:
+        """The orbits of twice the period that begin at a period doubling found by shooting.
+
+        The method is by default that of the branch with twice the segments.
+
+        Raises
+        ------
+        InputError
+            If the number of segments differs.
+        """
+        problem, u, _ = restored_shooting(request.field, point)
+        problem, method = rescaled(problem, request.scales, request.width), request.method
+        if method is not None:
+            segments = 2 * (len(problem.mesh) - 1)
+            if method.segments != segments:
+                raise InputError(f"segments = {method.segments} must be {segments}, twice those of "
+                                 f"the branch, for the orbits of twice the period; or leave the "
+                                 f"method out.")
+            problem = replace(problem, rtol=method.rtol, derivative_rtol=method.derivative_rtol)
+        return doubled(problem, u, request)
+
+    def beyond_on_mesh(
+        self, point: BranchPoint, start: Start, request: Request, method: Shooting
+    ) -> Branch:
+        """The other orbits at a point whose orbit was put on a mesh."""
+        if point.kind != "period doubling":
+            return super().beyond_on_mesh(point, start, request, method)
+        half = replace(method, segments=max(method.segments // 2, 1))
+        return doubled(*self.projected(start, half, None)[:2], request)
 
 
 def _of_stepping(problem: ShootingProblem, values: Array) -> str:
@@ -177,7 +207,7 @@ def _from_event_to_event(
                            problem.solver)
     except AnalysisError as error:
         return None, f"The runs of the orbit were differenced: {error}"
-    whole = {**attributes_of(replace(problem, limits=None)), "scales": found[0].scales,
+    whole = {**replace(problem, limits=None).attributes(), "scales": found[0].scales,
              "segments": 1}
     try:
         return followed(*found, options, name=_name(problem), attributes=whole, **how), ""
@@ -192,69 +222,27 @@ def _noted(why: str, branch: Branch) -> Branch:
     return replace(branch, message=" ".join(filter(None, (why, branch.message))))
 
 
-def _to_fastest(
-    times: Array, states: Array, sizes: Array, period: float, modes: int
-) -> tuple[Array, Array]:
-    """Truncate the motion at its fastest point within the last period.
+def _to_fastest(start: MotionStart, field: VectorField) -> MotionStart:
+    """The start with its motion truncated at its fastest point within the last period.
 
     The phase is best defined there. Next to a transition between stick and slip the first guess
-    would be far from the orbit.
+    would be far from the orbit. Forced motions and those of unknown period stay as they are.
     """
-    last = np.flatnonzero(times > times[-1] - period)
-    if len(last) == 0 or times[last[0]] - times[0] < period:
-        return times, states
-    speeds = np.linalg.norm(states[last, modes : 2 * modes] / sizes[:modes], axis=1)
+    motion = start.motion
+    if (motion.period is None or not isinstance(field, ContactField)
+        or motion.states.shape != (motion.times.size, field.dimension)
+        or field.forcing_period(start.values) is not None):
+        return start
+    modes, times = field.system().basis.modes, motion.times
+    last = np.flatnonzero(times > times[-1] - motion.period)
+    if len(last) == 0 or times[last[0]] - times[0] < motion.period:
+        return start
+    speeds = np.linalg.norm(motion.states[last, modes : 2 * modes] / start.widths[:modes], axis=1)
     end = last[first_largest(speeds)] + 1
-    return times[:end], states[:end]
+    return replace(start, motion=replace(motion, times=times[:end], states=motion.states[:end]))
 
 
-def goes_on(
-    field: VectorField, point: BranchPoint, rtol: float | None, options: ContinuationOptions,
-    scales: ArrayLike | None, width: float | None, sign: float, both: bool,
-) -> Branch:
-    """Continue a branch from one of its points, or backwards if ``sign`` is -1."""
-    problem, u, tangent = restored_shooting(field, point)
-    limits = None if scales is not None else point.branch.attributes.get("limits")
-    problem = replace(rescaled(problem, scales, width), limits=limits)
-    if rtol is not None:
-        problem = replace(problem, rtol=rtol)
-    ahead = float(np.copysign(1.0, sign * tangent[-1]))
-    branch, why = _from_event_to_event(problem, u, options, direction=ahead, both=both)
-    if branch is not None:
-        return branch
-    return _noted(why, continue_branch(
-        problem, u, options, name=_name(problem), tangent=sign * tangent, both=both,
-        attributes=attributes_of(problem)))
-
-
-def beyond(
-    field: VectorField, point: BranchPoint, method: Shooting | None, options: ContinuationOptions,
-    scales: ArrayLike | None, width: float | None, direction: float,
-) -> Branch:
-    """The orbits of twice the period that begin at a period doubling found by shooting.
-
-    The method is by default that of the branch with twice the segments.
-
-    Raises
-    ------
-    InputError
-        If the number of segments differs.
-    """
-    problem, u, _ = restored_shooting(field, point)
-    problem = rescaled(problem, scales, width)
-    if method is not None:
-        segments = 2 * (len(problem.mesh) - 1)
-        if method.segments != segments:
-            raise InputError(f"segments = {method.segments} must be {segments}, twice those of the "
-                             f"branch, for the orbits of twice the period; or leave the method "
-                             f"out.")
-        problem = replace(problem, rtol=method.rtol, derivative_rtol=method.derivative_rtol)
-    return doubled(problem, u, options, direction)
-
-
-def doubled(
-    problem: ShootingProblem, u: Array, options: ContinuationOptions, direction: float
-) -> Branch:
+def doubled(problem: ShootingProblem, u: Array, request: Request) -> Branch:
     """The branch of orbits of twice the period that begins at a period doubling u.
 
     They leave along the eigenvector of the multiplier -1, transported along the orbit, with
@@ -262,13 +250,14 @@ def doubled(
     single orbit, the branch ends with a point 'period halving': beyond it lie the same orbits with
     their halves exchanged.
     """
+    options = request.options
     twice, start, tangent = _doubled(problem, u)
-    tangent = np.copysign(1.0, direction) * heading(tangent, twice.weights())
+    tangent = request.sign * heading(tangent, twice.weights())
     stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
     twice, start, tangent = twice.adapted(start + options.step * tangent, tangent)
     found = continue_branch(twice, start, replace(options, stop_at=[*stops, HALVING]),
                             name=_name(twice),
-                            tangent=tangent, attributes=attributes_of(twice))
+                            tangent=tangent, attributes=twice.attributes())
     return _ended(found, problem, options)
 
 
