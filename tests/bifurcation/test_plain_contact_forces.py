@@ -19,6 +19,7 @@ from fecontact.bifurcation import (
 )
 from fecontact.bifurcation.fields.contact_field import field_between
 from fecontact.bifurcation.harmonic.compiled.arrays import PLAIN
+from fecontact.bifurcation.harmonic.compiled.evaluation import condense_sampled, evaluate_sampled
 from fecontact.bifurcation.harmonic.compiled.step_batches import StepBatches
 from fecontact.bifurcation.harmonic.starts import problem_for, restored
 from fecontact.core.errors import InputError
@@ -69,6 +70,9 @@ def test_they_are_those_of_the_samples_one_by_one():
     rows = problem.linearise(u)
     kept = rows.residual, rows.condensed, *rows._samples()
     e.numbers[PLAIN] = 0.0
+    key, = problem.compiled.known
+    problem.compiled.known[key] = e._replace(evaluate=evaluate_sampled.address,
+                                             condense=condense_sampled.address)
     other = problem.linearise(u)
     for mine, theirs in zip(kept, (other.residual, other.condensed, *other._samples()),
                             strict=True):

@@ -18,6 +18,7 @@ from fecontact.bifurcation.harmonic.memory import (
 )
 from fecontact.bifurcation.harmonic.slip_path import Path, cut_pieces, moved_at
 from fecontact.bifurcation.harmonic.stick_and_slip import follow_along
+from fecontact.core.addresses import function_at
 from fecontact.core.compiled import kernel, routine
 from fecontact.core.records import Block, IntegerVector, Matrix, Vector
 from fecontact.system.elastic_sliders import limit_of
@@ -176,8 +177,11 @@ def _along_two_tangents(j, X, T, s, count, offsets, values, derivatives, r, z, r
     return done, timed
 
 
-@routine
-def element_forces(X, T, s, laws, elements, offsets, values, derivatives, r, z, rows):
+@kernel(by_address=True)
+def element_forces(
+    X: Matrix, T: float, s: SystemArrays, laws: SystemArrays, elements: IntegerVector,
+    offsets: Vector, values: Matrix, derivatives: bool, r: Matrix, z: Matrix, rows: Block,
+) -> int:
     """Fill r (t n, N) with the friction of the elements of n nodes along their t tangents.
 
     X (L, m) are coefficients of the displacements, T the period [s], s the system without elements
@@ -207,6 +211,9 @@ def element_forces(X, T, s, laws, elements, offsets, values, derivatives, r, z, 
                 r[first : first + 2], z[:, at : at + states], own)
         done, by_period = min(done, found), by_period or timed
     return 2 * done if by_period else done
+
+
+element_forces_at = function_at(element_forces)
 
 
 @kernel

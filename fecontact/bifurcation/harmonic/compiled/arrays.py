@@ -84,7 +84,9 @@ class Equations(NamedTuple):
     times it was relied on; and whether contact forces may have kinks; and what
     :func:`fecontact.bifurcation.harmonic.elements.element_forces` returned last. ``limits`` (m,)
     bound the scales of the displacements; ``nodes`` have internal variables. ``kept`` are the rows
-    of the coefficients (2 H + 1, m) that are unknown, the others are zero.
+    of the coefficients (2 H + 1, m) that are unknown, the others are zero. Last are addresses of
+    the functions of :mod:`fecontact.bifurcation.harmonic.compiled.evaluation` that evaluate and
+    condense these equations, and of that of elements, zero without any.
     """
 
     contact: SystemArrays
@@ -111,6 +113,9 @@ class Equations(NamedTuple):
     nodes: int
     kept: IntegerVector
     workspace: Workspace
+    evaluate: int
+    condense: int
+    element_forces: int
 
 
 (TURN, PERIOD, LOW, HIGH, STEADY, PLAIN, FIRST_BOUND, LAST_BOUND, TOLERANCE, LARGEST_STEP,

@@ -9,7 +9,14 @@ import numpy as np
 from fecontact.bifurcation.fields.contact_field import ContactField, affine_arrays
 from fecontact.bifurcation.fields.corners import AffineArrays
 from fecontact.bifurcation.harmonic.compiled import arrays
+from fecontact.bifurcation.harmonic.compiled.evaluation import (
+    condense_plain,
+    condense_sampled,
+    evaluate_plain,
+    evaluate_sampled,
+)
 from fecontact.bifurcation.harmonic.compiled.loads import forces_at_rest
+from fecontact.bifurcation.harmonic.elements import element_forces
 from fecontact.core.types import Array
 from fecontact.laws.normal.bilateral import BilateralPolynomial
 from fecontact.system.contact_system import needs_friction
@@ -121,6 +128,7 @@ class CompiledBalance:
             numbers[arrays.PLAIN] = (numbers[arrays.STEADY] and problem.size <= MOST_UNKNOWNS
                                      and (kept.exact or not layout.memory)
                                      and self._plain(near))
+        plain = numbers[arrays.PLAIN] != 0.0
         marched = slice(0, 0 if kept.exact else None)
         elements = kept.elements if kept.exact else kept.elements[:0]
         return arrays.Equations(
@@ -129,7 +137,10 @@ class CompiledBalance:
             series.sines, body, given,
             series.projection @ given, kept.rows[marched], kept.offsets[marched],
             kept.blocks, elements, kept.offsets, contact, problem.onsets,
-            np.full(m, np.inf), numbers, layout.nodes, problem.rows_kept, workspace)
+            np.full(m, np.inf), numbers, layout.nodes, problem.rows_kept, workspace,
+            (evaluate_plain if plain else evaluate_sampled).address,
+            (condense_plain if plain else condense_sampled).address,
+            element_forces.address if len(elements) else 0)
 
     def _without_contact(
         self, problem: Any, near: AffineArrays

@@ -8,17 +8,26 @@ import math
 
 import numpy as np
 
-from fecontact.bifurcation.harmonic.compiled.arrays import PERIOD, PLAIN, STEADY, TIMED, TURN
+from fecontact.bifurcation.harmonic.compiled.arrays import (
+    PERIOD,
+    PLAIN,
+    STEADY,
+    TIMED,
+    TURN,
+    Equations,
+)
 from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks
 from fecontact.bifurcation.harmonic.compiled.memoryless_forces import (
     combine,
     memoryless_forces,
     project,
 )
-from fecontact.bifurcation.harmonic.elements import element_forces
+from fecontact.bifurcation.harmonic.elements import element_forces_at
 from fecontact.bifurcation.harmonic.memory import LEAK, march, solve_around
 from fecontact.bifurcation.harmonic.series import fill_blocks
-from fecontact.core.compiled import helper, routine
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import helper, kernel
+from fecontact.core.records import Vector
 from fecontact.system.jacobian import batch_derivatives, batch_rates
 
 # Relative steps of one-sided and of central differences in the parameter.
@@ -131,8 +140,9 @@ def balance(u, T, loads, e, out):
 def _follow(u, T, derivatives, e, friction, z):
     """Fill friction (t n, N) of elements along their tangents; 0 if they do not repeat."""
     m, L = e.springs.shape[1], e.values.shape[1]
-    return element_forces(u[: L * m].reshape((L, m)), T, e.contact, e.whole, e.elements,
-                          e.kept_offsets, e.values, derivatives, friction, z, e.workspace.by_node)
+    return element_forces_at(e.element_forces)(
+        u[: L * m].reshape((L, m)), T, e.contact, e.whole, e.elements, e.kept_offsets, e.values,
+        derivatives, friction, z, e.workspace.by_node)
 
 
 @helper
@@ -160,22 +170,27 @@ def _friction_at(u, T, derivatives, e):
     return e.numbers[TIMED]
 
 
-@routine
-def evaluate_at(u, derivatives, e):
+@kernel(by_address=True)
+def evaluate_plain(u: Vector, derivatives: bool, e: Equations) -> float:
     """Residual at u, with derivatives at the samples if asked for; returns the period.
 
-    Zero where internal variables do not come to repeat.
+    Of plain contact forces. Zero where elements do not come to repeat.
     """
+    T = take_parameter(u[len(u) - 1], e)
+    take_motion(u, T, e)
+    memoryless_forces(derivatives, T / len(e.tau), e)
+    if len(e.elements) > 0 and _friction_at(u, T, derivatives, e) == 0.0:
+        return 0.0
+    balance(u, T, 1.0, e, e.workspace.residual)
+    return T
+
+
+@kernel(by_address=True)
+def evaluate_sampled(u: Vector, derivatives: bool, e: Equations) -> float:
+    """As :func:`evaluate_plain`, of any contact forces, also with internal variables."""
     workspace = e.workspace
     m, c = e.springs.shape[1], len(e.offsets)
     T = take_parameter(u[len(u) - 1], e)
-    if e.numbers[PLAIN] != 0.0:
-        take_motion(u, T, e)
-        memoryless_forces(derivatives, T / len(e.tau), e)
-        if len(e.elements) > 0 and _friction_at(u, T, derivatives, e) == 0.0:
-            return 0.0
-        balance(u, T, 1.0, e, workspace.residual)
-        return T
     take_states(u, T, e, workspace.x)
     if c > 0:
         _take_differences(T, e)
@@ -201,6 +216,9 @@ def evaluate_at(u, derivatives, e):
     take_pushes(workspace.f, e)
     balance(u, T, 1.0, e, workspace.residual)
     return T
+
+
+evaluation_at = function_at(evaluate_plain)
 
 
 @helper
@@ -458,15 +476,41 @@ def _add_by_elements(u, T, central, e):
                 workspace.column[q * m + i] += rows[j, tangent, i] * force_harmonics[q]
 
 
-@routine
-def condense(u, T, central, e):
-    """Fill ``condensed`` and ``column``, the derivatives of the residual evaluated at u."""
+@helper
+def _take_condensed(e):
+    """Fill ``condensed`` with ``square`` and ``column``."""
+    workspace = e.workspace
+    s, m, L = workspace.coupled[0], e.springs.shape[1], e.values.shape[1]
+    k = L * s
+    condensed = workspace.condensed[: k * (k + 1)].reshape((k, k + 1))
+    square = workspace.square[: k * k].reshape((k, k))
+    for q in range(L):
+        for place in range(s):
+            i = q * s + place
+            for j in range(k):
+                condensed[i, j] = square[i, j]
+            condensed[i, k] = workspace.column[q * m + workspace.order[place]]
+
+
+@kernel(by_address=True)
+def condense_plain(u: Vector, T: float, central: bool, e: Equations) -> None:
+    """Fill ``condensed`` and ``column``, the derivatives of the residual evaluated at u.
+
+    Of plain contact forces.
+    """
+    _harmonics_of_derivatives(T, e.workspace.coupled[0], e)
+    _by_parameter(u, T, e)
+    if len(e.elements) > 0:
+        _add_by_elements(u, T, central, e)
+    _take_condensed(e)
+
+
+@kernel(by_address=True)
+def condense_sampled(u: Vector, T: float, central: bool, e: Equations) -> None:
+    """As :func:`condense_plain`, of any contact forces, also with internal variables."""
     workspace = e.workspace
     c, s = len(e.offsets), workspace.coupled[0]
-    m, L = e.springs.shape[1], e.values.shape[1]
-    k = L * s
-    if e.numbers[PLAIN] == 0.0:
-        _take_rows(s, e)
+    _take_rows(s, e)
     _harmonics_of_derivatives(T, s, e)
     if c > 0:
         batch_derivatives(workspace.t, workspace.y, e.contact, e.contact, 0.0, workspace.f_marched,
@@ -479,14 +523,10 @@ def condense(u, T, central, e):
         _add_memory(T, e)
     elif len(e.elements) > 0:
         _add_by_elements(u, T, central, e)
-    condensed = workspace.condensed[: k * (k + 1)].reshape((k, k + 1))
-    square = workspace.square[: k * k].reshape((k, k))
-    for q in range(L):
-        for place in range(s):
-            i = q * s + place
-            for j in range(k):
-                condensed[i, j] = square[i, j]
-            condensed[i, k] = workspace.column[q * m + workspace.order[place]]
+    _take_condensed(e)
+
+
+condensation_at = function_at(condense_plain)
 
 
 @helper

@@ -12,7 +12,7 @@ from fecontact.bifurcation.harmonic.compiled.arrays import (
     TOLERANCE,
     TRUSTED,
 )
-from fecontact.bifurcation.harmonic.compiled.evaluation import condense, evaluate_at
+from fecontact.bifurcation.harmonic.compiled.evaluation import condensation_at, evaluation_at
 from fecontact.bifurcation.harmonic.compiled.linear_systems import (
     PRECISE,
     choose_coupled,
@@ -92,14 +92,14 @@ def newton(u, guess, row, weights, e):
     scale = 1.0 + length(weights, guess)
     before, made, fresh, made_at = np.inf, 0, True, 0.0
     for count in range(1, _STEPS + 1):
-        T = evaluate_at(u, fresh, e)
+        T = evaluation_at(e.evaluate)(u, fresh, e)
         if not T > 0.0:
             return 0
         _right_side(u, guess, row, e, change)
         if fresh:
             if len(workspace.condensed) < n * (n + 1) and choose_coupled(T, e) == 0:
                 return -1
-            condense(u, T, False, e)
+            condensation_at(e.condense)(u, T, False, e)
             factorise_with(row, T, e)
             made, made_at = made + 1, T
             if _take_along(row, weights, T, _TANGENT, e) == 0:
@@ -132,10 +132,10 @@ def linearised(u, row, weights, e):
     """Fill ``along`` with the derivatives at u; 0 if that fails, else 1."""
     workspace = e.workspace
     n = len(workspace.residual)
-    T = evaluate_at(u, True, e)
+    T = evaluation_at(e.evaluate)(u, True, e)
     if not T > 0.0 or (len(workspace.condensed) < n * (n + 1) and choose_coupled(T, e) == 0):
         return 0
-    condense(u, T, True, e)
+    condensation_at(e.condense)(u, T, True, e)
     factorise_with(row, T, e)
     return _take_along(row, weights, T, PRECISE, e)
 
@@ -196,7 +196,7 @@ def damped_newton(u, row, weights, tolerance, e):
             for k in range(n + 1):
                 trial[k] = u[k] + factor * change[k]
             found = np.inf
-            if evaluate_at(trial, False, e) > 0.0:
+            if evaluation_at(e.evaluate)(trial, False, e) > 0.0:
                 found = math.sqrt(inner(workspace.residual, workspace.residual))
             if found < (1.0 - 0.1 * factor) * norm or (small and found < np.inf):
                 break

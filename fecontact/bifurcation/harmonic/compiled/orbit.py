@@ -2,8 +2,8 @@
 
 from fecontact.bifurcation.harmonic.compiled.arrays import STEADY, TOLERANCE, Equations
 from fecontact.bifurcation.harmonic.compiled.evaluation import (
-    condense,
-    evaluate_at,
+    condensation_at,
+    evaluation_at,
     take_forces,
     take_mean,
 )
@@ -42,10 +42,10 @@ def evaluate(
             x[k] = e.workspace.along[k]
         take_mean(e, mean)
         if e.numbers[STEADY] == 0.0:
-            evaluate_at(u, False, e)
+            evaluation_at(e.evaluate)(u, False, e)
         take_forces(u[len(u) - 1], e, forces)
         return 1
-    T = evaluate_at(u, wanted != RESIDUAL, e)
+    T = evaluation_at(e.evaluate)(u, wanted != RESIDUAL, e)
     if not T > 0.0:
         return 0
     if wanted == SOLUTION and choose_coupled(T, e) == 0:
@@ -53,7 +53,7 @@ def evaluate(
     take_forces(u[len(u) - 1], e, forces)
     if wanted != RESIDUAL:
         take_mean(e, mean)
-        condense(u, T, True, e)
+        condensation_at(e.condense)(u, T, True, e)
     if wanted == SOLUTION:
         factorise_with(row, T, e)
         return solve_with(row, weights, T, PRECISE, e, x)
