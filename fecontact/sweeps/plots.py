@@ -11,8 +11,8 @@ from fecontact.core.errors import InputError, choices, require_choice
 from fecontact.core.types import Array
 from fecontact.output.diagrams.colours import COLOURS, distinct_colours
 from fecontact.output.diagrams.diagram import Curve, Diagram
-from fecontact.output.diagrams.labels import in_unit
-from fecontact.output.plots.drawing import draw, name_axis
+from fecontact.output.diagrams.maps import Map, Scale, borders
+from fecontact.output.plots.drawing import colour_bar, draw, name_axis
 from fecontact.output.plots.figure import new_figure
 from fecontact.study.study import Study
 from fecontact.sweeps.statistics import SobolIndices
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 _FAILED = "#c8c4bc"
 _LEAST_OF_MAP = 3  # values of each parameter
 _LEAST_OF_DOTS = 200  # cases up to which ascending ones are joined by a line
+_AXES: tuple[Literal["x", "y"], ...] = ("x", "y")
 _MOST_TICKS, _SHORT = 8, 4  # named cells along an axis of a map, and digits of their values
-_COLOUR_MAP = "viridis"
 
 
 def plot_sweep(
@@ -161,8 +161,6 @@ def _map(
     table: SweepTable, name: str, first: str, second: str, path: str | Path | None
 ) -> "Figure":
     """Map of a summary over two parameters of a grid; failed cases are grey."""
-    from matplotlib import colormaps
-
     if table.shape is None:
         raise InputError("A map needs a sweep over a grid.")
     keys = list(table.parameters)
@@ -176,22 +174,16 @@ def _map(
     values = values[np.ix_(*order)]
     with new_figure(7.0, 5.2, path) as figure:
         axes = figure.subplots()
-        axes.grid(False)
-        axes.set_facecolor(_FAILED)
         known = values[np.isfinite(values)]
-        factor, label = in_unit(_label(name), known)
         logs = [_is_geometric(points) for points in (x, y)]
-        drawn = axes.pcolormesh(_edges(x, logs[0]), _edges(y, logs[1]),
-                                np.ma.masked_invalid(values / factor),
-                                cmap=colormaps[_COLOUR_MAP], rasterized=True)
-        for which, log in zip("xy", logs, strict=True):
+        shown = Map(borders(x, logs[0]), borders(y, logs[1]),
+                    np.where(np.isfinite(values), values, np.nan), Scale(_label(name)), _FAILED)
+        image = draw(axes, Diagram(table.label(first), table.label(second), maps=(shown,)))[0]
+        for which, label, points, log in zip(_AXES, (first, second), (x, y), logs, strict=True):
             if log:
                 _logarithmic(axes, which)
-        bar = figure.colorbar(drawn, ax=axes, pad=0.02)
-        bar.set_label(label)
-        bar.outline.set_visible(False)
-        name_axis(axes, "x", table.label(first), x)
-        name_axis(axes, "y", table.label(second), y)
+                name_axis(axes, which, table.label(label), points)
+        colour_bar(image, shown, axes)
         for axis, points, log in zip((axes.xaxis, axes.yaxis), (x, y), logs, strict=True):
             # Of few cells each is named, if the numbers are short.
             if not log and len(points) <= _MOST_TICKS and all(
@@ -336,12 +328,3 @@ def _is_geometric(points: Array) -> bool:
         return False
     steps, ratios = np.diff(points), points[1:] / points[:-1]
     return bool(np.ptp(steps) > 1e-6 * steps.max() and np.ptp(ratios) < 1e-6 * ratios.max())
-
-
-def _edges(points: Array, log: bool) -> Array:
-    """Edges of the cells around points."""
-    p = np.log(points) if log else points
-    middle = 0.5 * (p[1:] + p[:-1])
-    edges = np.concatenate([[2.0 * p[0] - middle[0]], middle, [2.0 * p[-1] - middle[-1]]])
-    return np.asarray(np.exp(edges) if log else edges)
-

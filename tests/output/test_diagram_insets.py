@@ -95,7 +95,7 @@ def test_maps_of_basins(tmp_path):
         Attractor("equilibrium", np.array([[0.2, 0.3]]), 1.0 / 3.0)))
     axis = plot_basins(found, x_label="x [m]", y_label="v [m/s]", rows=np.eye(2)).axes[0]
     drawn = axis.collections[0].get_array()
-    assert np.array_equal(np.asarray(drawn).reshape(3, 2), label.T)
+    assert np.array_equal(np.asarray(drawn).reshape(3, 2), label.T + 1)
     assert [text.get_text() for text in axis.get_legend().get_texts()] == [
         "periodic, 2 points, 50 %", "equilibrium, 33.3 %", "no end, 16.7 %", "its section"]
     assert axis.lines[0].get_xdata().tolist() == [0.5, 0.6]

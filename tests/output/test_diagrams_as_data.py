@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
 
 from fecontact.output.diagrams.diagram import Band, Curve, Diagram, Level, Mark
 from fecontact.output.diagrams.labels import in_unit
-from fecontact.output.plots.drawing import draw, legend_entries
+from fecontact.output.diagrams.maps import Map, Scale, borders
+from fecontact.output.plots.drawing import colour_bar, draw, legend_entries
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.report.charts import diagram_table
 from fecontact.output.report.payload import Payload, stored_array, unpacked
@@ -133,3 +136,50 @@ def test_dashed_lines_say_nothing_of_stability():
     whole, thin = header["one"]["lines"]
     assert "solid" not in whole
     assert not stored_array(thin["solid"], contents).any()
+
+
+def test_borders_lie_half_way_between_points():
+    assert borders(np.array([1.0, 2.0, 4.0])).tolist() == [0.5, 1.5, 3.0, 5.0]
+    assert borders(np.array([1.0, 100.0]), logarithmic=True) == pytest.approx([0.1, 10.0, 1000.0])
+    assert borders(np.array([4.0])).tolist() == [2.0, 6.0]
+
+
+@pytest.mark.parametrize("logarithmic", [False, True])
+def test_maps_have_their_colours_blanks_and_a_bar_in_a_suitable_unit(logarithmic):
+    values = np.array([[1e3, 2e4, np.nan], [5e4, 7e3, 1e5]])
+    one = Map(np.array([0.0, 1e-3, 2e-3, 4e-3]), np.array([0.0, 1.0, 3.0]), values,
+              Scale("pressure [Pa]", "inferno", logarithmic=logarithmic), "#123456")
+    diagram = Diagram("gap [m]", "speed [m/s]", maps=(one,), y_limits=(0.0, 3.0))
+    with new_figure(6.0, 4.0) as figure:
+        axes = figure.subplots()
+        (image,) = draw(axes, diagram)
+        colour_bar(image, one, axes)
+        figure.draw_without_rendering()
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("gap [mm]", "speed [m/s]")
+    assert axes.get_xlim() == (0.0, 4e-3)
+    (bar,) = [other for other in figure.axes if other is not axes]
+    assert bar.get_ylabel() == "pressure [kPa]"
+    shown = {text.get_text() for text in bar.get_yticklabels()}
+    assert {"20", "40", "100"} <= shown if not logarithmic else {"1", "10", "100"} <= shown
+    # Colours of cells are those of the part of the range that their values take, by hand.
+    part = [(np.log(v) - np.log(1e3)) / np.log(100.0) if logarithmic else (v - 1e3) / 99e3
+            for v in values.ravel()]
+    faces = image.to_rgba(image.get_array()).reshape(6, 4)
+    for colour, at in zip(faces, part, strict=True):
+        if np.isfinite(at):
+            assert colour[:3] == pytest.approx(colormaps["inferno"](at)[:3], abs=0.01)
+        else:
+            assert colour[3] == 0.0
+    assert to_hex(axes.get_facecolor()) == "#123456"
+
+
+def test_maps_of_names_have_one_colour_each():
+    one = Map(np.arange(4.0), np.arange(2.0), np.array([[0.0, 1.0, np.nan]]), Scale(
+        "state", ("#ff0000", "#00ff00"), ("open", "stick")))
+    with new_figure(6.0, 4.0) as figure:
+        axes = figure.subplots()
+        (image,) = draw(axes, Diagram("x", "y", maps=(one,)))
+        colour_bar(image, one, axes)
+    assert [to_hex(colour) for colour in image.to_rgba(image.get_array())[0, :2]] == [
+        "#ff0000", "#00ff00"]
+    assert [text.get_text() for text in figure.axes[1].get_yticklabels()] == ["open", "stick"]

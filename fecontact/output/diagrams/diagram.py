@@ -1,4 +1,4 @@
-"""Diagrams as data: curves, marks, bands and levels over two axes, for pictures and pages alike."""
+"""Diagrams as data: curves, maps, marks, bands and levels over two axes, for pictures and pages."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.types import Array
 from fecontact.output.diagrams.labels import in_unit
+from fecontact.output.diagrams.maps import Map
 
 WIDTH = 1.2  # of lines [points]
 _FLAT = 1e-9  # range of values, as a part of their largest, below which it is round-off
@@ -96,7 +97,7 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class Diagram:
-    """Curves over common axes, with all values in SI units.
+    """Curves and maps over common axes, with all values in SI units.
 
     Attributes
     ----------
@@ -104,7 +105,8 @@ class Diagram:
         With the SI unit, such as ``velocity x [m/s]``; pictures and pages show a unit that suits
         the values.
     curves : tuple of Curve
-    marks, bands, levels : tuples of Mark, Band, Level
+    marks, bands, levels, maps : tuples of Mark, Band, Level, Map
+        Maps lie behind curves, the first behind the others.
     title : str
     heading : str
         What the names of the curves are values of.
@@ -116,10 +118,11 @@ class Diagram:
 
     x_label: str
     y_label: str
-    curves: tuple[Curve, ...]
+    curves: tuple[Curve, ...] = ()
     marks: tuple[Mark, ...] = ()
     bands: tuple[Band, ...] = ()
     levels: tuple[Level, ...] = ()
+    maps: tuple[Map, ...] = ()
     title: str = ""
     heading: str = ""
     logarithmic: str = ""
@@ -127,8 +130,8 @@ class Diagram:
     y_limits: tuple[float | None, float | None] = (None, None)
 
     def values(self, axis: Literal["x", "y"]) -> Array:
-        """All finite values of the curves along an axis."""
-        found = [getattr(curve, axis) for curve in self.curves]
+        """All finite values of the curves and borders of the maps along an axis."""
+        found = [getattr(one, axis) for one in (*self.curves, *self.maps)]
         joined = np.concatenate([np.ravel(one) for one in found]) if found else np.zeros(0)
         return joined[np.isfinite(joined)]
 
@@ -152,7 +155,7 @@ class Diagram:
         """Range of y about curves that differ by round-off alone; None if they differ by more."""
         values = self.values("y")
         leveled = any(level.axis == "y" for level in self.levels)
-        if leveled or not len(values) or np.ptp(values) >= _FLAT * self.largest:
+        if leveled or self.maps or not len(values) or np.ptp(values) >= _FLAT * self.largest:
             return None
         return float(values.min()) - 0.05 * self.largest, float(values.max()) + 0.05 * self.largest
 

@@ -23,13 +23,14 @@ from fecontact.analysis.spectra import (
 from fecontact.core.checks import as_several, require_kind
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.types import Array
-from fecontact.core.units import count, listed, suitable_unit
+from fecontact.core.units import count, listed
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.diagrams.colours import COLOURS, distinct_colours
 from fecontact.output.diagrams.diagram import WIDTH, Curve, Diagram
+from fecontact.output.diagrams.maps import spectrogram_map
 from fecontact.output.diagrams.runs import phase_diagram
 from fecontact.output.diagrams.spectra import beyond_band, end_of_content, spectrum_diagram
-from fecontact.output.plots.drawing import draw
+from fecontact.output.plots.drawing import colour_bar, draw
 from fecontact.output.plots.face_panels import abscissa_unit, face_panels, scale_row
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.run import direction_row
@@ -140,8 +141,6 @@ def plot_spectrogram(
     InputError
         As in :func:`plot_spectrum`.
     """
-    from matplotlib.colors import LogNorm
-
     require_kind("plot_spectrogram", Trajectory, trajectory=trajectory)
     if highest_hz is not None:
         require_positive("plot_spectrogram", highest_hz=highest_hz)
@@ -160,17 +159,10 @@ def plot_spectrogram(
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.2))
         draw(upper, above)
         upper.set_xlabel("")
-        factor, symbol = suitable_unit(float(found.values.max()), shown.unit)
-        top = float(found.values.max()) / factor or 1.0
-        image = lower.pcolormesh(
-            found.time, found.frequency_hz, np.maximum(found.values / factor, 1e-300),
-            norm=LogNorm(top * 1e-4, top), cmap="viridis", shading="nearest", rasterized=True)
-        figure.colorbar(image, ax=lower, label=f"amplitude [{symbol}]", pad=0.01)
-        spread = found.values.max(axis=1)
-        lower.set_xlim(ends)
-        lower.set_ylim(0.0, highest_hz or end_of_content(found.frequency_hz, spread))
-        lower.set(xlabel=above.x_unit[1], ylabel="frequency [Hz]")
-        lower.grid(False)
+        below = Diagram("time [s]", "frequency [Hz]", maps=(spectrogram_map(found, shown.unit),),
+                        x_limits=ends, y_limits=(0.0, highest_hz or end_of_content(
+                            found.frequency_hz, found.values.max(axis=1))))
+        colour_bar(draw(lower, below)[0], below.maps[0], lower)
     return figure
 
 

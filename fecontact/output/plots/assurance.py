@@ -7,6 +7,9 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.measured.assurance import ModePairs
+from fecontact.output.diagrams.diagram import Diagram
+from fecontact.output.diagrams.maps import Map, Scale
+from fecontact.output.plots.drawing import colour_bar, draw
 from fecontact.output.plots.figure import new_figure
 
 if TYPE_CHECKING:
@@ -34,9 +37,9 @@ def plot_modal_assurance(pairs: ModePairs, *, path: str | Path | None = None) ->
     rows, columns = pairs.assurance.shape
     with new_figure(2.6 + 0.55 * min(columns, 20), 2.0 + 0.45 * min(rows, 20), path) as figure:
         axis = figure.subplots()
-        image = axis.imshow(pairs.assurance, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto",
-                            origin="lower")
-        axis.grid(False)
+        shown = Map(np.arange(columns + 1) - 0.5, np.arange(rows + 1) - 0.5, pairs.assurance,
+                    Scale("modal assurance", "Blues", low=0.0, high=1.0))
+        (image,) = draw(axis, Diagram("model [Hz]", "test [Hz]", maps=(shown,)))
         for row, column in zip(pairs.tested, pairs.computed, strict=True):
             axis.plot(column + np.array([-0.5, 0.5, 0.5, -0.5, -0.5]),
                       row + np.array([-0.5, -0.5, 0.5, 0.5, -0.5]), color="#d55e00", linewidth=1.6)
@@ -48,6 +51,5 @@ def plot_modal_assurance(pairs: ModePairs, *, path: str | Path | None = None) ->
         axis.set_xticks(range(columns), [f"{f:.4g}" for f in pairs.computed_frequencies],
                         rotation=60.0 if columns > 8 else 0.0)
         axis.set_yticks(range(rows), [f"{f:.4g}" for f in pairs.tested_frequencies])
-        axis.set(xlabel="model [Hz]", ylabel="test [Hz]")
-        figure.colorbar(image, ax=axis, label="modal assurance")
+        colour_bar(image, shown, axis)
     return figure

@@ -11,17 +11,18 @@ from fecontact.analysis.resolved import resolved
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
-from fecontact.core.units import suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.wear import WearLaw
 from fecontact.output.diagrams.colours import STATE_COLOURS
+from fecontact.output.diagrams.diagram import Diagram
+from fecontact.output.diagrams.maps import Map, Scale
+from fecontact.output.plots.drawing import colour_bar, draw
 from fecontact.output.plots.face_panels import similar
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.style import add_note, state_names
 from fecontact.reduction.assembly.contact_faces import ContactFace, shown_faces
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _COLOURS = {"open": "#e3e0da", **STATE_COLOURS}
@@ -88,44 +89,35 @@ def plot_contact_map(
         columns = np.linspace(trajectory.time[0], trajectory.time[-1], _COLUMNS + 1)[:-1]
         starts = np.unique(np.searchsorted(trajectory.time, columns))
         edges = _time_edges(trajectory.time, starts)
-        time_unit, symbol = suitable_unit(float(np.abs(edges).max()), "s")
         rows = [_face_rows(face) for face in faces]
 
-        name, unit, load = ("line load", "N/m", trajectory.line_load) if (
-            basis.thickness is None) else ("contact pressure", "Pa", trajectory.pressure)
+        label, load = ("line load [N/m]", trajectory.line_load) if (
+            basis.thickness is None) else ("contact pressure [Pa]", trajectory.pressure)
         highest = np.maximum.reduceat(load, starts, axis=0)
         limits = [float(highest[:, face.nodes].max()) for face in faces]
         common = similar(limits)
-        for number, (face, row) in enumerate(zip(faces, rows, strict=True)):
-            limit = max(limits) if common else limits[number]
-            factor, load_symbol = suitable_unit(limit, unit)
-            image = grid[number, 0].pcolormesh(
-                edges / time_unit, row.edges, _masked(highest[:, face.nodes] / factor, row.nodes),
-                cmap="viridis", vmin=0.0, vmax=limit / factor or 1.0)
-            if not common or number == 0:
-                figure.colorbar(image, ax=grid[:, 0].tolist() if common else grid[number, 0],
-                                label=f"{name} [{load_symbol}]", pad=0.01)
-
         states, spans = state_names(trajectory), _spans(trajectory.time)
+        of_states = Scale("state", tuple(_COLOURS[name] for name in states), states)
         for number, (face, row) in enumerate(zip(faces, rows, strict=True)):
+            top = max(limits) if common else limits[number]
             shown = _frequent_states(trajectory.contact_state[:, face.nodes], len(states), spans,
                                      starts)
-            image = _draw_states(grid[number, 1], edges / time_unit, row, shown, states)
-        bar = figure.colorbar(image, ax=grid[:, 1].tolist(), label="state", pad=0.01,
-                              ticks=range(len(states)))
-        bar.ax.set_yticklabels(states)
-        bar.ax.tick_params(length=0)
-        figure.align_ylabels(grid.reshape(-1) if single else grid[:, 0])
-        for axis in grid[-1] if not single else grid[-1, 1:]:
-            axis.set_xlabel(f"time [{symbol}]")
-        for face, row, axes in zip(faces, rows, grid, strict=True):
-            for axis in axes:
-                axis.grid(False)
-                if single or axis is axes[0]:
-                    axis.set_ylabel(row.label)
-                    axis.set_title(face.title, loc="left")
+            maps = (Map(edges, row.edges, row.of_nodes(highest[:, face.nodes]),
+                        Scale(label, low=0.0, high=top or 1.0)),
+                    Map(edges, row.edges, row.of_nodes(shown), of_states))
+            for column, one in enumerate(maps):
+                axis = grid[number, column]
+                (image,) = draw(axis, Diagram("time [s]", row.label, maps=(one,)))
+                shared = column == 1 or common
+                if not shared or number == 0:
+                    colour_bar(image, one, grid[:, column].tolist() if shared else axis)
                 if len(row.edges) == 2:
                     axis.set_yticks([0.5 * (row.edges[0] + row.edges[1])], ["0"])
+                if single or column == 0:
+                    axis.set_title(face.title, loc="left")
+        for axis in grid.ravel():
+            axis.label_outer()
+        figure.align_ylabels(grid.reshape(-1) if single else grid[:, 0])
     return figure
 
 
@@ -135,6 +127,10 @@ class _FaceRows(NamedTuple):
     edges: Array
     nodes: NDArray[np.intp]
     label: str
+
+    def of_nodes(self, values: NDArray[Any]) -> Array:
+        """Values (k, T) of the rows from those of the nodes (T, n)."""
+        return np.where(self.nodes[:, None] < 0, np.nan, values.T[self.nodes])
 
 
 def _frequent_states(
@@ -147,16 +143,6 @@ def _frequent_states(
     # A column of several times shows contact if any of them has it, as the pressure does.
     counts[0] *= counts[1:].sum(axis=0) == 0
     return np.asarray(counts.argmax(axis=0))
-
-
-def _draw_states(
-    axis: "Axes", edges: Array, row: _FaceRows, shown: NDArray[np.intp], names: Sequence[str]
-) -> Any:
-    from matplotlib.colors import BoundaryNorm, ListedColormap
-
-    return axis.pcolormesh(edges, row.edges, _masked(shown, row.nodes),
-                           cmap=ListedColormap([_COLOURS[name] for name in names]),
-                           norm=BoundaryNorm(np.arange(len(names) + 1) - 0.5, len(names)))
 
 
 def _spans(time: Array) -> Array:
@@ -190,8 +176,7 @@ def _face_rows(face: ContactFace) -> _FaceRows:
         return _FaceRows(np.arange(n + 1, dtype=np.float64) - 0.5, np.arange(n), "contact node")
     apart = np.flatnonzero(low[1:] > high[:-1] + tiny) + 1
     edges = np.insert(np.append(low, high[-1]), apart, high[apart - 1])
-    factor, symbol = suitable_unit(float(np.ptp(edges)), "m")
-    return _FaceRows(edges / factor, np.insert(order, apart, -1), f"{face.label} [{symbol}]")
+    return _FaceRows(edges, np.insert(order, apart, -1), f"{face.label} [m]")
 
 
 def _bands(x: Array, length: Array) -> tuple[Array, Array]:
@@ -211,9 +196,3 @@ def _bands(x: Array, length: Array) -> tuple[Array, Array]:
         if beyond < 0.05 * length[part].min() and (inside > 0.05 * length[part][1:-1]).all():
             low[part], high[part] = ends[:-1], ends[1:]
     return low, high
-
-
-def _masked(values: NDArray[Any], nodes: NDArray[np.intp]) -> "np.ma.MaskedArray[Any, Any]":
-    """Values (k, T) of the rows of the map from those of the nodes (T, n)."""
-    return np.ma.masked_where(np.repeat(nodes[:, None] < 0, len(values), axis=1),
-                              values.T[nodes])

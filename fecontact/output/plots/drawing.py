@@ -12,6 +12,7 @@ from fecontact.core.types import Array
 from fecontact.output.diagrams.colours import BEYOND_COLOUR, DASHES, INK
 from fecontact.output.diagrams.diagram import WIDTH, Curve, Diagram, thinned
 from fecontact.output.diagrams.labels import in_unit
+from fecontact.output.diagrams.maps import Map
 from fecontact.output.diagrams.special_points import SPECIAL
 from fecontact.output.plots.style import legend_label
 
@@ -80,13 +81,14 @@ def name_axis(axes: "Axes", which: Literal["x", "y"], label: str, values: Array)
             axis.set_major_formatter(_InUnit(factor))
 
 
-def draw(axes: "Axes", diagram: Diagram, *, marker_size: float = _SIZE) -> None:
-    """Draw a diagram into empty axes, and label them.
+def draw(axes: "Axes", diagram: Diagram, *, marker_size: float = _SIZE) -> list[Any]:
+    """Draw a diagram into empty axes, and label them; return the images of its maps.
 
     Data are in SI units, ticks in units that suit them. Thick lines lie behind thin ones.
     """
     for name in diagram.logarithmic:
         axes.set(**{f"{name}scale": "log"})
+    images = [_draw_map(axes, one) for one in diagram.maps]
     for curve in diagram.curves:
         _draw_curve(axes, curve)
     for mark in diagram.marks:
@@ -109,6 +111,37 @@ def draw(axes: "Axes", diagram: Diagram, *, marker_size: float = _SIZE) -> None:
     ends = diagram.flat_range or diagram.y_limits
     if ends != (None, None):
         axes.set_ylim(*ends)
+    return images
+
+
+def _draw_map(axes: "Axes", one: Map) -> Any:
+    """Draw the cells of a map over the whole of the axes."""
+    from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
+
+    scale, count = one.scale, len(one.scale.names)
+    norm = (BoundaryNorm(np.arange(count + 1) - 0.5, max(count, 2)) if count
+            else (LogNorm if scale.logarithmic else Normalize)(*one.ends))
+    colours = scale.colours if isinstance(scale.colours, str) else ListedColormap(
+        list(scale.colours))
+    if one.blank:
+        axes.set_facecolor(one.blank)
+    axes.grid(False)
+    return axes.pcolormesh(one.x, one.y, np.ma.masked_invalid(one.values), cmap=colours, norm=norm,
+                           alpha=one.opacity if one.opacity < 1.0 else None, rasterized=True)
+
+
+def colour_bar(image: Any, one: Map, axes: "Axes | Sequence[Axes]") -> None:
+    """Add the colour bar of a map beside axes, in a unit that suits its values."""
+    figure = image.axes.figure
+    factor, label = in_unit(one.scale.label, np.array(one.ends))
+    bar = figure.colorbar(image, ax=axes, label=label, pad=0.02)
+    bar.outline.set_visible(False)
+    if one.scale.names:
+        bar.set_ticks(range(len(one.scale.names)), labels=one.scale.names)
+        bar.ax.tick_params(length=0)
+    elif factor != 1.0:
+        bar.formatter = (_OnDecades if one.scale.logarithmic else _InUnit)(factor)
+        bar.update_ticks()
 
 
 def _draw_curve(axes: "Axes", curve: Curve) -> None:

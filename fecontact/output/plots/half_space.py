@@ -1,17 +1,17 @@
 """Plot of pressures and friction between half-spaces."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
-from fecontact.core.types import Array
 from fecontact.half_space.friction import HalfSpaceFriction
 from fecontact.half_space.normal_contact import HalfSpaceContact
-from fecontact.output.diagrams.labels import in_unit
+from fecontact.output.diagrams.diagram import Diagram
+from fecontact.output.diagrams.maps import Map, Scale
+from fecontact.output.plots.drawing import colour_bar, draw
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.solids.maps import OPEN
 
@@ -58,24 +58,13 @@ def plot_half_space(
                   contact.touching),
                  ("slip [m]", np.linalg.norm(found.slip[point], axis=-1), "viridis",
                   contact.touching)]
-    n, m = contact.pressure.shape
-    a, b = contact.sides
-    length, unit = in_unit("x [m]", np.array([max(n * a, m * b)]))
-    extent = (-0.5 * n * a / length, 0.5 * n * a / length, -0.5 * m * b / length,
-              0.5 * m * b / length)
+    x, y = (side * (np.arange(count + 1) - 0.5 * count) for side, count in zip(
+        contact.sides, contact.pressure.shape, strict=True))
     with new_figure(4.3 * len(maps), 3.8, path) as figure:
         axes = figure.subplots(1, len(maps), squeeze=False)[0]
         for axis, (label, values, colours, shown) in zip(axes, maps, strict=True):
-            factor, label = in_unit(label, values)
-            image = axis.imshow(_masked(values / factor, shown), cmap=colours, vmin=0.0,
-                                extent=extent, origin="lower", interpolation="nearest")
-            axis.set_facecolor(OPEN)
-            axis.grid(False)
-            axis.set(xlabel=unit, ylabel=unit.replace("x", "y", 1))
-            figure.colorbar(image, ax=axis, label=label, fraction=0.046)
+            one = Map(x, y, np.where(shown, values, np.nan).T, Scale(label, colours, low=0.0), OPEN)
+            (image,) = draw(axis, Diagram("x [m]", "y [m]", maps=(one,)))
+            axis.set_aspect("equal")
+            colour_bar(image, one, axis)
     return figure
-
-
-def _masked(values: Array, shown: NDArray[np.bool_]) -> Any:
-    """Values with x to the right; those that are not shown are masked."""
-    return np.ma.masked_where(~shown.T, values.T)

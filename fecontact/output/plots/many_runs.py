@@ -16,8 +16,9 @@ from fecontact.core.types import ArrayLike
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.diagrams.colours import distinct_colours
 from fecontact.output.diagrams.diagram import Curve, Diagram
+from fecontact.output.diagrams.maps import Map, Scale, basin_map, borders
 from fecontact.output.diagrams.spectra import spectrum_diagram
-from fecontact.output.plots.drawing import draw, name_axis
+from fecontact.output.plots.drawing import draw
 from fecontact.output.plots.figure import new_figure
 from fecontact.reduction.modal_basis import Component
 from fecontact.system.contact_system import ContactSystem
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from fecontact.bifurcation.attractors.basins import Basins
     from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
 
-_UNSETTLED = "#ffffff"
 _COLUMNS, _ROWS = 1600, 800  # cells of the picture, at most
 _DARKEST = 0.98  # part of the cells that are met which are not the darkest
 
@@ -104,7 +104,6 @@ def plot_basins(
     InputError
         For another suffix, or a file that cannot be written.
     """
-    from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -113,19 +112,18 @@ def plot_basins(
     require_kind("plot_basins", Basins, found=found)
     with new_figure(8.0, 5.2, path) as figure:
         axis = figure.subplots()
-        count = len(found.attractors)
-        colours = [_UNSETTLED, *distinct_colours(count)]
-        axis.pcolormesh(found.first, found.second, found.label.T, shading="nearest", alpha=0.75,
-                        cmap=ListedColormap(colours), rasterized=True,
-                        norm=BoundaryNorm(np.arange(-1.5, count + 0.5), count + 1))
+        diagram = Diagram(x_label or "", y_label or "", maps=(basin_map(found),))
+        shown = diagram.maps[0]
+        colours, opacity = shown.scale.colours, shown.opacity
+        draw(axis, diagram)
         box = axis.get_xlim(), axis.get_ylim()
         handles: list[Line2D | Patch] = [
-            Patch(color=colours[k + 1], alpha=0.75, label=f"{_described(one.kind, one.points)}, "
+            Patch(color=colours[k + 1], alpha=opacity, label=f"{_described(one.kind, one.points)}, "
                                                           f"{100.0 * one.share:.3g} %")
             for k, one in enumerate(found.attractors)]
         lost = float((found.label < 0).mean())
         if lost:
-            handles.append(Patch(facecolor=_UNSETTLED, edgecolor="#8a8a8a",
+            handles.append(Patch(facecolor=colours[0], edgecolor="#8a8a8a",
                                  label=f"no end, {100.0 * lost:.3g} %"))
         if rows is not None:
             chosen = np.asarray(rows, dtype=float)
@@ -136,9 +134,6 @@ def plot_basins(
             handles.append(Line2D([], [], color="#ffffff", marker="o", markeredgecolor="#202020",
                                   linestyle="none", label="its section"))
         axis.set(xlim=box[0], ylim=box[1])
-        name_axis(axis, "x", x_label or "", found.first)
-        name_axis(axis, "y", y_label or "", found.second)
-        axis.grid(False)
         axis.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5))
     return figure
 
@@ -176,8 +171,6 @@ def plot_poincare_scan(
     AnalysisError
         If no run could go on.
     """
-    from matplotlib.colors import LogNorm
-
     from fecontact.bifurcation.attractors.poincare_scan import PoincareScan
 
     require_kind("plot_poincare_scan", PoincareScan, found=found)
@@ -196,24 +189,19 @@ def plot_poincare_scan(
     met = share[share > 0.0]
     with new_figure(9.0, 5.2, path) as figure:
         axis = figure.subplots()
-        axis.pcolormesh(edges, rows, np.where(share > 0.0, share, np.nan).T, cmap="Blues",
-                        norm=LogNorm(0.2 * float(met.min()),
-                                     float(np.quantile(met, _DARKEST))), rasterized=True)
-        name_axis(axis, "x", x_label or _parameter(found), found.values)
-        name_axis(axis, "y", y_label or _named(found, point, component, of), heights)
-        axis.grid(False)
+        draw(axis, Diagram(
+            x_label or _parameter(found), y_label or _named(found, point, component, of), maps=(
+                Map(edges, rows, np.where(share > 0.0, share, np.nan).T, Scale(
+                    colours="Blues", low=0.2 * float(met.min()),
+                    high=float(np.quantile(met, _DARKEST)), logarithmic=True)),)))
     return figure
 
 
 def _edges(values: np.ndarray) -> np.ndarray:
     """Edges of columns with one value or more each."""
-    if len(values) == 1:
-        return values[0] + 0.5 * max(abs(values[0]), 1.0) * np.array([-1.0, 1.0])
     step = max(len(values) / _COLUMNS, 1.0)
-    first = np.unique(np.arange(0.0, len(values), step).astype(int))[1:]
-    between = 0.5 * (values[first - 1] + values[first])
-    return np.concatenate([values[:1] - 0.5 * (values[1] - values[0]), between,
-                           values[-1:] + 0.5 * (values[-1] - values[-2])])
+    first = np.unique(np.arange(0.0, len(values), step).astype(int))
+    return borders(values)[[*first, len(values)]]
 
 
 def _parameter(found: "PoincareScan") -> str:

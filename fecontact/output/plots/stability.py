@@ -8,7 +8,10 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.output.diagrams.branches import eigenvalue_diagrams
-from fecontact.output.plots.drawing import draw, name_axis
+from fecontact.output.diagrams.colours import INK
+from fecontact.output.diagrams.diagram import Curve, Diagram
+from fecontact.output.diagrams.maps import stability_maps, zero_lines
+from fecontact.output.plots.drawing import colour_bar, draw
 from fecontact.output.plots.figure import new_figure
 
 if TYPE_CHECKING:
@@ -89,31 +92,20 @@ def plot_stability_map(
     require_kind("plot_stability_map", StabilityMap, found=found)
     with new_figure(7.4, 5.2, path) as figure:
         axis = figure.subplots()
-        unstable = (found.unstable > 0).T
-        hertz = np.ma.masked_where(~unstable, found.frequency_hz.T)
-        axis.set_facecolor("#f4f2ee")
-        low, high = (float(hertz.min()), float(hertz.max())) if hertz.count() else (0.0, 1.0)
-        image = axis.pcolormesh(found.first, found.second, hertz, cmap="viridis", shading="nearest",
-                                vmin=low, vmax=high if high > low else low + 1e-3 * max(low, 1.0))
-        figure.colorbar(image, ax=axis, pad=0.02,
-                        label="frequency of the fastest growing mode [Hz]")
-        growth = found.growth_rate.T
-        for border in borders:
-            axis.plot(*(border.column(name) for name in found.names), color="#303030",
-                      linewidth=1.4)
-        if not borders and 0 < unstable.sum() < unstable.size and min(growth.shape) > 1:
-            axis.contour(found.first, found.second, growth, levels=[0.0], colors="#303030",
-                         linewidths=1.4)
-        if (found.unstable < 0).any():
-            axis.pcolormesh(found.first, found.second,
-                            np.ma.masked_where((found.unstable >= 0).T, np.ones(unstable.shape)),
-                            cmap="Greys", vmin=0.0, vmax=2.0, shading="nearest")
+        unstable, growth = (found.unstable > 0).T, found.growth_rate.T
+        lines = [np.column_stack([border.column(name) for name in found.names])
+                 for border in borders] or (
+            zero_lines(found.first, found.second, growth)
+            if 0 < unstable.sum() < unstable.size else [])
+        diagram = Diagram(
+            x_label or found.labels[0], y_label or found.labels[1],
+            tuple(Curve("", INK, line[:, 0], line[:, 1], 1.4) for line in lines),
+            maps=stability_maps(found))
+        image = draw(axis, diagram)[0]
+        colour_bar(image, diagram.maps[0], axis)
         inside = np.argwhere(~unstable & (found.unstable >= 0).T)
         if len(inside):
             centre = inside[np.argmin(((inside - inside.mean(axis=0)) ** 2).sum(axis=1))]
             axis.text(found.first[centre[1]], found.second[centre[0]], "stable", ha="center",
                       va="center")
-        name_axis(axis, "x", x_label or found.labels[0], found.first)
-        name_axis(axis, "y", y_label or found.labels[1], found.second)
-        axis.grid(False)
     return figure
