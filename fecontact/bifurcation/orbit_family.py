@@ -13,7 +13,7 @@ from fecontact.bifurcation.continuation.problem import ContinuationOptions, opti
 from fecontact.bifurcation.orbit_methods import Collocation, Method
 from fecontact.bifurcation.orbits import starts
 from fecontact.bifurcation.orbits.branches import as_motion
-from fecontact.bifurcation.orbits.discretisation import MotionStart, first_that_goes
+from fecontact.bifurcation.orbits.discretisation import first_that_goes
 from fecontact.bifurcation.orbits.discretisations import DISCRETISATIONS, discretisation_by
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.same_orbit import VANISHING
@@ -172,10 +172,11 @@ def orbit_family(
     motion = as_motion(start)
     values = field.values if motion.parameter_values is None else motion.parameter_values.copy()
     sizes, limits = sizes_of(scales, motion.amplitudes + 1e-300)
-    given = MotionStart(replace(motion, periods=1), values, free, np.append(sizes, 1.0), limits)
+    given = starts.MotionStart(field, values, free, replace(motion, periods=1),
+                               np.append(sizes, 1.0))
     intervals, degree = by.mesh(how)
     problem, u = starts.corrected_samples(
-        lambda intervals: given.on_mesh(field, intervals, degree), intervals, family=True)
+        lambda intervals: given.on_mesh(intervals, degree), intervals, family=True)
     low, high = chosen.second_bounds
     if not low <= problem.period(u) <= high:
         raise InputError(f"The start has the period {problem.period(u):.6g} s, outside the bounds "

@@ -11,7 +11,7 @@ from fecontact.bifurcation.continuation.points import (
 )
 from fecontact.bifurcation.orbits.mesh import require_mesh
 from fecontact.bifurcation.orbits.normal_forms import examined, verdict
-from fecontact.bifurcation.orbits.starts import corrected_samples, from_samples
+from fecontact.bifurcation.orbits.starts import MotionStart, corrected_samples
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.resources.blas_threads import one_blas_thread
@@ -66,15 +66,13 @@ def with_normal_form(
         raise InputError(f"{point.place} is one of a set-valued system, which has no smooth normal "
                          f"form.")
     values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
-    motion = point.orbit(field, _SAMPLES)
     widths = np.delete(np.asarray(point.branch.attributes["scales"], dtype=float), -2)
+    start = MotionStart(field, values, free, point.orbit(field, _SAMPLES), widths)
     kind = "torus" if isinstance(point, NeimarkSackerPoint) else "period doubling"
     coefficient, error = np.nan, np.nan
     for doubling in range(_DOUBLINGS + 1):
         problem, u = corrected_samples(
-            lambda count: from_samples(field, values, free, motion.times, motion.states,
-                                       motion.period, count, _DEGREE, motion.periods, widths),
-            intervals * 2**doubling)
+            lambda count: start.on_mesh(count, _DEGREE), intervals * 2**doubling)
         found = examined(kind, problem, u, problem.linearise(u))
         if found is None:
             raise AnalysisError(f"{point.place}: the orbit by collocation has no critical "

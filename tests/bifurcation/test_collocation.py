@@ -24,7 +24,7 @@ from fecontact.bifurcation.orbits.mesh import (
     node_times,
     rule,
 )
-from fecontact.bifurcation.orbits.starts import converged_orbit, from_samples
+from fecontact.bifurcation.orbits.starts import MotionStart, converged_orbit
 
 
 def stuart_landau(t, x, p, out):
@@ -243,8 +243,8 @@ def test_rule_integrates_and_differentiates_polynomials():
 def test_mass_on_a_belt_with_steep_friction(slope, period, largest):
     field = vector_field(belt, {"slope": slope, "V": 0.2}, 2)
     times, states = settled(field, 60.0, [1.0, 0.2], period)
-    problem, u = converged_orbit(*from_samples(field, field.values, 0, times, states, None, 200, 4,
-                                               1, np.ones(3)))
+    start = MotionStart(field, field.values, 0, PeriodicMotion(times, states), np.ones(3))
+    problem, u = converged_orbit(*start.on_mesh(200, 4))
     assert problem.period(u) == pytest.approx(period, abs=1e-8)
     assert extremes(problem.nodes(u), 4)[1][0] == pytest.approx(largest, abs=2e-9)
 

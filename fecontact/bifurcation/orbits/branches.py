@@ -27,7 +27,7 @@ from fecontact.bifurcation.orbits.curves.resonant import (
     is_single,
     of_several,
 )
-from fecontact.bifurcation.orbits.discretisation import MotionStart, Request, first_that_goes
+from fecontact.bifurcation.orbits.discretisation import Request, first_that_goes
 from fecontact.bifurcation.orbits.discretisations import (
     DISCRETISATIONS,
     discretisation_by,
@@ -192,7 +192,7 @@ def _from_motion(motion: PeriodicMotion, parameter: str, request: Request) -> Br
     sizes, limits = sizes_of(request.scales, motion.amplitudes + 1e-300)
     widths = np.append(sizes, width_of(request.width, options, given[free]))
     return discretisation_by(method).from_motion(
-        MotionStart(motion, given, free, widths, limits), request, method)
+        starts.MotionStart(field, given, free, motion, widths, limits), request, method)
 
 
 def _around(point: BranchPoint, name: str, request: Request) -> Branch:
@@ -272,9 +272,8 @@ def _collocated(
     problem, u, tangent = restored_orbit(field, point)
     motions = [replace(point, u=there, values={**point.values, "period": problem.period(there)})
                .orbit(field, _SAMPLES) for there in (u, u + _ALONG * tangent)]
-    at = motions[0]
-    values, d = point.parameter_values(field), field.dimension
-    found, nodes = starts.from_samples(
-        field, values, problem.free, at.times, at.states, at.period, intervals, degree, at.periods,
-        np.append(problem.scales[:d], problem.scales[-1]))
+    d = field.dimension
+    start = starts.MotionStart(field, point.parameter_values(field), problem.free, motions[0],
+                               np.append(problem.scales[:d], problem.scales[-1]))
+    found, nodes = start.on_mesh(intervals, degree)
     return found, nodes, starts.along(found, nodes, motions[1], _ALONG)

@@ -12,7 +12,7 @@ from fecontact.bifurcation.fields.jumps import require_smooth_friction
 from fecontact.bifurcation.orbit_methods import Collocation
 from fecontact.bifurcation.orbits import starts
 from fecontact.bifurcation.orbits.collocation import Intervals
-from fecontact.bifurcation.orbits.discretisation import Discretisation, MotionStart, Request
+from fecontact.bifurcation.orbits.discretisation import Discretisation, Request
 from fecontact.bifurcation.orbits.orbit_points import CollocatedPoints
 from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import HALVING
@@ -43,12 +43,13 @@ class ByCollocation(CollocatedPoints, Discretisation):
         problem, u, tangent = start
         return replace(problem, limits=limits), u, tangent
 
-    def from_motion(self, start: MotionStart, request: Request, method: Collocation) -> Branch:
+    def from_motion(
+        self, start: starts.MotionStart, request: Request, method: Collocation
+    ) -> Branch:
         """Branch through the orbit near a motion."""
         self.require(request.field)
         problem, u = starts.corrected_samples(
-            lambda intervals: start.on_mesh(request.field, intervals, method.degree),
-            method.intervals)
+            lambda intervals: start.on_mesh(intervals, method.degree), method.intervals)
         return self.followed((problem, u, None), method, request.options, start.limits,
                              direction=request.direction, both=request.both)
 

@@ -12,7 +12,7 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbit_methods import Shooting
-from fecontact.bifurcation.orbits.discretisation import Discretisation, MotionStart, Request
+from fecontact.bifurcation.orbits.discretisation import Discretisation, Request
 from fecontact.bifurcation.orbits.mesh import interpolate
 from fecontact.bifurcation.orbits.orbit_points import ShotPoints
 from fecontact.bifurcation.orbits.restored import rescaled, restored_shooting
@@ -22,7 +22,7 @@ from fecontact.bifurcation.orbits.shooting import (
     ShootingProblem,
     shooting_from,
 )
-from fecontact.bifurcation.orbits.starts import Begun, Start
+from fecontact.bifurcation.orbits.starts import Begun, MotionStart, Start
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.ties import first_largest
 from fecontact.core.types import Array
@@ -88,8 +88,8 @@ class ByShooting(ShotPoints, Discretisation):
         AnalysisError
             If Newton's method finds no orbit near the motion.
         """
-        start = _to_fastest(start, request.field)
-        found, u = start.on_mesh(request.field, *self.mesh(method))
+        start = _to_fastest(start)
+        found, u = start.on_mesh(*self.mesh(method))
         problem, u, _ = self.projected((found, u, None), method, start.limits)
         how: dict[str, Any] = {"direction": request.direction, "both": request.both}
         branch, why = _from_event_to_event(problem, u, request.options, **how)
@@ -222,13 +222,13 @@ def _noted(why: str, branch: Branch) -> Branch:
     return replace(branch, message=" ".join(filter(None, (why, branch.message))))
 
 
-def _to_fastest(start: MotionStart, field: VectorField) -> MotionStart:
+def _to_fastest(start: MotionStart) -> MotionStart:
     """The start with its motion truncated at its fastest point within the last period.
 
     The phase is best defined there. Next to a transition between stick and slip the first guess
     would be far from the orbit. Forced motions and those of unknown period stay as they are.
     """
-    motion = start.motion
+    motion, field = start.motion, start.field
     if (motion.period is None or not isinstance(field, ContactField)
         or motion.states.shape != (motion.times.size, field.dimension)
         or field.forcing_period(start.values) is not None):

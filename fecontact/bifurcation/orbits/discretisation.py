@@ -17,8 +17,6 @@ from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.orbits import starts
-from fecontact.bifurcation.orbits.collocation import CollocationProblem
-from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.orbit_points import OrbitPoints
 from fecontact.core.errors import FecontactError, InputError
 from fecontact.core.types import Array, ArrayLike
@@ -59,38 +57,6 @@ class Request:
     def sign(self) -> float:
         """1 forward, -1 back."""
         return float(np.copysign(1.0, self.direction))
-
-
-@dataclass(frozen=True, eq=False)
-class MotionStart:
-    """A motion from which a branch starts.
-
-    Attributes
-    ----------
-    motion : PeriodicMotion
-    values : (k,) array
-        Parameters of the field there.
-    free : int
-        Index of the one that varies.
-    widths : (d + 1,) array
-        Scales of the states and of the parameter.
-    limits : (d,) array or None
-        Upper limits up to which the scales of the states grow.
-    """
-
-    motion: PeriodicMotion
-    values: Array
-    free: int
-    widths: Array
-    limits: Array | None
-
-    def on_mesh(
-        self, field: VectorField, intervals: int, degree: int
-    ) -> tuple[CollocationProblem, Array]:
-        """The last period on a mesh of so many intervals."""
-        motion = self.motion
-        return starts.from_samples(field, self.values, self.free, motion.times, motion.states,
-                                   motion.period, intervals, degree, motion.periods, self.widths)
 
 
 class Discretisation(OrbitPoints):
@@ -140,9 +106,9 @@ class Discretisation(OrbitPoints):
         """Intervals and degree of the mesh on which starts are put."""
         return _INTERVALS, _DEGREE
 
-    def from_motion(self, start: MotionStart, request: Request, method: Any) -> Branch:
+    def from_motion(self, start: starts.MotionStart, request: Request, method: Any) -> Branch:
         """Branch through the orbit near a motion."""
-        return self.followed((*start.on_mesh(request.field, *self.mesh(method)), None), method,
+        return self.followed((*start.on_mesh(*self.mesh(method)), None), method,
                              request.options, start.limits, direction=request.direction,
                              both=request.both)
 

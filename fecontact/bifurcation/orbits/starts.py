@@ -4,7 +4,7 @@ A start is a problem, its unknowns u and the direction in which the branch leave
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -37,26 +37,13 @@ _FINER = (2, 4)
 AMPLITUDES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-2, 1e-7)
 
 
-def from_hopf(
-    field: VectorField, values: Array, free: int, state: Array, angular_frequency: float,
-    vector: ArrayLike, intervals: int, degree: int, scales: Array, amplitude: float = 1e-3,
-) -> Start:
-    """Start on the orbits born at a Hopf point, x = state + eps Re(vector exp(i w t)).
+def at_hopf(
+    field: VectorField, point: HopfPoint, intervals: int, degree: int, options: ContinuationOptions,
+    scales: ArrayLike | None, width: float | None,
+) -> Iterator[tuple[Start, Array | None]]:
+    """Starts on the orbits born at a Hopf point, x = state + eps Re(eigenvector exp(i w t)).
 
-    Parameters
-    ----------
-    field, values, free
-        Parameter values (k,) at the Hopf point, and the index of the free one.
-    state : (d,) array
-        The equilibrium.
-    angular_frequency, vector
-        w and the complex eigenvector (d,) of the pair on the imaginary axis.
-    intervals, degree : int
-        Number of intervals and of collocation points on each.
-    scales : (d + 1,) array
-        Scales of the states and the parameter in the step length.
-    amplitude : float
-        Amplitude of the first guess, in the inner product of the problem.
+    One for each of the amplitudes eps to try, with limits of the scales.
 
     Raises
     ------
@@ -64,79 +51,84 @@ def from_hopf(
         If the mesh cannot be used.
     """
     require_mesh(intervals, degree)
-    require_positive("from_hopf", angular_frequency=angular_frequency)
-    mesh = np.linspace(0.0, 1.0, intervals + 1)
-    phase = 2.0j * np.pi * node_times(mesh, degree)
-    shape = np.array((np.exp(phase)[:, None] * np.asarray(vector)).real, order="C")
-    period = 2.0 * np.pi / angular_frequency
-    problem = CollocationProblem(field, values.copy(), free, mesh, degree, shape,
-                                 _with_period(scales, period))
-    leaving = np.concatenate([shape.reshape(-1), [0.0, 0.0]])
-    leaving /= np.sqrt(problem.weights() @ leaving**2)
-    u = np.concatenate([np.tile(np.asarray(state, dtype=float), len(shape)),
-                        [period, values[free]]])
-    # At the Hopf point itself the system is singular: period and parameter do not affect the orbit.
-    return problem, u + amplitude * leaving, leaving
-
-
-def at_hopf(
-    field: VectorField, point: HopfPoint, intervals: int, degree: int, options: ContinuationOptions,
-    scales: ArrayLike | None, width: float | None,
-) -> Iterator[tuple[Start, Array | None]]:
-    """Starts at a Hopf point, one for each of the amplitudes to try, and limits of the scales."""
     values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
-    state = np.ascontiguousarray(point.u[:-1])
+    state, w = np.ascontiguousarray(point.u[:-1]), point.angular_frequency
+    require_positive("A Hopf point", angular_frequency=w)
     sizes, limits = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
     widths = np.append(sizes, width_of(width, options, point.parameter))
+    mesh = np.linspace(0.0, 1.0, intervals + 1)
+    phase = 2.0j * np.pi * node_times(mesh, degree)
+    shape = np.array((np.exp(phase)[:, None] * np.asarray(point.eigenvector)).real, order="C")
+    period = 2.0 * np.pi / w
+    leaving = np.concatenate([shape.reshape(-1), [0.0, 0.0]])
+    at = np.concatenate([np.tile(state, len(shape)), [period, values[free]]])
     for amplitude in AMPLITUDES:
-        yield from_hopf(field, values, free, state, point.angular_frequency, point.eigenvector,
-                        intervals, degree, widths, amplitude), limits
+        problem = CollocationProblem(field, values.copy(), free, mesh, degree, shape,
+                                     _with_period(widths, period))
+        away = leaving / np.sqrt(problem.weights() @ leaving**2)
+        # At the Hopf point itself the system is singular: period and parameter do not affect the
+        # orbit.
+        yield (problem, at + amplitude * away, away), limits
 
 
-def from_samples(
-    field: VectorField, values: Array, free: int, times: ArrayLike, states: ArrayLike,
-    period: float | None, intervals: int, degree: int, periods: int, scales: Array,
-) -> tuple[CollocationProblem, Array]:
-    """Problem and first guess from a nearly periodic motion.
+@dataclass(frozen=True, eq=False)
+class MotionStart:
+    """A nearly periodic motion from which a branch starts.
 
-    Parameters
+    Attributes
     ----------
-    times, states : (k,) and (k, d) array
-        Samples over at least one period; the last period is used.
-    period : float or None
-        Period of the motion [s]; None for the time since the motion last passed its end point.
-        Forced systems take ``periods`` times the period of the forcing.
-
-    field, values, free, intervals, degree, periods, scales
-        See :func:`from_hopf`.
-
-    Raises
-    ------
-    InputError
-        If the samples do not cover a period, or are not periodic.
+    field : VectorField
+    values : (k,) array
+        Parameters of the field there.
+    free : int
+        Index of the one that varies.
+    motion : PeriodicMotion
+    widths : (d + 1,) array
+        Scales of the states and of the parameter in the step length.
+    limits : (d,) array, optional
+        Upper limits up to which the scales of the states grow; None keeps them.
     """
-    require_mesh(intervals, degree)
-    t, x = np.asarray(times, dtype=float), np.asarray(states, dtype=float)
-    if t.ndim != 1 or x.shape != (len(t), field.dimension) or len(t) < 5:
-        raise InputError(f"An orbit of this field needs times (k,) and states (k, "
-                         f"{field.dimension}), k at least 5, not {t.shape} and {x.shape}.")
-    forcing = field.forcing_period(values)
-    if forcing is not None:
-        T = periods * forcing
-    else:
-        T = _return_time(t, x) if period is None else float(period)
-    require_positive("from_samples", period=T)
-    if t[-1] - t[0] < T * (1.0 - 1e-9):
-        raise InputError(f"The samples cover {t[-1] - t[0]:g} s, but the period is {T:g} s; give "
-                         f"at least one period.")
-    fine = np.linspace(0.0, 1.0, 4 * intervals + 1)
-    sampled = partial(_at_phases, t, x, T, forcing is not None)
-    mesh = equidistributed(fine, sampled(node_times(fine, degree)), degree, intervals)
-    nodes = sampled(node_times(mesh, degree))
-    problem = CollocationProblem(field, values.copy(), free, mesh, degree, nodes,
-                                 _with_period(scales, T), periods)
-    return problem, np.concatenate([nodes.reshape(-1), [T] if forcing is None else [],
-                                    [values[free]]])
+
+    field: VectorField
+    values: Array
+    free: int
+    motion: PeriodicMotion
+    widths: Array
+    limits: Array | None = None
+
+    def on_mesh(self, intervals: int, degree: int) -> tuple[CollocationProblem, Array]:
+        """Problem and first guess: the last period on a mesh of so many intervals.
+
+        Forced systems take ``motion.periods`` times the period of the forcing, motions of unknown
+        period the time since they last passed their end point.
+
+        Raises
+        ------
+        InputError
+            If the samples do not cover a period, or are not periodic.
+        """
+        require_mesh(intervals, degree)
+        field, motion, t, x = self.field, self.motion, self.motion.times, self.motion.states
+        if x.shape[1] != field.dimension or len(t) < 5:
+            raise InputError(f"An orbit of this field needs times (k,) and states (k, "
+                             f"{field.dimension}), k at least 5, not {t.shape} and {x.shape}.")
+        forcing = field.forcing_period(self.values)
+        if forcing is not None:
+            T = motion.periods * forcing
+        else:
+            T = _return_time(t, x) if motion.period is None else float(motion.period)
+        require_positive("A motion", period=T)
+        if t[-1] - t[0] < T * (1.0 - 1e-9):
+            raise InputError(f"The samples cover {t[-1] - t[0]:g} s, but the period is {T:g} s; "
+                             f"give at least one period.")
+        fine = np.linspace(0.0, 1.0, 4 * intervals + 1)
+        sampled = partial(_at_phases, t, x, T, forcing is not None)
+        mesh = equidistributed(fine, sampled(node_times(fine, degree)), degree, intervals)
+        nodes = sampled(node_times(mesh, degree))
+        problem = CollocationProblem(field, self.values.copy(), self.free, mesh, degree, nodes,
+                                     _with_period(self.widths, T), motion.periods)
+        return problem, np.concatenate([nodes.reshape(-1), [T] if forcing is None else [],
+                                        [self.values[self.free]]])
 
 
 def _at_phases(t: Array, x: Array, period: float, forced: bool, phases: Array) -> Array:
