@@ -35,7 +35,8 @@ def factorise(a, count, pivots):
             f0, f1 = a[i, k] * inverse, a[i + 1, k] * inverse
             f2, f3 = a[i + 2, k] * inverse, a[i + 3, k] * inverse
             a[i, k], a[i + 1, k], a[i + 2, k], a[i + 3, k] = f0, f1, f2, f3
-            for c in range(k + 1, columns):
+            # Unsigned: loops over indices that might be negative are not vectorised.
+            for c in range(np.uint64(k + 1), np.uint64(columns)):
                 pivot = a[k, c]
                 a[i, c] -= f0 * pivot
                 a[i + 1, c] -= f1 * pivot
@@ -45,7 +46,7 @@ def factorise(a, count, pivots):
         while i < rows:
             factor = a[i, k] * inverse
             a[i, k] = factor
-            for c in range(k + 1, columns):
+            for c in range(np.uint64(k + 1), np.uint64(columns)):
                 a[i, c] -= factor * a[k, c]
             i += 1
 
@@ -156,7 +157,7 @@ def factorise_within(a, reach, starts, pivots):
             f0, f1 = a[i, k] * inverse, a[i + 1, k] * inverse
             f2, f3 = a[i + 2, k] * inverse, a[i + 3, k] * inverse
             a[i, k], a[i + 1, k], a[i + 2, k], a[i + 3, k] = f0, f1, f2, f3
-            for c in range(k + 1, until):
+            for c in range(np.uint64(k + 1), np.uint64(until)):
                 pivot = a[k, c]
                 a[i, c] -= f0 * pivot
                 a[i + 1, c] -= f1 * pivot
@@ -166,7 +167,7 @@ def factorise_within(a, reach, starts, pivots):
         while i < end:
             factor = a[i, k] * inverse
             a[i, k] = factor
-            for c in range(k + 1, until):
+            for c in range(np.uint64(k + 1), np.uint64(until)):
                 a[i, c] -= factor * a[k, c]
             i += 1
 

@@ -24,16 +24,27 @@ solution methods, Computer Methods in Applied Mechanics and Engineering 92 (1991
 """
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from fecontact.core.compiled import helper
-from fecontact.core.records import Block, Matrix, Vector
-from fecontact.integrate.nonsmooth.equations import free_acceleration, stick_limit
+from fecontact.core.dense_lu import factorise, solve
+from fecontact.core.records import Vector
+from fecontact.core.types import Array, Integers
+from fecontact.integrate.nonsmooth.equations import stick_limit
 from fecontact.integrate.nonsmooth.problem import CREEP
+from fecontact.system.kernels import body_acceleration, prescribed_at
 from fecontact.system.node_forces import friction_along, normal_gradients, tangent_force
-from fecontact.system.nodes import node_contact, node_motion, size_of
+from fecontact.system.nodes import (
+    AXES,
+    COMBINATIONS,
+    MODES,
+    NODES,
+    node_contact,
+    node_motion,
+    size_of,
+)
 from fecontact.system.polynomial_forces import (
     add_polynomial_stiffness,
     has_polynomial,
@@ -48,6 +59,9 @@ _FINER = 1e-4
 _ITERATIONS = 60
 # Newton steps without shortening.
 _HASTY = 8
+
+# So few modes are multiplied without BLAS.
+_FEW = 6
 
 KEPT, HESITANT, FREE = range(3)
 
@@ -73,41 +87,37 @@ class Hold(NamedTuple):
     of all second components, the latter of length one in slip.
     """
 
-    grip: Vector
-    multiplier: Vector
-    side: Vector
+    grip: Annotated[Array, NODES]
+    multiplier: Annotated[Array, (AXES - 1) * NODES]
+    side: Annotated[Array, (AXES - 1) * NODES]
 
 
 class NewtonWorkspace(NamedTuple):
     """Workspace of Newton's method.
 
-    Rows ``active`` (n, d, m) of the nodes under force, and their ``gradients`` (n, d, m), minus
-    the derivatives of the forces along the axes to V;
-    ``partial`` (d + 1, 2 d) of one node; ``linear`` (m, m) is 1 + g C + g^2 K, ``matrix`` the whole
-    matrix; ``balance`` and ``residual`` (m,); ``polynomial`` (D, m) is G of
+    The ``nodes`` (n,) under force come first. Their ``jacobians`` (n, d, d) are -g times the
+    derivatives of the forces along the axes to the velocities there, ``active`` (n, d, m) are their
+    rows, and ``gradients`` (n, d, m) the products of both;
+    ``partial`` (d + 1, 2 d) is of one node; ``linear`` (m, m) is
+    1 + g C + g^2 K, ``matrix`` the factors of the whole matrix with their ``pivots`` (m,);
+    ``prescribed`` (m,) are the modal forces given in time, ``balance`` all of them; ``residual``
+    and ``change`` (m,) are of the velocities; ``polynomial`` (D, m) is G of
     :mod:`fecontact.system.polynomial_forces` where the matrix was made last.
     """
 
-    gradients: Block
-    active: Block
-    partial: Matrix
-    linear: Matrix
-    matrix: Matrix
-    balance: Vector
-    residual: Vector
-    polynomial: Matrix
-
-
-def newton_workspace_for(
-    nodes: int, modes: int, tangents: int = 1, combinations: int = 0
-) -> NewtonWorkspace:
-    """Workspace for so many nodes and modes, and combinations D of polynomial forces."""
-    linear, whole = np.zeros((2, modes, modes))
-    balance, residual = np.zeros((2, modes))
-    gradients, active = np.zeros((2, nodes, 1 + tangents, modes))
-    partial = np.zeros((2 + tangents, 2 * (1 + tangents)))
-    return NewtonWorkspace(gradients, active, partial, linear, whole, balance, residual,
-                           np.zeros((combinations, modes)))
+    nodes: Annotated[Integers, NODES]
+    jacobians: Annotated[Array, NODES, AXES, AXES]
+    partial: Annotated[Array, AXES + 1, 2 * AXES]
+    active: Annotated[Array, NODES, AXES, MODES]
+    gradients: Annotated[Array, NODES, AXES, MODES]
+    linear: Annotated[Array, MODES, MODES]
+    matrix: Annotated[Array, MODES, MODES]
+    pivots: Annotated[Integers, MODES]
+    prescribed: Annotated[Array, MODES]
+    balance: Annotated[Array, MODES]
+    residual: Annotated[Array, MODES]
+    change: Annotated[Array, MODES]
+    polynomial: Annotated[Array, COMBINATIONS, MODES]
 
 
 @helper
@@ -188,10 +198,10 @@ def _set_friction(j, contact, pressing, g, p, hold, turning, partial, force):
 
 @helper
 def _linearise(stage, moved, p, hold, turning, workspace, force):
-    """Contact of one stage: accelerations, friction forces and rows of the Jacobian.
+    """Contact of one stage: accelerations, friction forces and their derivatives.
 
     Adds modal contact forces to ``workspace.balance``, fills ``force`` (n,), in space (2 n,), with
-    R, and ``active`` and ``gradients`` of the workspace. KEPT nodes stay on their side; HESITANT
+    R, and ``nodes`` and ``jacobians`` of the workspace. KEPT nodes stay on their side; HESITANT
     ones that would turn their slip around are first tried as sticking, or the iteration would jump
     across stick for ever. Returns the number of nodes under force and the largest creep velocity.
     """
@@ -216,41 +226,81 @@ def _linearise(stage, moved, p, hold, turning, workspace, force):
                 for other in range(d - 1):
                     partial[2 * k, 2 * other] += g * F * contact.curvature[k][other]
         for axis in range(d):
-            push, sign = F, -1.0
+            push, factor = F, -g
             if axis != 1:
-                k, sign = axis // 2, 1.0
+                k, factor = axis // 2, g
                 push = -tangent_force(F, force[k * n + j], contact.slope[k], s)
+            for other in range(d):
+                workspace.jacobians[count, axis, other] = factor * partial[axis, other]
             for i in range(m):
-                total = 0.0
-                for other in range(d):
-                    total += partial[axis, other] * s.rows[j, other, i]
                 workspace.balance[i] += s.rows[j, axis, i] * push
-                workspace.active[count, axis, i] = s.rows[j, axis, i]
-                workspace.gradients[count, axis, i] = sign * total
+        workspace.nodes[count] = j
         count += 1
     return count, creep
 
 
 @helper
-def _evaluate(stage, p, hold, turning, workspace, force):
-    """Fill ``residual`` and ``balance`` of the workspace for the velocities Y, and the places."""
+def _set_gradients(count, s, workspace):
+    """Fill ``active`` and ``gradients`` of the first of ``workspace.nodes``."""
+    _, d, m = s.rows.shape
+    for at in range(count):
+        j, jacobian = workspace.nodes[at], workspace.jacobians[at]
+        for axis in range(d):
+            for i in range(m):
+                total = 0.0
+                for other in range(d):
+                    total += jacobian[axis, other] * s.rows[j, other, i]
+                workspace.active[at, axis, i] = s.rows[j, axis, i]
+                workspace.gradients[at, axis, i] = total
+
+
+@helper
+def _set_matrix(count, s, workspace):
+    """Fill ``workspace.matrix`` by the ``linear`` one and the ``jacobians`` of so many nodes."""
+    _, d, m = s.rows.shape
+    active, gradients, whole = workspace.active, workspace.gradients, workspace.matrix
+    # Twice, because loops over axes are written out where their number is known.
+    if d == 2 or d == 3:
+        _set_gradients(count, s, workspace)
+    whole[:] = workspace.linear
+    if m > _FEW and count > 0:
+        size = count * d
+        whole += np.dot(active[:count].reshape((size, m)).T,
+                        gradients[:count].reshape((size, m)))
+        return
+    for at in range(count):
+        for axis in range(d):
+            for i in range(m):
+                for k in range(m):
+                    whole[i, k] += active[at, axis, i] * gradients[at, axis, k]
+
+
+@helper
+def _evaluate(stage, moved, p, hold, turning, workspace, force):
+    """Fill ``residual`` and ``balance`` of the workspace for the velocities Y, and the places.
+
+    ``moved`` is the motion of the ground at the stage.
+    """
     Y, m = stage.Y, len(stage.start)
     for i in range(m):
         Y[i] = stage.start[i] + stage.g * Y[m + i]
-    moved = free_acceleration(stage.t, Y, p.system, workspace.balance)
-    count, creep = _linearise(stage, moved, p, hold, turning, workspace, force)
+    body_acceleration(workspace.prescribed, Y, p.system, workspace.balance)
+    count, creep = 0, 0.0
+    # Twice, because loops over axes are written out where their number is known.
+    if p.system.rows.shape[1] == 2 or p.system.rows.shape[1] == 3:
+        count, creep = _linearise(stage, moved, p, hold, turning, workspace, force)
     for i in range(m):
         workspace.residual[i] = stage.known[i] + stage.g * workspace.balance[i] - Y[m + i]
     return count, creep
 
 
 @helper
-def _shorten(stage, p, hold, change, downhill, workspace, force):
+def _shorten(stage, moved, p, hold, downhill, workspace, force):
     """Shorten a Newton step to where the minimum along it lies; ``downhill`` is its slope."""
-    m = len(stage.start)
+    m, change = len(stage.start), workspace.change
     low, high, part = 0.0, 1.0, 1.0
     for _ in range(40):
-        _evaluate(stage, p, hold, FREE, workspace, force)
+        _evaluate(stage, moved, p, hold, FREE, workspace, force)
         uphill = 0.0
         for i in range(m):
             uphill -= workspace.residual[i] * change[i]
@@ -274,30 +324,30 @@ def solve_stage(stage, p, hold, limits, finest, workspace, force):
     convex minimum: when the sticking set is not found at once, each Newton step is shortened to
     where the minimum along it lies.
     """
-    Y, m, floor, whole = stage.Y, len(stage.start), limits.floor, workspace.matrix
+    Y, m, floor = stage.Y, len(stage.start), limits.floor
+    whole, change = workspace.matrix, workspace.change
+    moved = prescribed_at(stage.t, p.system, workspace.prescribed)
     turning = KEPT
     for iteration in range(_ITERATIONS):
-        count, _ = _evaluate(stage, p, hold, turning, workspace, force)
+        count, _ = _evaluate(stage, moved, p, hold, turning, workspace, force)
         turning = HESITANT if iteration < _HASTY else FREE
-        whole[:] = workspace.linear
+        _set_matrix(count, p.system, workspace)
         if has_polynomial(p.system):
             set_polynomial_gradient(Y, p.system, workspace.polynomial)
             add_polynomial_stiffness(stage.g * stage.g, workspace.polynomial, p.system, whole)
-        if count:
-            size = count * workspace.active.shape[1]
-            whole += stage.g * np.dot(workspace.active[:count].reshape((size, m)).T,
-                                      workspace.gradients[:count].reshape((size, m)))
         for i in range(m):
             if not math.isfinite(workspace.residual[i]):
                 return False
-        change = np.linalg.solve(whole, workspace.residual)
-        moved, downhill = 0.0, 0.0
+            change[i] = workspace.residual[i]
+        factorise(whole, m, workspace.pivots)
+        solve(whole, workspace.pivots, change)
+        largest, downhill = 0.0, 0.0
         for i in range(m):
             downhill += workspace.residual[i] * change[i]
             Y[m + i] += change[i]
-            moved = max(moved, abs(change[i]) / (limits.rtol * (floor[m + i] + abs(Y[m + i]))))
-        if moved <= 1e-2:
-            _, creep = _evaluate(stage, p, hold, turning, workspace, force)
+            largest = max(largest, abs(change[i]) / (limits.rtol * (floor[m + i] + abs(Y[m + i]))))
+        if largest <= 1e-2:
+            _, creep = _evaluate(stage, moved, p, hold, turning, workspace, force)
             if creep <= finest:
                 return True
             if creep < math.inf:
@@ -305,5 +355,5 @@ def solve_stage(stage, p, hold, limits, finest, workspace, force):
                 hold.multiplier[:] = force
                 turning = KEPT
         elif turning == FREE:
-            _shorten(stage, p, hold, change, downhill, workspace, force)
+            _shorten(stage, moved, p, hold, downhill, workspace, force)
     return False

@@ -1,13 +1,20 @@
 """Workspace of implicit steps with set-valued friction."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from fecontact.core.records import Matrix, Vector
+from fecontact.core.records import allocate
+from fecontact.core.types import Array
 from fecontact.integrate.bernstein import DEPTH, fit
-from fecontact.integrate.nonsmooth.problem import NonsmoothProblem, node_columns, tangents
-from fecontact.integrate.nonsmooth.stage_newton import Hold, NewtonWorkspace, newton_workspace_for
+from fecontact.integrate.nonsmooth.problem import (
+    NODE_ENTRIES,
+    WITH_WORK,
+    NonsmoothProblem,
+    sizes_of,
+)
+from fecontact.integrate.nonsmooth.stage_newton import Hold, NewtonWorkspace
+from fecontact.system.nodes import AXES, COMBINATIONS, MODES, NODES
 from fecontact.system.powers import POWER_COUNT
 
 STAGES = 3
@@ -24,7 +31,7 @@ class Workspace(NamedTuple):
 
     Attributes
     ----------
-    newton, hold : NewtonRoom, Hold
+    newton, hold : NewtonWorkspace, Hold
         Workspace and stick variables of the stages.
     states, accelerations, forces, rates : (3, 2 m), (3, m), (3, n), (3, p + n) arrays
         Of the stages: Y, q'', friction forces, in space (3, 2 n), and powers.
@@ -46,33 +53,25 @@ class Workspace(NamedTuple):
 
     newton: NewtonWorkspace
     hold: Hold
-    states: Matrix
-    accelerations: Matrix
-    forces: Matrix
-    rates: Matrix
-    start: Vector
-    known: Vector
-    new: Vector
-    before: Vector
-    after: Vector
-    old: Matrix
-    sides: Vector
-    inertia: Vector
-    tries: Vector
-    cubic: Vector
-    speed: Vector
-    halves: Matrix
+    states: Annotated[Array, STAGES, 2 * MODES]
+    accelerations: Annotated[Array, STAGES, MODES]
+    forces: Annotated[Array, STAGES, (AXES - 1) * NODES]
+    rates: Annotated[Array, STAGES, NODES + POWER_COUNT]
+    start: Annotated[Array, MODES]
+    known: Annotated[Array, MODES]
+    new: Annotated[Array, WITH_WORK]
+    before: Annotated[Array, MODES + NODES + POWER_COUNT]
+    after: Annotated[Array, MODES + NODES + POWER_COUNT]
+    old: Annotated[Array, NODES, NODE_ENTRIES]
+    sides: Annotated[Array, (AXES - 1) * NODES]
+    inertia: Annotated[Array, NODES]
+    tries: Annotated[Array, TRIES]
+    cubic: Annotated[Array, 4]
+    speed: Annotated[Array, 4]
+    halves: Annotated[Array, DEPTH, 5]
 
 
 def workspace_for(problem: NonsmoothProblem) -> Workspace:
     """Workspace for a problem."""
-    n, _, m = problem.system.rows.shape
-    size, k = m + POWER_COUNT + n, tangents(problem)
-    start, known = np.zeros((2, m))
-    before, after = np.zeros((2, size))
-    return Workspace(newton_workspace_for(n, m, k, len(problem.system.polynomial_rows)),
-                     Hold(np.zeros(n), np.zeros(k * n), np.zeros(k * n)),
-                     np.zeros((STAGES, 2 * m)), np.zeros((STAGES, m)), np.zeros((STAGES, k * n)),
-                     np.zeros((STAGES, size - m)), start, known, np.zeros(m + size), before, after,
-                     np.zeros((n, node_columns(problem))), np.zeros(k * n),
-                     np.zeros(n), np.zeros(TRIES), np.zeros(4), np.zeros(4), np.zeros((DEPTH, 5)))
+    return allocate(Workspace, sizes_of(problem) | {
+        COMBINATIONS: len(problem.system.polynomial_rows)})

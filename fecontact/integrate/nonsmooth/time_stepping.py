@@ -12,9 +12,8 @@ Numerical Analysis 14 (1977).
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from fecontact.core.compiled import helper, routine
+from fecontact.core.dense_lu import solve
 from fecontact.integrate.bernstein import NOWHERE, first_below
 from fecontact.integrate.nonsmooth.equations import contact_powers, observe
 from fecontact.integrate.nonsmooth.event_search import MISSED, ROUGHLY, first_pressed, pressed
@@ -56,7 +55,7 @@ from fecontact.integrate.step_loop import (
     Method,
     step_loop,
 )
-from fecontact.system.nodes import ground_motion, ground_speed
+from fecontact.system.nodes import ground_motion, ground_speed, size_of
 from fecontact.system.polynomial_forces import add_polynomial_product, has_polynomial
 from fecontact.system.powers import body_powers
 
@@ -95,7 +94,7 @@ def _fastest_side(moved, p):
     for j in range(len(s.gap)):
         speed = 0.0
         for tangent in range(s.rows.shape[1] - 1):
-            speed = math.hypot(speed, ground_speed(tangent, j, moved, s))
+            speed = size_of((ground_speed(tangent, j, moved, s), speed))
         fastest = max(fastest, speed)
     return fastest
 
@@ -109,7 +108,7 @@ def _slips_back(j, step, p, w, tolerance, workspace):
     s, b, speed, old, h = p.system, workspace.cubic, workspace.speed, workspace.old, step.h
     first, last, rise, fall = 0.0, 0.0, 0.0, 0.0
     for k in range(s.rows.shape[1] - 1):
-        first = math.hypot(first, old[j, SLIP_OF[k]])
+        first = size_of((old[j, SLIP_OF[k]], first))
     if old[j, FORCE] == 0.0 or w.nodes[j, FORCE] == 0.0 or first <= tolerance:
         return 1.0
     speed[:] = 0.0
@@ -288,12 +287,12 @@ def _error(step, p, limits, Y, workspace):
             known[i] -= g * s.stiffness[i, k] * start[k]
     if has_polynomial(s):
         add_polynomial_product(-g, workspace.newton.polynomial, start, s, known)
-    filtered = np.linalg.solve(workspace.newton.matrix, known)
+    solve(workspace.newton.matrix, workspace.newton.pivots, known)
     worst = 0.0
     for i in range(m):
-        place = start[i] + g * filtered[i]
+        place = start[i] + g * known[i]
         worst = max(worst, abs(place) / (limits.rtol * (floor[i] + abs(Y[i]))),
-                    abs(filtered[i]) / (limits.rtol * (floor[m + i] + abs(Y[m + i]))))
+                    abs(known[i]) / (limits.rtol * (floor[m + i] + abs(Y[m + i]))))
     return worst
 
 
@@ -373,7 +372,7 @@ def _attempt(step, last, smallest, data):
     for j in range(n):
         slip = 0.0
         for k in range(p.system.rows.shape[1] - 1):
-            slip = math.hypot(slip, w.nodes[j, SLIP_OF[k]])
+            slip = size_of((w.nodes[j, SLIP_OF[k]], slip))
         largest[SLIP_SIZE] = max(largest[SLIP_SIZE], slip)
     _set_end(length, m, progress, workspace)
     if counts[STEPS] == 0:

@@ -196,6 +196,16 @@ def set_forces(y, s, blocks, moved, w, scratch, rate):
 
     ``w`` (3, d n) holds the nodes as :func:`project` puts them there, ``scratch`` is workspace.
     """
+    # Twice, because loops over axes are written out where their number is known.
+    if s.rows.shape[1] == 2:
+        _set_forces(y, s, blocks, moved, w, scratch, rate)
+    else:
+        _set_forces(y, s, blocks, moved, w, scratch, rate)
+
+
+@helper
+def _set_forces(y, s, blocks, moved, w, scratch, rate):
+    """Body of :func:`set_forces`."""
     m, n = len(blocks.position), len(s.gap)
     states = (len(y) - 2 * m) // n
     forces = w[2]
@@ -239,6 +249,15 @@ def set_gradients(y, s, blocks, moved, w, out):
 def set_node_gradients(y, s, blocks, moved, w, out):
     """Body of :func:`set_gradients` without polynomial forces."""
     project(blocks, y, w[0], w[1])
+    if s.rows.shape[1] == 2:
+        _set_node_gradients(y, s, blocks, moved, w, out)
+    else:
+        _set_node_gradients(y, s, blocks, moved, w, out)
+
+
+@helper
+def _set_node_gradients(y, s, blocks, moved, w, out):
+    """Body of :func:`set_node_gradients`."""
     m, n = len(blocks.position), len(s.gap)
     states = out.rates.shape[1]
     forces = w[2]

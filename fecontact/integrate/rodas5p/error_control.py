@@ -1,6 +1,5 @@
 """Errors of a step as multiples of what is allowed."""
 
-import math
 
 import numpy as np
 
@@ -143,9 +142,9 @@ def slip_error(error, problem, progress, workspace):
             slip, distance = 0.0, 0.0
             for tangent in range(s.rows.shape[1] - 1):
                 first = 2 * tangent * n
-                slip = math.hypot(slip, slips[first + at])
-                distance = math.hypot(distance, workspace.nodes[1, first + j] - ground_speed(
-                    tangent, j, moved, s))
+                slip = size_of((slips[first + at], slip))
+                distance = size_of((workspace.nodes[1, first + j] - ground_speed(
+                    tangent, j, moved, s), distance))
             part = slip / (control.slip_part * (control.slip_scale[j] + distance))
             if part > error:
                 error = part
