@@ -46,6 +46,11 @@ class FitData:
         found: Array | None = getattr(self, "deviation")  # noqa: B009 (a field of subclasses)
         return found
 
+    @property
+    def deviation_freedom(self) -> float:
+        """Degrees of freedom with which the deviations were estimated; infinite if known."""
+        return np.inf
+
     def predicted(self, system: ContactSystem) -> Array:
         """Numbers (n,) that a model gives in place of the measured ones; FecontactError if none."""
         raise NotImplementedError

@@ -137,6 +137,11 @@ class CurveData(FitData):
             return None
         return np.concatenate([curve.frequency_deviation_hz, curve.damping_deviation])
 
+    @property
+    def deviation_freedom(self) -> float:
+        """Degrees of freedom of the deviations of the curve."""
+        return self._curve.deviation_freedom
+
     def curves(self) -> list[Curve]:
         """Frequency and damping ratio over amplitude."""
         curve = self._curve

@@ -80,15 +80,11 @@ def marginal_diagrams(chains: Posterior, level: float = 0.95) -> list[Diagram]:
 
 def pair_diagrams(chains: Posterior, level: float = 0.95) -> dict[tuple[int, int], Diagram]:
     """Samples and the ellipse of the fit for each pair of parameters, by their numbers."""
-    from scipy.stats import chi2, f
-
     fit, log = chains.fit, _logarithmic(chains)
     every = max(1, len(chains.samples) // _SAMPLES)
     samples = chains.samples[::every]
-    weighted = fit.problem.weighted or fit.freedom < 1
-    reach = np.sqrt(chi2.ppf(level, 2) if weighted else 2.0 * f.ppf(level, 2, fit.freedom))
     turn = np.linspace(0.0, 2.0 * np.pi, _ELLIPSE)
-    circle = reach * np.array([np.cos(turn), np.sin(turn)])
+    circle = fit.reach(level, 2) * np.array([np.cos(turn), np.sin(turn)])
     found = {}
     for i, j in combinations(range(len(fit.names)), 2):
         covariance = fit.place_covariance[np.ix_([i, j], [i, j])]

@@ -69,6 +69,11 @@ class Problem:
                                else one.deviations for one in self.data])
 
     @property
+    def deviation_freedom(self) -> float:
+        """Least degrees of freedom of the deviations of the data; infinite if all are known."""
+        return min(one.deviation_freedom for one in self.data)
+
+    @property
     def parts(self) -> list[slice]:
         """Ranges of the residuals that belong to each data set."""
         ends = np.cumsum([0, *(len(one.measured) for one in self.data)]).tolist()

@@ -107,8 +107,6 @@ def profile_likelihood(
     InputError
         For another parameter, fewer than five points, or a level out of range.
     """
-    from scipy.stats import chi2, f
-
     require_kind("profile_likelihood", Fit, fit=fit)
     as_count(points, "profile_likelihood: points", 5)
     _ = fit[name]
@@ -138,7 +136,6 @@ def profile_likelihood(
                 continue
             u = np.array(done.places)
             found[j] = 2.0 * done.cost / scale
-    limit = float(chi2.ppf(level, 1) if weighted else f.ppf(level, 1, fit.freedom))
     one = fit.problem.parameters[k]
     return ProfileLikelihood(name, np.array([one.value(float(u)) for u in places]), found,
-                   float(np.nanmin(found)), limit, float(level))
+                   float(np.nanmin(found)), fit.reach(level) ** 2, float(level))

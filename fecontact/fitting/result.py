@@ -204,19 +204,43 @@ class Fit(Summarised):
         InputError
             If it is not above 0 and below 1.
         """
-        reach = self._quantile(level) * np.sqrt(np.diag(self.place_covariance))
+        reach = self.reach(level) * np.sqrt(np.diag(self.place_covariance))
         with np.errstate(over="ignore", invalid="ignore"):
             return {name: _between(one, float(u), float(off)) for name, one, u, off in zip(
                 self.names, self.problem.parameters, self.places, reach, strict=True)}
 
-    def _quantile(self, level: float) -> float:
-        from scipy.stats import norm, t
+    def reach(self, level: float, size: int = 1) -> float:
+        """Size, in deviations, of the region that contains ``size`` parameters together.
+
+        The root of the quantile of chi square for known deviations, and of ``size F`` for those
+        that were estimated, from residuals or from noise: for one parameter Student's quantile.
+
+        Parameters
+        ----------
+        level : float
+            Probability.
+        size : int
+            Number of parameters.
+
+        Raises
+        ------
+        InputError
+            If the level is not above 0 and below 1.
+        """
+        from scipy.stats import chi2, f
 
         if not (isinstance(level, int | float) and 0.0 < level < 1.0):
             raise InputError(f"intervals: level = {level!r} must be above 0 and below 1.")
-        part = 0.5 * (1.0 + level)
-        return float(norm.ppf(part) if self.problem.weighted or self.freedom < 1
-                     else t.ppf(part, self.freedom))
+        known = self._spread_freedom
+        return float(np.sqrt(size * f.ppf(level, size, known) if np.isfinite(known)
+                             else chi2.ppf(level, size)))
+
+    @property
+    def _spread_freedom(self) -> float:
+        """Degrees of freedom of the deviations of the data; infinite if they are known."""
+        if self.problem.weighted:
+            return self.problem.deviation_freedom
+        return float(self.freedom) if self.freedom > 0 else np.inf
 
     def bands(self, level: float = 0.95) -> list[tuple[Array, Array]]:
         """Lower and upper limits of the predicted numbers of each data set.
@@ -232,7 +256,7 @@ class Fit(Summarised):
         kept = s > _RANK * max(float(s[0]), 1e-300)
         moved = (self.jacobian * self.problem.deviations[:, None]) @ (
             directions[kept].T / s[kept])
-        reach = self._quantile(level) * np.linalg.norm(moved, axis=1)
+        reach = self.reach(level) * np.linalg.norm(moved, axis=1)
         return [(self.predicted[part] - reach[part], self.predicted[part] + reach[part])
                 for part in self.problem.parts]
 
@@ -278,10 +302,11 @@ class Fit(Summarised):
         if self.starts[0].message:
             found.append(self.starts[0].message)
         if self.problem.weighted and self.freedom > 0:
-            from scipy.stats import chi2
+            from scipy.stats import chi2, f
 
-            ratio = self.chi_square / self.freedom
-            if chi2.sf(self.chi_square, self.freedom) < 1e-3:
+            ratio, known = self.chi_square / self.freedom, self._spread_freedom
+            if (f.sf(ratio, self.freedom, known) if np.isfinite(known)
+                    else chi2.sf(self.chi_square, self.freedom)) < 1e-3:
                 found.append(f"The residuals are {np.sqrt(ratio):.2g} times the stated deviations: "
                              f"the model does not reproduce the data, or the deviations are too "
                              f"small; intervals are too narrow.")

@@ -47,6 +47,9 @@ class AmplitudeCurve(Summarised):
         Title of the amplitude, such as 'B x'.
     note : str
         Part of the data that was left out and the reason; empty for none.
+    deviation_freedom : float
+        Degrees of freedom with which the deviations were estimated, at least; infinite if they are
+        known.
 
     Raises
     ------
@@ -64,6 +67,7 @@ class AmplitudeCurve(Summarised):
     unit: str = "m"
     observed: str = ""
     note: str = ""
+    deviation_freedom: float = float("inf")
 
     def __post_init__(self) -> None:
         amplitude = as_floats(self.amplitude, "AmplitudeCurve: amplitude")

@@ -68,7 +68,8 @@ def ring_down(
     Returns
     -------
     AmplitudeCurve
-        One point for each window, with standard deviations by the noise beside the mode.
+        One point for each window, with standard deviations by the noise beside the mode, and the
+        degrees of freedom of these estimates.
 
     Raises
     ------
@@ -87,7 +88,8 @@ def ring_down(
     step = float(t[1] - t[0])
     f = _frequency(t, x, frequency_hz)
     half = _half_window(t, step, f, window)
-    middles = np.arange(half, len(x) - half, max(1, round(2 * half * (1.0 - overlap))))
+    apart = max(1, round(2 * half * (1.0 - overlap)))
+    middles = np.arange(half, len(x) - half, apart)
     scale = float(np.abs(x).max())
     if not scale > 0.0:
         raise AnalysisError("ring_down: all values are zero; there is no vibration to follow.")
@@ -107,7 +109,8 @@ def ring_down(
         scale * amplitude[kept] / size**order, size / (2.0 * np.pi), ratio,
         error / (2.0 * np.pi), error * np.sqrt(np.maximum(1.0 - ratio**2, 0.0)) / size,
         t[middles[kept]], _displacement(series.unit, order), series.title,
-        _note(half * step, int(np.count_nonzero(~kept)), len(kept)))
+        _note(half * step, int(np.count_nonzero(~kept)), len(kept)),
+        _noise_freedom(half, step, f, apart, len(middles)))
 
 
 def _displacement(unit: str, order: int) -> str:
@@ -221,9 +224,35 @@ def _fits(
 def _noise(weighted: Array, tau: Array, f: float) -> Array:
     """Mean power (P,) of weighted residuals (P, L) at frequencies beside the mode."""
     bin_ = 1.0 / float(tau[-1] - tau[0])
-    places = np.array([f + sign * k * bin_ for k in _BESIDE for sign in (-1.0, 1.0)])
-    waves = np.exp(-2j * np.pi * places[places > 0.0][:, None] * tau)
+    waves = np.exp(-2j * np.pi * _beside(f, bin_)[:, None] * tau)
     return np.asarray((np.abs(weighted @ waves.T) ** 2).mean(axis=1))
+
+
+def _beside(f: float, bin_: float) -> Array:
+    """Frequencies beside the mode at which noise is looked at [Hz]."""
+    places = np.array([f + sign * k * bin_ for k in _BESIDE for sign in (-1.0, 1.0)])
+    return places[places > 0.0]
+
+
+def _noise_freedom(half: int, step: float, f: float, apart: int, windows: int) -> float:
+    r"""Degrees of freedom of the variance of the noise at the ends of a record, the least.
+
+    It is the mean of M powers of transforms y_j of white noise, over frequencies and windows:
+    ``2 M^2 / sum (|C_jk|^2 + |P_jk|^2)`` with the correlations C of the y_j, and P of y_j with the
+    conjugate of y_k, which matters near frequency zero.
+    """
+    from scipy.signal import windows as shapes
+
+    shape = shapes.blackmanharris(2 * half + 1)
+    averaged = (min(_AVERAGED, windows) + 1) // 2
+    places = _beside(f, 1.0 / (2.0 * half * step))
+    turn = np.exp(-2j * np.pi * step * places[:, None] * np.arange(-half, half + 1))
+    y = np.zeros((averaged, len(places), 2 * half + 1 + apart * (averaged - 1)), dtype=complex)
+    for k in range(averaged):
+        y[k, :, k * apart : k * apart + 2 * half + 1] = turn * shape
+    y = y.reshape(averaged * len(places), -1)
+    squares = sum((np.abs(y @ other.T) ** 2).sum() for other in (y, y.conj()))
+    return float(2.0 * len(y) ** 2 * (shape @ shape) ** 2 / squares)
 
 
 def _equations(

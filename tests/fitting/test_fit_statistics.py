@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.stats import binom, chi2, t
+from scipy.stats import binom, chi2, f, norm, t
 
 import fecontact as fc
 from fecontact.fitting import FunctionData, profile_likelihood
@@ -234,6 +234,23 @@ def test_a_fit_that_was_cancelled_goes_on(tmp_path):
         fc.fit(system(), RANGES, FunctionData(counted, y, 0.02), starts=2, folder=tmp_path)
     fc.fit(system(), RANGES, FunctionData(counted, y, 0.02), starts=1, folder=tmp_path,
            overwrite=True)
+
+
+def test_deviations_that_were_estimated_widen_intervals_as_student_says():
+    """Ratios of a normal number and an estimated deviation have Student's distribution."""
+    class Estimated(FunctionData):
+        deviation_freedom = 8.0
+
+    y = 0.3 + 1.2 * PLACES
+    known, estimated = (fc.fit(system(), RANGES, kind(line, y, 0.1, PLACES))
+                        for kind in (FunctionData, Estimated))
+    widths = [np.ptp(one.intervals(0.9)[SLOPE]) for one in (known, estimated)]
+    assert widths[1] / widths[0] == pytest.approx(t.ppf(0.95, 8.0) / norm.ppf(0.95))
+    assert estimated.reach(0.9, 2) ** 2 == pytest.approx(2.0 * f.ppf(0.9, 2, 8.0))
+    assert profile_likelihood(estimated, SLOPE, points=5).limit == pytest.approx(
+        t.ppf(0.975, 8.0) ** 2)
+    assert np.ptp(estimated.bands()[0], axis=0) == pytest.approx(
+        np.ptp(known.bands()[0], axis=0) * t.ppf(0.975, 8.0) / norm.ppf(0.975))
 
 
 def test_pictures(tmp_path):

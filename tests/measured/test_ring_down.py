@@ -188,3 +188,18 @@ def test_wrong_input_is_told_in_one_sentence(call, told):
     t, x, _ = linear(end=1.0)
     with pytest.raises(fc.FecontactError, match=told):
         call(t, x)
+
+
+@pytest.mark.parametrize(("window", "times"), [(6.0, 4001), (10.0, 4001), (10.0, 8001)])
+def test_degrees_of_freedom_of_the_deviations_are_those_of_their_scatter(window, times):
+    """2 m^2 / v of the mean m and the variance v of an estimated variance, at both ends."""
+    rng = np.random.default_rng(3)
+    t = 2e-4 * np.arange(times)
+    x = np.exp(-t) * np.cos(2.0 * np.pi * 33.0 * t)
+    found = [ring_down(t, x + 0.01 * rng.standard_normal(times), derivative=0, window=window,
+                       frequency_hz=33.0) for _ in range(200)]
+    squares = np.array([one.frequency_deviation_hz for one in found]) ** 2
+    freedom = 2.0 * squares.mean(axis=0) ** 2 / squares.var(axis=0)
+    # Of 200 variances the scatter is known to about 15 %.
+    assert freedom.min() == pytest.approx(found[0].deviation_freedom, rel=0.45)
+    assert freedom.max() > freedom.min()
