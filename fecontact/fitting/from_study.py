@@ -1,14 +1,17 @@
 """Fits that a study describes: its ``[fit]`` section as data, and the fit of them."""
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fecontact.analysis.histories import quantity_unit
+from fecontact.analysis.receptance import response_unit
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, ModelWarning
 from fecontact.core.tables import located
 from fecontact.fitting.data import FitData
 from fecontact.fitting.data_in_time import DecayData, HistoryData, LoopData
@@ -27,6 +30,9 @@ from fecontact.measured.ring_down import ring_down
 from fecontact.study.fit_section import FitDataSettings, FitSettings
 from fecontact.study.study import Study
 from fecontact.system.contact_system import ContactSystem
+
+# Words of problems of a measurement that a fit does not stop for.
+_DOUBTS = ("gap", "thousandth", "overloaded")
 
 
 def fit_study(
@@ -86,7 +92,21 @@ def study_data(study: Study) -> tuple[FitData, ...]:
 def _measurement(study: Study, one: FitDataSettings, axis: Axis) -> Measurement:
     assert one.file is not None
     found = read_measurement(study.folder / one.file, axis=axis, units=dict(one.units) or None)
-    return found.between(one.t_start, one.t_end) if axis == "time" else found
+    found = found.between(one.t_start, one.t_end) if axis == "time" else found
+    for problem in found.problems:
+        if any(word in problem for word in _DOUBTS):
+            warnings.warn(f"{one.file}: {problem}.", ModelWarning, stacklevel=2)
+    return found
+
+
+def _channel(test: Measurement, channel: str | None, unit: str) -> int:
+    """Number of a channel; InputError if it has another unit."""
+    k = test.index(channel)
+    given = test.channels[k].unit
+    if given not in ("", unit):
+        raise InputError(f"channel '{test.names[k]}' has the unit {given}, but {unit} is needed "
+                         f"here; name another channel, or give its unit in units.")
+    return k
 
 
 def _initial(study: Study, one: FitDataSettings) -> Any:
@@ -109,12 +129,15 @@ class _Preloaded:
 
 def _loop(study: Study, one: FitDataSettings) -> FitData:
     test = _measurement(study, one, "time")
-    return LoopData(test.series(one.against)[1], test.series(one.channel)[1], one.deviation,
-                    one.along, name=one.name)
+    x, force = (test.series(_channel(test, name, unit))[1] for name, unit in (
+        (one.against, "m"), (one.channel, "N")))
+    return LoopData(x, force, one.deviation, one.along, name=one.name)
 
 
 def _history(study: Study, one: FitDataSettings) -> FitData:
-    time, values, _, _ = _measurement(study, one, "time").series(one.channel)
+    test = _measurement(study, one, "time")
+    time, values, _, _ = test.series(_channel(test, one.channel, quantity_unit(
+        one.quantity, one.component)))
     return HistoryData(time, values, one.deviation, one.quantity, one.point, one.component,
                        _initial(study, one), name=one.name)
 
@@ -151,9 +174,10 @@ def _receptance(study: Study, one: FitDataSettings) -> FitData:
     test = _measurement(study, one, "frequency")
     k = test.index(one.channel)
     kind = response_kind(test.channels[k].unit)
-    return ReceptanceData(test.abscissa, np.asarray(test.values[:, k], dtype=complex),
-                          (one.excitation, one.excitation_component), (one.point, one.component),
-                          one.deviation, kind, None if one.about == "none" else one.about,
+    pushed, seen = (one.excitation, one.excitation_component), (one.point, one.component)
+    _channel(test, one.channel, response_unit(kind, seen, pushed))
+    return ReceptanceData(test.abscissa, np.asarray(test.values[:, k], dtype=complex), pushed,
+                          seen, one.deviation, kind, None if one.about == "none" else one.about,
                           name=one.name)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from fecontact.core.units import Summarised, listed
 from fecontact.fitting.data import FitData
 from fecontact.fitting.problem import Problem
 from fecontact.fitting.search import SearchOptions
+from fecontact.measured.assurance import scale_question
 from fecontact.study.fit_section import values_of
 from fecontact.system.contact_system import ContactSystem
 
@@ -20,6 +22,7 @@ from fecontact.system.contact_system import ContactSystem
 # cannot be found; least component that is named, and least ratio of singular values.
 _LOST, _NAMED, _RANK = 0.5, 0.2, 1e-9
 _AT_BOUND = 1e-6
+_TOGETHER = 0.995  # correlation from which on two parameters are named
 
 
 @read_only_arrays
@@ -296,6 +299,7 @@ class Fit(Summarised):
                   for name in self.on_bounds]
         found += [f"The derivatives over {name} to both sides differ: a contact changes its state "
                   f"there, and its interval is a rough one." for name in self.kinks]
+        found += self._pairs() + self._unit_questions()
         failed = [one for one in self.starts if one.failed]
         if failed:
             found.append(f"{len(failed)} of {len(self.starts)} starts failed: {failed[0].message}")
@@ -311,6 +315,27 @@ class Fit(Summarised):
                              f"the model does not reproduce the data, or the deviations are too "
                              f"small; intervals are too narrow.")
         return tuple(found)
+
+    def _pairs(self) -> list[str]:
+        """Sentences on parameters that hardly differ in what they change."""
+        found, correlation = [], self.correlation
+        for (i, one), (j, other) in combinations(enumerate(self.names), 2):
+            value = float(correlation[i, j])
+            named = any(one in text and other in text for text in self.not_found)
+            if abs(value) > _TOGETHER and not named:
+                found.append(f"{one} and {other} are hardly told apart: their correlation is "
+                             f"{value:.5f}.")
+        return found
+
+    def _unit_questions(self) -> list[str]:
+        """Questions about data that are about 1000 times what the model gives."""
+        found = []
+        for one, part in zip(self.data, self.problem.parts, strict=True):
+            for curve in one.curves():
+                both = one.measured[curve.part], self.predicted[part][curve.part]
+                if all(values.any() for values in both):
+                    found.append(scale_question(*both, names=(one.title,)))
+        return [question for question in found if question]
 
     def rows(self, level: float = 0.95) -> list[tuple[str, str, str, str]]:
         """Rows of a table: name, value, limits of the interval."""

@@ -250,9 +250,9 @@ def _noise_freedom(half: int, step: float, f: float, apart: int, windows: int) -
     y = np.zeros((averaged, len(places), 2 * half + 1 + apart * (averaged - 1)), dtype=complex)
     for k in range(averaged):
         y[k, :, k * apart : k * apart + 2 * half + 1] = turn * shape
-    y = y.reshape(averaged * len(places), -1)
-    squares = sum((np.abs(y @ other.T) ** 2).sum() for other in (y, y.conj()))
-    return float(2.0 * len(y) ** 2 * (shape @ shape) ** 2 / squares)
+    rows = y.reshape(averaged * len(places), -1)
+    squares = sum((np.abs(rows @ other.T) ** 2).sum() for other in (rows, rows.conj()))
+    return float(2.0 * len(rows) ** 2 * (shape @ shape) ** 2 / squares)
 
 
 def _equations(

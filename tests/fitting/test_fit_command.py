@@ -201,7 +201,8 @@ changes = { "drive.amplitude_x" = 1e-4 }
     ('"force"', '"forc"', "did you mean 'force'"),
     ("deviation = 0.5", "deviation = 0.0", "must be a finite number above zero"),
     ("friction.stiffness = {", "friction.stifness = {", "did you mean 'stiffness'"),
-    ('kind = "loop"', 'kind = "history"\ninitial = "preload"', "needs the section [preload]"),
+    ('kind = "loop"', 'kind = "history"\nquantity = "total_friction_force"\ninitial = "preload"',
+     "needs the section [preload]"),
 ])
 def test_what_is_wrong_in_a_study_is_told(old, new, told, study, cli):
     assert old in STUDY
@@ -211,6 +212,38 @@ def test_what_is_wrong_in_a_study_is_told(old, new, told, study, cli):
     assert told in said
     assert said.count("\n") == 1
     assert not (study.parent / "results").exists()
+
+
+def changed_table(study, change):
+    path = study.parent / "loop.csv"
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join(change(lines)) + "\n")
+
+
+def test_channels_of_other_units_are_refused(study, cli):
+    study.write_text(STUDY.replace('channel = "force"', 'channel = "pull"'))
+    code, _, said = cli("fit", str(study))
+    assert code == 1
+    assert "channel 'pull' has the unit m, but N is needed here" in said
+    study.write_text(STUDY)
+    changed_table(study, lambda lines: [lines[0].replace("[mm]", "[km]"), *lines[1:]])
+    assert "channel 'pull' has the unit km, but m is needed here" in cli("fit", str(study))[2]
+
+
+def test_gaps_and_factors_of_a_thousand_are_told(study, cli):
+    changed_table(study, lambda lines: [lines[0].replace("[N]", "[kN]"), *lines[1:8], *lines[12:]])
+    code, _, said = cli("fit", str(study), "--set", "fit.starts=1")
+    assert code == 0
+    assert "The times have 1 gap, the first of 5 s after 6 s" in said
+    assert "are they in a unit that is 1000 times the SI unit?" in said
+
+
+def test_parameters_that_are_hardly_told_apart_are_named(study, cli):
+    study.write_text(STUDY.replace("[fit.parameters]", '''[fit.parameters]
+load.normal = { low = 30.0, high = 300.0, start = 100.0, scale = "log" }'''))
+    code, _, said = cli("fit", str(study), "--set", "fit.starts=1")
+    assert code == 0
+    assert "load.normal and friction.friction_coefficient" in said
 
 
 def test_a_study_without_the_section(study, cli):
