@@ -19,7 +19,7 @@ from fecontact.bifurcation import (
     resonance_curve,
 )
 from fecontact.bifurcation.harmonic import starts
-from fecontact.bifurcation.harmonic.response import rest_state
+from fecontact.bifurcation.harmonic.forced_starts import rest_state
 from fecontact.bifurcation.harmonic.starts import problem_for
 from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem
 from fecontact.core.errors import AnalysisError, InputError

@@ -1,6 +1,6 @@
 """Nonlinear frequency responses: branches of forced orbits at several levels."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from numbers import Real
 from types import NoneType
@@ -20,7 +20,6 @@ from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
     options_of,
-    width_of,
 )
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import (
@@ -28,16 +27,15 @@ from fecontact.bifurcation.fields.contact_field import (
     field_between,
 )
 from fecontact.bifurcation.fields.observed_row import observed_row
-from fecontact.bifurcation.harmonic import branches, starts
-from fecontact.bifurcation.harmonic.compiled.arrays import RESTS
+from fecontact.bifurcation.harmonic import branches
 from fecontact.bifurcation.harmonic.engine_order import WaveField
+from fecontact.bifurcation.harmonic.forced_starts import Forced, start_of
 from fecontact.bifurcation.harmonic.layout import Layout, layout_from, layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import (
     observed_of_series,
 )
-from fecontact.bifurcation.harmonic.problem import HarmonicProblem
-from fecontact.bifurcation.harmonic.stalled import NO_WAVE, stall_reason
+from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.orbit_methods import Method
 from fecontact.bifurcation.orbits.branches import orbit_branch
 from fecontact.bifurcation.orbits.discretisations import (
@@ -56,10 +54,8 @@ from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.initial_state import initial_state
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
-from fecontact.system.model_limits import unresisted_motion
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
-from fecontact.system.statics.equilibrium import equilibrium_coordinates
 
 # Points of a branch at most, and largest step, unless options say so.
 _POINTS, _LARGEST = 2000, 0.03
@@ -279,15 +275,15 @@ def frequency_response(
     low, high = chosen.bounds
     first = inside(low if start is None else float(start), chosen)
     found: list[Branch] = []
+    level = None if level_name is None else field.index(level_name)
+    follow = branch_of_response if discretisation_by(how).finds_responses else _by_orbit_method
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
+        wanted = Forced(field, given, field.index(name), how, chosen, held, level)
         try:
-            further = _with_level(field, observed, row, level_name, float(value))
-            both = low < first < high
-            follow = (branch_of_response if discretisation_by(how).finds_responses
-                      else _by_orbit_method)
-            branch = follow(field, given, field.index(name), level_name, first, how, chosen, held,
-                            row, further, both=both)
+            branch = follow(wanted, first, row,
+                            _with_level(field, observed, row, level_name, float(value)),
+                            both=low < first < high)
         except KeyboardInterrupt:
             if not found:
                 raise
@@ -333,21 +329,20 @@ def levels_of(levels: Mapping[str, ArrayLike] | None) -> tuple[str | None, Array
 
 
 def branch_of_response(
-    field: VectorField, values: Array, free: int, level_name: str | None, first: float,
-    method: Any, options: ContinuationOptions, held: Array | None = None,
-    row: Array | None = None, further: Mapping[str, Any] | None = None, *, both: bool,
+    wanted: Forced, first: float, row: Array | None = None,
+    further: Mapping[str, Any] | None = None, *, both: bool = False,
 ) -> Branch:
-    """The branch at one level; ``held`` (d,) is the state of a preload.
+    """The branch at one level, from the first value of the parameter, by harmonic balance.
 
     ``row`` (d,) is what is observed, if anything, ``further`` are attributes of the branch.
     """
+    field, options = wanted.field, wanted.options
     if row is not None:
         _require_observable(layout_of(field), row)
-    begin, problem, u = _started(field, values, free, level_name, first, method, options, held,
-                                 both=both)
+    begin, problem, u = start_of(wanted, first, both=both)
     if row is not None:
         problem = replace(problem, row=row)
-    branch = branches.follow(problem, u, None, method, options, further,
+    branch = branches.follow(problem, u, None, wanted.method, options, further,
                              direction=_inwards(begin, options), both=both)
     message = stall_reason(field, branch)
     return branch if message == branch.message else replace(branch, message=message)
@@ -358,59 +353,22 @@ def _inwards(begin: float, options: ContinuationOptions) -> float:
     return 1.0 if begin < options.bounds[1] else -1.0
 
 
-def _started(
-    field: VectorField, values: Array, free: int, level_name: str | None, first: float,
-    method: HarmonicBalance, options: ContinuationOptions, held: Array | None, *, both: bool,
-) -> tuple[float, HarmonicProblem, Array]:
-    """Value of the parameter, problem and unknowns of the orbit from which a branch starts."""
-    ends = [first] if both else [first, *(end for end in options.bounds if end != first)]
-    failure: FecontactError = AnalysisError("No orbit was found to start from.")
-    for begin in ends:
-        values = values.copy()
-        values[free] = begin
-        attempts: list[Callable[[], tuple[HarmonicProblem, Array]]] = [
-            lambda values=values: _from_rest(  # type: ignore[misc]
-                field, values, free, method, options, held)]
-        if level_name is not None:
-            attempts.append(lambda values=values: _raised(  # type: ignore[misc]
-                field, values, free, field.index(level_name), method, options, held))
-        if isinstance(field, WaveField):
-            attempts.append(lambda values=values: _excited_further(  # type: ignore[misc]
-                field, values, free, method, options, held))
-        elif isinstance(field, ContactField) and method.repeats is None:
-            attempts.append(lambda values=values: _from_run(  # type: ignore[misc]
-                field, values, free, method, options, held))
-        for attempt in attempts:
-            try:
-                return begin, *attempt()
-            except FecontactError as error:
-                failure = error
-    # The supports of a wheel's sector are those of the wheel.
-    resisted = isinstance(failure, InputError) or isinstance(field, WaveField)
-    if isinstance(field, ContactField) and not resisted and (
-            free_motion := unresisted_motion(field.system(values))):
-        raise AnalysisError(f"No orbit was found to start from. {free_motion}") from failure
-    raise failure
-
-
 def _by_orbit_method(
-    field: VectorField, values: Array, free: int, level_name: str | None, first: float,
-    method: Any, options: ContinuationOptions, held: Array | None, row: Array,
-    further: Mapping[str, Any], *, both: bool,
+    wanted: Forced, first: float, row: Array, further: Mapping[str, Any], *, both: bool
 ) -> Branch:
     """The branch at one level by collocation or shooting, from the orbit of harmonic balance.
 
     Where harmonic balance finds none, it starts from the motion to which a run settles; set-valued
     orbits from a run by their solver, as harmonic balance knows smoothed laws alone.
     """
+    field, options, begin = wanted.field, wanted.options, first
     _require_observable(layout_of(field), row)
-    name, begin = list(field.parameters)[free], first
-    solver = method.solver
+    solver = wanted.method.solver
     try:
         if not solver.smooth:
             raise AnalysisError("Harmonic balance knows no set-valued laws.")
-        begin, problem, u = _started(field, values, free, level_name, first,
-                                     HarmonicBalance(stability=None), options, held, both=both)
+        begin, problem, u = start_of(replace(wanted, method=HarmonicBalance(stability=None)),
+                                     first, both=both)
         found = problem.linearise(u)
         states = np.vstack([found.states, found.states[:1]])
         motion = PeriodicMotion(np.linspace(0.0, 1.0, len(states)) * found.period, states,
@@ -418,15 +376,13 @@ def _by_orbit_method(
     except FecontactError:
         if not isinstance(field, ContactField):
             raise
-        there = values.copy()
-        there[free] = begin
+        there = wanted.at(begin).values
         motion = periodic_motion(field.system(there), longest_period=field.forcing_period(there),
                                  solver=solver)
-    at = values.copy()
-    at[free] = begin
+    motion = replace(motion, parameter_values=wanted.at(begin).values)
     try:
-        branch = orbit_branch(field, replace(motion, parameter_values=at), name, method=method,
-                              options=options, direction=_inwards(begin, options), both=both)
+        branch = orbit_branch(field, motion, wanted.name, method=wanted.method, options=options,
+                              direction=_inwards(begin, options), both=both)
     except AnalysisError as error:
         if not layout_of(field).memory:
             raise
@@ -447,148 +403,6 @@ def _observed_along(
                             details_of(point), header)
               for point, values in zip(branch.points, seen, strict=True)]
     return replace(branch, points=tuple(points), attributes=attributes)
-
-
-def _problem(
-    field: VectorField, values: Array, free: int, method: HarmonicBalance,
-    options: ContinuationOptions, held: Array | None,
-) -> HarmonicProblem:
-    """The problem with scales of the states that grow with the response.
-
-    Elements that never slide keep the deflection of the state ``held``, or of rest.
-    """
-    name = list(field.parameters)[free]
-    scales = np.ones(field.dimension + 2)
-    scales[-1] = width_of(None, options, float(values[free]))
-    problem = starts.problem_for(field, values, free, method, scales,
-                                 limits=np.full(field.dimension, 1e4))
-    if problem.autonomous:
-        raise InputError("Nothing excites the system with a period; a frequency response needs a "
-                         "harmonic drive or load.")
-    scales[-2] = problem.period(values[[free]])
-    if not np.isfinite(scales[-2]):
-        raise InputError(f"At {name} = {values[free]:g} the excitation has no period.")
-    if isinstance(field, ContactField) and method.orders is not None:
-        starts.require_mean(method, rest_state(field, values)[: problem.layout.displacements])
-    if isinstance(field, ContactField) and problem.layout.memory:
-        state = rest_state(field, values) if held is None else held
-        problem = replace(problem, kept=problem.kept.left_by(state[None]))
-    return problem
-
-
-def _from_rest(
-    field: VectorField, values: Array, free: int, method: HarmonicBalance,
-    options: ContinuationOptions, held: Array | None,
-) -> tuple[HarmonicProblem, Array]:
-    """The orbit that Newton's method finds from rest, and scales of its size."""
-    problem = _problem(field, values, free, method, options, held)
-    u = np.append(np.zeros(problem.size), values[free])
-    if isinstance(field, ContactField) and not _rests_at_zero(problem, field, u):
-        state = rest_state(field, values)
-        u = starts.unknowns(problem, np.tile(state, (problem.samples, 1)), 0.0)
-    return _scaled(*starts.converged_orbit(problem, u))
-
-
-def _rests_at_zero(problem: HarmonicProblem, field: ContactField, u: Array) -> bool:
-    """Whether all forces without displacement are known to have no mean."""
-    e = problem.equations(float(u[-1]))
-    return (e is not None and not problem.layout.memory and e.numbers[RESTS] != 0.0
-            and not field.system().basis.springs)
-
-
-def rest_state(field: ContactField, values: Array) -> Array:
-    """State (d,) of rest under the loads' means, of the normal problem alone."""
-    state = np.zeros(field.dimension)
-    if isinstance(field, WaveField):
-        return field.waves.rest(field, values)
-    try:
-        q = equilibrium_coordinates(field.system(values), "rest", 0.0, standing=True)
-    except FecontactError:
-        return state
-    state[: len(q)] = q
-    return state
-
-
-def _scaled(problem: HarmonicProblem, u: Array) -> tuple[HarmonicProblem, Array]:
-    """The problem with scales of the size of an orbit; it is found again to their precision."""
-    if problem.layout.memory:
-        low, high = problem.extremes(u, problem.linearise(u).memory)
-        sizes = (high - low) / 2.0
-    else:
-        states = problem.states(u, problem.period(u), np.zeros((problem.samples, 0)))
-        sizes = (states.max(axis=0) - states.min(axis=0)) / 2.0
-    largest = float(sizes.max()) or 1.0
-    sizes = np.maximum(sizes, 1e-3 * largest)
-    scales = np.concatenate([sizes, problem.scales[-2:]])
-    scaled = replace(problem, scales=scales, limits=1e4 * sizes)
-    # A branch begins so by itself where that is quick.
-    return (scaled, u) if scaled.equations(float(u[-1])) else starts.converged_orbit(scaled, u)
-
-
-def _excited_further(
-    field: WaveField, values: Array, free: int, method: HarmonicBalance,
-    options: ContinuationOptions, held: Array | None,
-) -> tuple[HarmonicProblem, Array]:
-    """The wave at full excitation, along a branch from a thousandth of it."""
-    part = field.waves.excited(field, values)
-    try:
-        states = _up_to(part, part.values, 0, 1.0, method, options, held)
-    except AnalysisError as error:
-        said = str(error).replace("No orbit was found at the level 1",
-                                  "No wave was found under the whole excitation")
-        raise AnalysisError(f"{said} {NO_WAVE}") from None
-    return _taken(field, values, free, method, options, states, held)
-
-
-def _raised(
-    field: VectorField, values: Array, free: int, level: int, method: HarmonicBalance,
-    options: ContinuationOptions, held: Array | None,
-) -> tuple[HarmonicProblem, Array]:
-    """The orbit at a level, along a branch from a thousandth of it."""
-    return _taken(field, values, free, method, options, _up_to(
-        field, values, level, float(values[level]), method, options, held), held)
-
-
-def _up_to(
-    field: VectorField, values: Array, level: int, wanted: float, method: HarmonicBalance,
-    options: ContinuationOptions, held: Array | None,
-) -> Array:
-    """States (k, d) over the period of the orbit at a level, along a branch to it."""
-    low = values.copy()
-    low[level] = 1e-3 * wanted
-    bounds = (min(low[level], wanted), max(low[level], wanted))
-    plain = replace(method, tolerance=None, sampling_tolerance=None)
-    problem, u = _from_rest(field, low, level, plain, replace(options, bounds=bounds), held)
-    branch = branches.follow(problem, u, None, plain, replace(
-        options, bounds=bounds, locate=False, progress=None), direction=np.sign(wanted))
-    if branch.status is BranchStatus.INTERRUPTED:
-        raise KeyboardInterrupt
-    last = branch.points[-1]
-    if last.parameter != wanted:
-        raise AnalysisError(f"No orbit was found at the level {wanted:g}: raised from a thousandth "
-                            f"of it, the branch ends at {last.parameter:.4g}.")
-    return np.asarray(last.orbit(samples=501).states)
-
-
-def _from_run(
-    field: ContactField, values: Array, free: int, method: HarmonicBalance,
-    options: ContinuationOptions, held: Array | None,
-) -> tuple[HarmonicProblem, Array]:
-    """The orbit to which a run settles."""
-    motion = periodic_motion(field.system(values), longest_period=field.forcing_period(values))
-    return _taken(field, values, free, method, options, motion.states, held)
-
-
-def _taken(
-    field: VectorField, values: Array, free: int, method: HarmonicBalance,
-    options: ContinuationOptions, states: Array, held: Array | None,
-) -> tuple[HarmonicProblem, Array]:
-    """The orbit near states (k, d) over a period, both ends included."""
-    problem = _problem(field, values, free, method, options, held)
-    phases = np.linspace(0.0, 1.0, len(states))
-    sampled = np.stack([np.interp(problem.series.times, phases, column) for column in states.T],
-                       axis=1)
-    return _scaled(*starts.converged_orbit(problem, starts.unknowns(problem, sampled, 0.0)))
 
 
 def observed_amplitudes(branch: Branch, row: Array) -> Array:

@@ -19,6 +19,7 @@ from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import starts
+from fecontact.bifurcation.harmonic.forced_starts import Forced, rest_state
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.response import (
     FrequencyResponse,
@@ -26,7 +27,6 @@ from fecontact.bifurcation.harmonic.response import (
     branch_of_response,
     observed_amplitudes,
     preloaded,
-    rest_state,
 )
 from fecontact.bifurcation.nonlinear_modes.peak_problem import HELD, PeakProblem
 from fecontact.core.checks import as_floats, require_kind
@@ -145,9 +145,8 @@ def _started(
             events={_REACHED: lambda found: found["observed_amplitude"] / amplitude - 1.0},
             stop_at=[_REACHED])
         try:
-            branch = branch_of_response(field, values, force, None, given.bounds[0],
-                                        replace(plain, stability=None), given, held, both=False,
-                                        row=row)
+            level = Forced(field, values, force, replace(plain, stability=None), given, held)
+            branch = branch_of_response(level, given.bounds[0], row)
         except FecontactError as error:
             failed = error
             break

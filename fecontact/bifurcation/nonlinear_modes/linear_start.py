@@ -10,7 +10,7 @@ from fecontact.bifurcation.equilibria.equilibrium import find_equilibrium, stead
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
 from fecontact.bifurcation.harmonic.engine_order import EngineOrder, WaveField, Waves
-from fecontact.bifurcation.harmonic.response import rest_state
+from fecontact.bifurcation.harmonic.forced_starts import rest_state
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ComplexArray
 from fecontact.laws.excitation import BOUNDARY_STRESSES, BoundaryLoad, Drive, Load

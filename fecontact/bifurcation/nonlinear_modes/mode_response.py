@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
-from fecontact.bifurcation.harmonic.response import levels_of, rest_state
+from fecontact.bifurcation.harmonic.forced_starts import rest_state
+from fecontact.bifurcation.harmonic.response import levels_of
 from fecontact.bifurcation.nonlinear_modes.given_force import given_force, require_excitation
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode
 from fecontact.core.checks import require_kind

@@ -14,13 +14,13 @@ from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import starts
+from fecontact.bifurcation.harmonic.forced_starts import Forced, rest_state
 from fecontact.bifurcation.harmonic.layout import layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.response import (
     branch_of_response,
     observed_amplitudes,
     preloaded,
-    rest_state,
 )
 from fecontact.bifurcation.nonlinear_modes.given_force import given_force
 from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem
@@ -211,8 +211,9 @@ def _first(
     # Kinks jump the stability, which does not matter here.
     given = options_of(ContinuationOptions(points=2000, largest_step=_RESPONSE, locate=False),
                        frequencies)
-    branch = branch_of_response(field, values, free, None, given.bounds[0],
-                                replace(method, tolerance=None), given, held, both=False)
+    branch = branch_of_response(
+        Forced(field, values, free, replace(method, tolerance=None), given, held),
+        given.bounds[0])
     sizes = observed_amplitudes(branch, row)
     place = int(np.argmax(sizes))
     if place in (0, len(sizes) - 1):
