@@ -172,6 +172,6 @@ def test_a_rigid_motion_that_nothing_resists_is_named(monkeypatch):
         raise AnalysisError("Newton's method does not converge.")
 
     for name in ("_from_rest", "_raised", "_from_run"):
-        monkeypatch.setattr(f"fecontact.bifurcation.harmonic.response.{name}", no_orbit)
+        monkeypatch.setattr(f"fecontact.bifurcation.harmonic.forced_starts.{name}", no_orbit)
     with pytest.raises(AnalysisError, match="Nothing but friction resists a rotation"):
         frequency_response(system, (40.0, 160.0))
