@@ -183,3 +183,32 @@ def test_maps_of_names_have_one_colour_each():
     assert [to_hex(colour) for colour in image.to_rgba(image.get_array())[0, :2]] == [
         "#ff0000", "#00ff00"]
     assert [text.get_text() for text in figure.axes[1].get_yticklabels()] == ["open", "stick"]
+
+
+@pytest.mark.parametrize("logarithmic", [False, True])
+def test_a_page_has_the_colours_of_a_picture(logarithmic):
+    values = np.array([[1e3, 2e4, np.nan], [5e4, 7e3, 1e5]])
+    one = Map(np.array([0.0, 1e-3, 2e-3, 4e-3]), np.array([0.0, 1.0, 3.0]), values,
+              Scale("pressure [Pa]", "inferno", logarithmic=logarithmic))
+    diagram = Diagram("gap [m]", "speed [m/s]", maps=(one,))
+    header, contents = table_of(diagram)
+    (shown,) = header["one"]["maps"]
+    assert stored_array(shown["x"], contents) == pytest.approx([0.0, 1.0, 2.0, 4.0], abs=1e-5)
+    assert stored_array(shown["y"], contents) == pytest.approx([0.0, 1.0, 3.0], abs=1e-5)
+    cells, shades = stored_array(shown["cells"], contents).astype(int), np.array(shown["shades"])
+    assert (cells == 0).tolist() == [False, False, True, False, False, False]
+    with new_figure(4.0, 3.0) as figure:
+        (image,) = draw(figure.subplots(), diagram)
+    expected = 255.0 * image.to_rgba(image.get_array()).reshape(6, 4)[:, :3]
+    known = cells > 0
+    assert np.abs(shades[cells[known] - 1] - expected[known]).max() < 6.0
+    assert (shown["label"], shown["ends"]) == ("pressure [kPa]", ["1", "100"])
+
+
+def test_a_page_has_the_names_of_a_map():
+    one = Map(np.arange(4.0), np.arange(2.0), np.array([[0.0, 1.0, np.nan]]), Scale(
+        "state", ("#ff0000", "#00ff00"), ("open", "stick")))
+    header, contents = table_of(Diagram("x", "y", maps=(one,)))
+    (shown,) = header["one"]["maps"]
+    assert stored_array(shown["cells"], contents).tolist() == [1.0, 2.0, 0.0]
+    assert (shown["shades"], shown["names"]) == ([[255, 0, 0], [0, 255, 0]], ["open", "stick"])

@@ -1,17 +1,20 @@
 """Diagrams as parts of a page, and those of a run: histories, spectra, phase planes, energies."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fecontact.analysis.histories import Point
-from fecontact.analysis.spectra import amplitude_spectrum
+from fecontact.analysis.spectra import amplitude_spectrum, spectrogram
+from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.diagrams.colours import distinct_colours
 from fecontact.output.diagrams.diagram import Curve, Diagram
-from fecontact.output.diagrams.labels import name_and_unit
+from fecontact.output.diagrams.labels import in_unit, name_and_unit
+from fecontact.output.diagrams.maps import Map, spectrogram_map
 from fecontact.output.diagrams.runs import (
     AXES,
     energy_diagrams,
@@ -20,12 +23,14 @@ from fecontact.output.diagrams.runs import (
     motion_diagrams,
     usual_points,
 )
-from fecontact.output.diagrams.spectra import spectrum_diagram
+from fecontact.output.diagrams.spectra import end_of_content, spectrum_diagram
 from fecontact.output.report.payload import SMALLEST, Payload
 
 _OVER_TIME = 1e-4  # error of curves over time, as a part of their largest value
 _STEP = 1e-5  # error of other ordinates
 _ACROSS = 1e-6  # error of abscissae, as a part of their range
+_SHADES = 64  # of a map of numbers
+_ROWS = 160  # frequencies of a spectrogram, at most
 _FEWEST = 16  # output times of a spectrum
 _FLAT = 1e-9  # of the largest motion, below which a spectrum is round-off
 
@@ -70,12 +75,40 @@ def diagram_table(
         if solid is not None and not solid.all():
             line["solid"] = payload.add(solid)
         lines.append(line)
+    maps = [_map_table(one, shown, payload) for one in diagram.maps]
     return {"title": diagram.title or name, "unit": unit, "factor": factor, "xLabel": x_label,
             "log": diagram.logarithmic, "limits": limits, "lines": lines,
+            "maps": maps,
             "levels": [[level.axis, float(shown(level.axis, np.array(level.value)))]
                        for level in diagram.levels],
             "marks": [[float(shown("x", np.array(mark.x))), float(shown("y", np.array(mark.y))),
                        mark.letters or mark.kind] for mark in diagram.marks]}
+
+
+def _map_table(
+    one: Map, shown: Callable[[str, Array], Array], payload: Payload
+) -> dict[str, Any]:
+    """A map as a part of a page: borders, the number of each cell's colour, and the colours."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_rgb
+
+    scale, (low, high) = one.scale, one.ends
+    values = one.values
+    if isinstance(scale.colours, str):
+        colours = colormaps[scale.colours](np.linspace(0.0, 1.0, _SHADES))[:, :3]
+        if scale.logarithmic:
+            low, high, values = np.log(low), np.log(high), np.log(values)
+        values = np.clip(np.rint((_SHADES - 1) * (values - low) / (high - low)), 0, _SHADES - 1)
+    else:
+        colours = np.array([to_rgb(name) for name in scale.colours])
+    factor, label = in_unit(scale.label, np.array(one.ends))
+    edges = {axis: shown(axis, getattr(one, axis)) for axis in ("x", "y")}
+    return {**{axis: payload.add(at, max(_ACROSS * float(np.ptp(at)), SMALLEST))
+               for axis, at in edges.items()},
+            "cells": payload.add(np.where(np.isfinite(values), values + 1.0, 0.0).ravel()),
+            "shades": np.rint(255.0 * colours).astype(int).tolist(), "names": list(scale.names),
+            "label": label, "ends": [*scale.names[:1], *scale.names[-1:]]
+            or [f"{end / factor:.4g}" for end in one.ends]}
 
 
 def chart_tables(
@@ -118,8 +151,29 @@ def spectrum_tables(
                  for point, colour, one in zip(points, distinct_colours(len(points)), motions,
                                                strict=True)
                  if np.ptp(one[:, axis]) > _FLAT * largest]
-        charts += spectrum_table(f"velocity {letter}", "m/s", lines, payload) if lines else []
+        if found := spectrum_table(f"velocity {letter}", "m/s", lines, payload) if lines else []:
+            charts += [*found, *spectrogram_charts(f"velocity {letter}", "m/s", lines[0], payload)]
     return charts
+
+
+def spectrogram_charts(
+    title: str, unit: str, line: Curve, payload: Payload
+) -> list[dict[str, Any]]:
+    """A chart of the amplitudes of a history over time and frequency; none for a short history."""
+    try:
+        found = spectrogram(line.x, line.y, resample=True)
+    except InputError:  # too few periods
+        return []
+    if len(found.time) < _FEWEST:
+        return []
+    end = end_of_content(found.frequency_hz, found.values.max(axis=1))
+    kept = max(int(np.searchsorted(found.frequency_hz, end)) + 1, 2)
+    step = -(-kept // _ROWS)
+    thin = replace(found, frequency_hz=found.frequency_hz[:kept:step], values=np.maximum.reduceat(
+        found.values[:kept], np.arange(0, kept, step), axis=0))
+    return [diagram_table(Diagram(
+        "time [s]", "frequency [Hz]", maps=(spectrogram_map(thin, unit),),
+        title=f"{' of '.join(filter(None, (title, line.name)))}: frequency over time"), payload)]
 
 
 def spectrum_table(

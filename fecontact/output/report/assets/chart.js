@@ -81,10 +81,10 @@ class Chart {
   // lines: [{name, colour, width?, x?, y, solid?, marker?, bars?, limits?}] with arrays; without x over
   // the time of the clock; bars and shaded limits have [lower, upper] ends.
   // Logarithmic axes, named in `log`, have common logarithms; `limits` fixes ends of axes, `marks` are
-  // places with letters, `levels` straight lines at a value of an axis.
+  // places with letters, `levels` straight lines at a value of an axis, `maps` coloured cells behind them.
   constructor(clock, { title, unit, xLabel, lines, legend = lines, height = 132, kind = "chart",
-    log = "", limits = {}, marks = [], levels = [] }) {
-    Object.assign(this, { clock, lines, xLabel, height, log, marks, levels, ends: limits });
+    log = "", limits = {}, marks = [], levels = [], maps = [] }) {
+    Object.assign(this, { clock, lines, xLabel, height, log, marks, levels, maps, ends: limits });
     this.base = el("canvas");
     this.top = el("canvas");
     this.box = el("div.plot", {}, this.base, this.top);
@@ -115,7 +115,7 @@ class Chart {
     this.point();
   }
 
-  get overTime() { return !this.lines[0].x; }
+  get overTime() { return this.lines.length > 0 && !this.lines[0].x; }
 
   limits() {
     const [i0, i1] = this.clock.window();
@@ -130,7 +130,9 @@ class Chart {
           }
         }
       }
-      const room = 0.06 * (high - low) || 0.1 * abs(high) || 1, [first, last] = this.ends[name] ?? [];
+      for (const one of this.maps) [low, high] = [min(low, one[name].values[0]), max(high, one[name].values.at(-1))];
+      const room = this.maps.length ? 0 : 0.06 * (high - low) || 0.1 * abs(high) || 1;
+      const [first, last] = this.ends[name] ?? [];
       return [first ?? low - room, last ?? high + room];
     };
     return { x: this.overTime ? this.clock.shown() : span("x"), y: span("y") };
@@ -159,6 +161,7 @@ class Chart {
     c.beginPath();
     c.rect(left, top - 1, right - left, bottom - top + 2);
     c.clip();
+    for (const one of this.maps) this.coloured(c, one);
     c.strokeStyle = css("mark");
     c.beginPath();
     for (const [name, value] of this.levels) {
@@ -193,6 +196,17 @@ class Chart {
     c.stroke();
     c.fillStyle = css("ink");
     c.fillText(text, x + 7, y - 9);
+  }
+
+  // Cells have the number of their colour, from 1; 0 for none.
+  coloured(c, { x, y, cells, shades }) {
+    const columns = x.values.length - 1, across = Array.from(x.values, this.px), up = Array.from(y.values, this.py);
+    cells.values.forEach((number, k) => {
+      if (!number) return;
+      const i = k % columns, j = (k - i) / columns;
+      c.fillStyle = `rgb(${shades[number - 1]})`;
+      c.fillRect(across[i], up[j + 1], across[i + 1] - across[i] + 0.4, up[j] - up[j + 1] + 0.4);
+    });
   }
 
   bottomLabels(c, xs) {
@@ -311,12 +325,18 @@ class Chart {
 // A chart over abscissae of its own; a click gives the number of the nearest point of its first line.
 class StillChart extends Chart {
   constructor(diagram, pick = () => {}) {
-    const lines = linesOf(diagram), longest = max(...lines.map(({ x }) => x.length)) - 1;
+    const lines = linesOf(diagram), longest = max(0, ...lines.map(({ x }) => x.length)) - 1;
     super({ window: () => [0, longest], set: pick }, { ...diagram, lines });
+    for (const { shades, ends, label } of this.maps) {
+      const bar = new ColourBar();
+      bar.show(shades, ...ends);
+      bar.node.append(label);
+      this.node.append(bar.node);
+    }
   }
 
   timeAt(x, y) {
-    const [line] = this.lines, away = Array.from(line.x, (at, i) => hypot(this.px(at) - x, this.py(line.y[i]) - y));
+    const [line] = this.lines, away = Array.from(line?.x ?? [], (at, i) => hypot(this.px(at) - x, this.py(line.y[i]) - y));
     return away.indexOf(min(...away));
   }
 

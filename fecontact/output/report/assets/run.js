@@ -39,7 +39,7 @@ async function build(host, data, told) {
   });
   const maps = data.contact ? data.contact.faces.flatMap((face) => (face.plan ? [Footprint, ContactMap] : [ContactMap])
     .map((kind) => new kind(clock, data.contact, face, data.maps["von Mises stress"]))) : [];
-  const spectra = data.spectra.map((one) => new Spectrum(one));
+  const spectra = data.spectra.map((one) => one.maps.length ? new StillChart(one) : new Spectrum(one));
   const energies = data.energies.map((one) => new Chart(clock, overTime(one, clock)));
   const all = [...charts, ...spectra, ...phases, ...maps, ...energies];
   const resize = () => { for (const one of all) one.resize(); };
