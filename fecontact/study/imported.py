@@ -177,9 +177,17 @@ class Imported:
             if name and held.strip():
                 fixed[name] = " ".join(held.split())
         return {**({} if mesh.materials else {"material": "steel"}),
-                **({"plane": "strain"} if mesh.dimension == 2 else {}),
+                **(self._plane() if mesh.dimension == 2 else {}),
                 **({"fixed": fixed} if fixed else {}),
                 **({"rotation": rotation} if (rotation := self._rotation(body)) else {})}
+
+    def _plane(self) -> dict[str, object]:
+        """State of plane bodies, and their thickness, one in units of the file if it has none."""
+        found = self.contents
+        if not found.planes:
+            return {"plane": "strain"}
+        return {"plane": min(found.planes, key=("stress", "strain").index),
+                "thickness": self.scale * (found.thicknesses or (1.0,))[0]}
 
     def _loads(self, bodies: Sequence[str]) -> "_Loads":
         """Forces and moments at points, pressure and gravity of the first step."""
@@ -337,6 +345,8 @@ def imported(path: str | Path, scale: float = 1.0) -> Imported:
                   for name, mesh in meshes.items() if not mesh.materials]
     notes += [f"{number} {sentence.format(kind)}" for kind, number in contents.elements.items()
               for types, sentence in _OTHERWISE.items() if re.fullmatch(types, kind)]
+    if any(mesh.dimension == 2 for mesh in meshes.values()):
+        notes += _doubts_of_plane(contents)
     interfaces: list[tuple[str, str]] = []
     for face, other in _facing(meshes, contents):
         try:
@@ -355,6 +365,23 @@ def _contact_nodes(meshes: Mapping[str, Mesh], *faces: str) -> int:
     """Number of contact nodes of a proposed interface, at most that of facets of both faces."""
     return min(_MOST_NODES, *(len(meshes[body].boundaries[name])
                               for body, _, name in (face.partition(".") for face in faces)))
+
+
+def _doubts_of_plane(contents: DeckContents) -> Iterator[str]:
+    """Sentences on states and thicknesses of plane bodies that the file does not settle."""
+    if len(contents.planes) > 1:
+        yield ("The file has elements of plane stress and of plane strain. The study has plane "
+               "stress for all: correct plane in [body].")
+    if not contents.planes:
+        yield ("The file does not tell plane stress from plane strain. The study has plane strain: "
+               "correct plane, and give thickness, in [body].")
+    if len(contents.thicknesses) > 1:
+        sizes = ", ".join(f"{size:g}" for size in contents.thicknesses)
+        yield (f"The sections of the file have the thicknesses {sizes}. The study has the first "
+               f"one: correct thickness in [body].")
+    if contents.planes and not contents.thicknesses:
+        yield ("The file gives its plane bodies no thickness. The study has one unit of length: "
+               "correct thickness in [body].")
 
 
 def _facing(meshes: Mapping[str, Mesh], contents: DeckContents) -> Iterator[tuple[str, str]]:

@@ -180,7 +180,7 @@ def test_a_single_body_and_units(cli, place):
 @pytest.mark.parametrize(("name", "message"), [
     ("none.inp", "none.inp: there is no such file."),
     ("part.step", "part.step: files of this kind are not read"),
-    ("cut.inp", "cut.inp: The file holds no *NODE or no *ELEMENT data."),
+    ("cut.inp", "cut.inp: The file ends with the line '*ELEMENT, TYPE=C3D8' without its data"),
 ])
 def test_files_that_cannot_be_read(cli, place, name, message):
     (place / "cut.inp").write_text("*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=C3D8\n")

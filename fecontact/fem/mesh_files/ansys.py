@@ -16,7 +16,7 @@ from fecontact.core.errors import InputError, MeshError, ModelWarning, choices
 from fecontact.core.extras import optional
 from fecontact.core.types import Array, Integers
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
-from fecontact.fem.mesh_files.ansys_loads import archive_loads
+from fecontact.fem.mesh_files.ansys_loads import archive_loads, plane_states
 from fecontact.fem.mesh_files.raw import RawMesh
 
 # Numbers of element types.
@@ -86,6 +86,9 @@ def read_cdb(path: Path) -> RawMesh:
     if "NBLOCK" not in commands or "EBLOCK" not in commands:
         raise MeshError("The file holds no NBLOCK or no EBLOCK; write the archive by CDWRITE, DB "
                         "with blocked nodes and elements.")
+    if "1" in plane_states(text):
+        raise MeshError("The file holds axisymmetric elements (KEYOPT 3 of 1); fecontact's bodies "
+                        "are plane.")
     found = mapdl_archive.Archive(str(path), parse_vtk=False)
     _require_whole(text, found)
     elements = _Elements(found)

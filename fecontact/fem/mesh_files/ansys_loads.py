@@ -23,6 +23,10 @@ _ON_FACE = re.compile(r"^\s*SFE\s*,\s*(\d+)\s*,\s*(\d+)\s*,\s*(\w+)\s*,\s*(\d*)\
 _BLOCK = re.compile(r"^\s*(DBLOCK|FBLOCK|SFEBLOCK)\s*,([^\n]*)\n\([^\n]*\n((?:[ \t]*\d[^\n]*\n)*)",
                     re.MULTILINE | re.IGNORECASE)
 _OF_ALL = re.compile(r"^\s*(ACEL|OMEGA)\s*,([^\n]*)", re.MULTILINE | re.IGNORECASE)
+# Types of elements and their options 3; plane elements, and options of plane strain.
+_TYPE = re.compile(r"^\s*ET\s*,\s*(\d+)\s*,\s*(?:PLANE)?(\d+)", re.MULTILINE | re.IGNORECASE)
+_OPTION = re.compile(r"^\s*KEYOPT?\s*,\s*(\d+)\s*,\s*3\s*,\s*(\d+)", re.MULTILINE | re.IGNORECASE)
+_PLANE, _STRAIN = ("2", "42", "82", "182", "183"), ("2", "5")
 _LABELS = {"F": ("FX", "FY", "FZ", "MX", "MY", "MZ"),
            "D": ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")}
 
@@ -112,6 +116,15 @@ def archive_loads(text: str) -> ArchiveLoads:
     return found
 
 
+def plane_states(text: str) -> set[str]:
+    """Options 3 of the plane elements of an archive.
+
+    '0' and '3' are plane stress, '1' is axisymmetry, '2' and '5' are plane strain.
+    """
+    options = dict(_OPTION.findall(text))
+    return {options.get(kind, "0") for kind, name in _TYPE.findall(text) if name in _PLANE}
+
+
 def archive_contents(path: Path) -> DeckContents:
     """Loads and supports of an archive as those of a deck.
 
@@ -120,14 +133,16 @@ def archive_contents(path: Path) -> DeckContents:
     MeshError
         As in :func:`archive_loads`.
     """
-    found = archive_loads(path.read_text(encoding="utf-8", errors="replace"))
+    text = path.read_text(encoding="utf-8", errors="replace")
+    found = archive_loads(text)
     return DeckContents(
         found.counts, supports=tuple(
             (name, " ".join(COMPONENTS[_LABELS["D"].index(label)] for label in name.split()[1:]))
             for name in found.supports),
         forces=tuple((f"node {node}", component, value)
                      for node, component, value in found.forces),
-        distributed=found.distributed)
+        distributed=found.distributed, planes=tuple(sorted({
+            "strain" if state in _STRAIN else "stress" for state in plane_states(text)})))
 
 
 def _numbers(command: str, text: str) -> list[float]:

@@ -45,6 +45,10 @@ class DeckContents:
         Sets of one node, by its number.
     distributed : DistributedLoads
         Pressure, gravity and centrifugal force of ``*DLOAD`` and ``*DSLOAD`` in the first step.
+    planes : tuple of str
+        States of the plane elements, 'stress', 'strain' or both; empty where nothing tells.
+    thicknesses : tuple of float
+        Thicknesses of the sections of plane elements, each once, in units of the file.
 
     Files of Nastran and Ansys give supports, forces and distributed loads alike.
     """
@@ -56,6 +60,8 @@ class DeckContents:
     forces: tuple[tuple[str, str, float], ...] = ()
     single: Mapping[str, str] = field(default_factory=dict)
     distributed: DistributedLoads = field(default_factory=DistributedLoads)
+    planes: tuple[str, ...] = ()
+    thicknesses: tuple[float, ...] = ()
 
     @property
     def loads(self) -> dict[str, int]:
@@ -92,6 +98,7 @@ def deck_contents(path: Path) -> DeckContents:
     forces: list[tuple[str, str, float]] = []
     single: dict[str, str] = {}
     distributed = DistributedLoads()
+    thicknesses: list[float] = []
     for keyword, options, lines in deck.blocks():
         rows = [[word.strip() for word in line.split(",")] for line in lines] if (
             keyword in ("CONTACT PAIR", "BOUNDARY", "CLOAD", "NSET")
@@ -113,6 +120,8 @@ def deck_contents(path: Path) -> DeckContents:
             for name, *held in (*rows, *groups):
                 known = next((one for one in supports if one.upper() == name.upper()), name)
                 supports.setdefault(known, set()).update(_held(held))
+        elif keyword == "SOLID SECTION":
+            thicknesses.append(_thickness(lines))
         elif keyword in LOADS and not deck.keywords["END STEP"]:
             add_loads(distributed, keyword, options, lines)
         elif keyword == "CLOAD" and not deck.keywords["END STEP"]:
@@ -123,7 +132,17 @@ def deck_contents(path: Path) -> DeckContents:
         deck.keywords, elements, tuple(pairs),
         tuple((name, " ".join(COMPONENTS[dof - 1] for dof in sorted(held)))
               for name, held in supports.items() if held), tuple(forces), single,
-        distributed)
+        distributed,
+        tuple(sorted({"stress" if name.startswith("CPS") else "strain" for name in elements
+                      if name.startswith(("CPS", "CPE"))})), tuple(dict.fromkeys(thicknesses)))
+
+
+def _thickness(lines: list[str]) -> float:
+    """Thickness of a section of plane elements; one where its data say nothing."""
+    try:
+        return float(lines[0].split(",")[0]) if lines else 1.0
+    except ValueError:
+        return 1.0
 
 
 COMPONENTS = ("x", "y", "z", "phi_x", "phi_y", "phi_z")

@@ -59,14 +59,17 @@ def nastran_contents(path: Path) -> DeckContents:
     MeshError, InputError
         As in :func:`add_load_groups`.
     """
-    found = _Loads(BulkData(path))
+    bulk = BulkData(path)
+    found, shells = _Loads(bulk), bulk.cards["PSHELL"]
     return DeckContents(
         found.keywords, supports=tuple(
             (name, " ".join(COMPONENTS[int(k) - 1] for k in components))
             for name, (_, components) in found.supports.items() if components),
         forces=tuple((f"point {point}", component, value)
                      for point, component, value in found.forces),
-        distributed=found.distributed)
+        distributed=found.distributed, planes=("stress",) if shells else (),
+        thicknesses=tuple(dict.fromkeys(thickness for line, fields in shells if (
+            thickness := real(line, fields[2])))))
 
 
 class _Loads:
