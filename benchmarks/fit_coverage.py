@@ -1,8 +1,10 @@
 """Fits of synthetic truths: how often intervals of 95 % cover them, and Bouc-Wen from a swept sine.
 
-1. Loops of an Iwan element with noise of 1, 3 and 10 % of the largest force.
-2. Ring-downs of a mass with Bouc-Wen friction with noise of 1 % of the first amplitude.
-3. The hysteretic system of Noel and Schoukens, m y'' + c y' + k y + z = u with z' = alpha y' - beta
+1. Loops of an Iwan element and of the four-parameter one, and the force of a rough surface that is
+   pressed and relieved, with noise of 1, 3 and 10 % of the largest force.
+2. The motion of a mass with LuGre friction on which a drive pulls, with the same noise.
+3. Ring-downs of a mass with Bouc-Wen friction with noise of 1 % of the first amplitude.
+4. The hysteretic system of Noel and Schoukens, m y'' + c y' + k y + z = u with z' = alpha y' - beta
    (gamma |y'| z + delta y' |z|), from a swept sine with noise of 1 %. Its hysteresis has no limit
    (gamma + delta < 0), which BoucWenFriction cannot say: a law of our own does.
 
@@ -25,15 +27,19 @@ import fecontact as fc
 from fecontact.fitting import DecayData, FitData, HistoryData, LoopData
 from fecontact.laws import (
     BoucWenFriction,
+    FourParameterIwanFriction,
     FrictionLaw,
     IwanFriction,
+    LuGreFriction,
     PrescribedForce,
+    RoughSurface,
     SweptSine,
     memory_friction_law,
 )
 from fecontact.measured import ring_down
 from fecontact.study import FitParameter
 
+Array = np.ndarray
 ROW = np.array([[1.0], [0.0], [0.0]])
 PULL = 1e-3 * np.concatenate([np.linspace(0.0, 1.0, 20), np.linspace(1.0, -1.0, 40)[1:],
                               np.linspace(-1.0, 1.0, 40)[1:]])
@@ -64,6 +70,17 @@ def coverage(title: str, truth: fc.ContactSystem, first: fc.ContactSystem,
           flush=True)
 
 
+def fitted_force(
+    title: str, truth: fc.ContactSystem, first: fc.ContactSystem, ranges: dict[str, FitParameter],
+    x: Array, noise: float, trials: int, **how: str,
+) -> None:
+    """Coverage of fits to the force over a displacement x [m]."""
+    force = LoopData(x, np.zeros(len(x)), 1.0, **how).predicted(truth)
+    deviation = noise * float(np.abs(force).max())
+    coverage(f"{title}, noise {100.0 * noise:g} %", truth, first, ranges, lambda rng: LoopData(
+        x, force + deviation * rng.standard_normal(len(force)), deviation, **how), trials)
+
+
 def loops(noise: float, trials: int) -> None:
     """Loops of an Iwan element."""
     def model(stiffness: float, coefficient: float) -> fc.ContactSystem:
@@ -72,14 +89,58 @@ def loops(noise: float, trials: int) -> None:
             friction=IwanFriction(stiffness=stiffness, friction_coefficient=coefficient),
             drive=fc.Drive(stiffness_x=1e6))
 
-    truth = model(1e6, 0.4)
-    force = LoopData(PULL, np.zeros(len(PULL)), 1.0).predicted(truth)
-    deviation = noise * float(np.abs(force).max())
-    coverage(f"loops, noise {100.0 * noise:g} %", truth, model(5e5, 0.3), {
+    fitted_force("Iwan", model(1e6, 0.4), model(5e5, 0.3), {
         "friction.stiffness": FitParameter(1e5, 1e7, scale="log"),
-        "friction.friction_coefficient": FitParameter(0.05, 2.0, scale="log"),
-    }, lambda rng: LoopData(PULL, force + deviation * rng.standard_normal(len(force)), deviation),
-        trials)
+        "friction.friction_coefficient": FitParameter(0.05, 2.0, scale="log")}, PULL, noise, trials)
+
+
+def four_parameters(noise: float, trials: int) -> None:
+    """Loops of a four-parameter Iwan element: power, and force at which all of it slides."""
+    def model(chi: float, coefficient: float) -> fc.ContactSystem:
+        return fc.ContactSystem(
+            body(2.0, 1e4, 0.0), normal=PrescribedForce(50.0),
+            friction=FourParameterIwanFriction(1e6, coefficient, chi, 0.5),
+            drive=fc.Drive(stiffness_x=1e6))
+
+    fitted_force("four-parameter Iwan", model(-0.4, 0.4), model(-0.6, 0.3), {
+        "friction.chi": FitParameter(-0.95, -0.01),
+        "friction.friction_coefficient": FitParameter(0.05, 2.0, scale="log")},
+        0.1 * PULL, noise, trials)
+
+
+def rough(noise: float, trials: int) -> None:
+    """Force of a rough surface that is pressed and relieved."""
+    across = np.array([[0.0], [1.0], [0.0]])
+    basis = fc.basis_from_matrices([[2.0]], [[1e4]], {
+        "contact": across[None], "B": across, "C": across})
+
+    def model(stiffness: float, height: float) -> fc.ContactSystem:
+        return fc.ContactSystem(basis, normal=RoughSurface(stiffness, height),
+                                drive=fc.Drive(stiffness_y=1e8))
+
+    press = -4e-5 * np.concatenate([np.linspace(0.0, 1.0, 40), np.linspace(1.0, 0.0, 40)[1:]])
+    fitted_force("rough surface", model(1e7, 1e-5), model(2e7, 2e-5), {
+        "normal.stiffness": FitParameter(1e6, 1e8, scale="log"),
+        "normal.roughness_height": FitParameter(1e-6, 1e-4, scale="log")},
+        press, noise, trials, along="motion_y")
+
+
+def bristles(noise: float, trials: int) -> None:
+    """The motion of a mass with LuGre friction that a drive pulls to and fro."""
+    def model(coefficient: float, stiffness: float) -> fc.ContactSystem:
+        return fc.ContactSystem(
+            body(2.0, 1e4, 20.0), normal=PrescribedForce(50.0),
+            friction=LuGreFriction(0.5, coefficient, 1e-2, 2.0, stiffness, 10.0),
+            drive=fc.Drive(stiffness_x=5e4, amplitude_x=1e-3, frequency_hz=10.0))
+
+    truth, times = model(0.4, 1e4), np.linspace(0.0, 0.2, 201)
+    clean = HistoryData(times, np.zeros(len(times)), 1.0, initial=np.zeros(3)).predicted(truth)
+    deviation = noise * float(np.abs(clean).max())
+    coverage(f"LuGre, noise {100.0 * noise:g} %", truth, model(0.3, 2e4), {
+        "friction.kinetic_coefficient": FitParameter(0.05, 0.48, scale="log"),
+        "friction.bristle_stiffness": FitParameter(1e3, 1e6, scale="log")},
+        lambda rng: HistoryData(times, clean + deviation * rng.standard_normal(len(times)),
+                                deviation, initial=np.zeros(3)), trials)
 
 
 def decays(trials: int) -> None:
@@ -203,7 +264,8 @@ def main() -> None:
     trials = int(sys.argv[sys.argv.index("--trials") + 1]) if "--trials" in sys.argv else (
         4 if quick else 1000)
     for noise in ((0.03,) if quick else (0.01, 0.03, 0.1)):
-        loops(noise, trials)
+        for case in (loops, four_parameters, rough, bristles):
+            case(noise, trials)
     decays(2 if quick else max(trials // 5, 1))
     swept(1.0 if quick else 3.0)
 
