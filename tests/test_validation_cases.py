@@ -95,7 +95,7 @@ CASES = {
     "friction_oscillator": (("out",), [(r"vibrate at (\S+) Hz", HELD_HZ, 0.006),
                                        (r"^c: three modes .* (\S+) Hz", HELD_HZ, 0.05),
                                        (r"equilibrium: (\S+) N", 14.0, 1e-6)],
-                            {"out/phase.png", "out/leaning.png"}),
+                            {"out/phase.png", "out/inclined.png"}),
     "impact_oscillator": ((), [(r"\| 2 \| period (\d)", 1.0, 0.0),
                                (r"\| 2 \|.* ([-+][\d.]+) \|$", -6.254, 0.01)], set()),
     "impact_figures": (("out",), [(r"phase.png: (\d+) diagrams", 6.0, 0.0)],

@@ -12,7 +12,7 @@ from fecontact import Trajectory, simulate
 from fecontact.analysis import periodicity
 from fecontact.integrate import Scipy
 
-LEANING = "three modes, leaning force"
+INCLINED = "three modes, inclined force"
 FIGURES = {
     "b: two modes": ("4.3-2 b", "one loop of stick and slip", "one loop with one slip, which "
                      "closes after four periods of the drive"),
@@ -30,14 +30,14 @@ def section(images: Path) -> str:
     runs = {name: friction.settled(friction.CASES[name](), rtol=1e-7) for name in FIGURES}
     shown = {name: run.between(run.time[-1] - 16 * friction.PERIOD) for name, run in runs.items()}
     save(friction.figure(shown), images / "friction-phase.png")
-    vertical, leaning = runs["d: three modes, waves"], friction.settled(
-        friction.CASES[LEANING](), rtol=1e-7)
-    pair = {"vertical": vertical, "leaning": leaning}
+    vertical, inclined = runs["d: three modes, waves"], friction.settled(
+        friction.CASES[INCLINED](), rtol=1e-7)
+    pair = {"vertical": vertical, "inclined": inclined}
     save(friction.side_by_side({name: run.between(run.time[-1] - 16 * friction.PERIOD)
-                                for name, run in pair.items()}), images / "friction-leaning.png")
+                                for name, run in pair.items()}), images / "friction-inclined.png")
     return TEXT.format(
-        verdict=verdict(vertical, leaning),
-        leaning=table(("contact force", "slips in 100 periods", "lengths [mm]", "x of B [mm]",
+        verdict=verdict(vertical, inclined),
+        inclined=table(("contact force", "slips in 100 periods", "lengths [mm]", "x of B [mm]",
                        "normal force [N]", "belt: friction [J]", "belt: normal force [J]",
                        "lost by friction [J]"),
                       [compared(name, run) for name, run in pair.items()]),
@@ -67,17 +67,17 @@ def compared(name: str, run: Trajectory) -> tuple[str, ...]:
             f"{energies.friction[-1]:.4f}")
 
 
-def verdict(vertical: Trajectory, leaning: Trajectory) -> str:
+def verdict(vertical: Trajectory, inclined: Trajectory) -> str:
     """The differences in a sentence."""
-    swings = [float(np.ptp(run.displacement("B")[:, 0])) for run in (leaning, vertical)]
-    carried = leaning.energies.belt_normal_work[-1] / (
-        leaning.energies.belt_normal_work[-1] + leaning.energies.belt_friction_work[-1])
-    open_part = float((leaning.normal_force == 0.0).mean())
+    swings = [float(np.ptp(run.displacement("B")[:, 0])) for run in (inclined, vertical)]
+    carried = inclined.energies.belt_normal_work[-1] / (
+        inclined.energies.belt_normal_work[-1] + inclined.energies.belt_friction_work[-1])
+    open_part = float((inclined.normal_force == 0.0).mean())
     return fill(
-        f"With the leaning force the slopes carry the mass up to {swings[0] / swings[1]:.1f} times "
+        f"With the inclined force the slopes carry the mass up to {swings[0] / swings[1]:.1f} times "
         f"as far, {carried:.0%} of the belt's work are its normal force's, and after long slips "
         f"across a wave the mass is thrown off ({open_part:.0%} of the time) and lands with "
-        f"{leaning.normal_force.max() / friction.NORMAL_FORCE:.0f} times its load. The several "
+        f"{inclined.normal_force.max() / friction.NORMAL_FORCE:.0f} times its load. The several "
         f"loops of the source are those of the vertical force.", 100)
 
 
@@ -124,13 +124,13 @@ stick only B vibrates, because the contact does not move.
 
 The waves have slopes of up to 0.50. In the source the contact force is vertical on them
 (`ground.normal = "vertical"`). By default the contact force is normal to the sloping surface, as an
-elastic contact needs to conserve energy; the table and the picture name this case "leaning". The
+elastic contact needs to conserve energy; the table and the picture name this case "inclined". The
 contact force then pushes the mass along the belt with up to half of the normal force, in addition
 to a friction of at most 0.8 of it:
 
-{leaning}
+{inclined}
 
-![Vertical and leaning contact force on the same waves](images/validation/friction-leaning.png)
+![Vertical and inclined contact force on the same waves](images/validation/friction-inclined.png)
 
 {verdict}
 

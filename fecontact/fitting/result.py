@@ -323,7 +323,7 @@ class Fit(Summarised):
             value = float(correlation[i, j])
             named = any(one in text and other in text for text in self.not_found)
             if abs(value) > _TOGETHER and not named:
-                found.append(f"{one} and {other} are hardly told apart: their correlation is "
+                found.append(f"{one} and {other} can hardly be separated: their correlation is "
                              f"{value:.5f}.")
         return found
 

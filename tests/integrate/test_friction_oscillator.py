@@ -68,23 +68,23 @@ def test_waves_make_several_slip_loops():
     assert run.energies.imbalance < 2e-5
 
 
-def test_leaning_contact_force_changes_the_motion_over_steep_waves():
+def test_inclined_contact_force_changes_the_motion_over_steep_waves():
     """Slopes of 0.5: the mass slides down them, the belt's normal force works, energy is kept."""
-    vertical, leaning = (example.settled(example.oscillator(3, ground), 20, 40)
-                         for ground in (example.WAVY, example.LEANING))
-    assert leaning.energies.imbalance < 2e-5
-    swings = [np.ptp(run.displacement("B")[:, 0]) for run in (vertical, leaning)]
+    vertical, inclined = (example.settled(example.oscillator(3, ground), 20, 40)
+                         for ground in (example.WAVY, example.INCLINED))
+    assert inclined.energies.imbalance < 2e-5
+    swings = [np.ptp(run.displacement("B")[:, 0]) for run in (vertical, inclined)]
     assert swings[1] > 1.8 * swings[0]
-    assert len(lengths(leaning)) > 2 * len(lengths(vertical))
+    assert len(lengths(inclined)) > 2 * len(lengths(vertical))
     slope = (2.0 * np.pi * 200e-6 / 2.5e-3) * np.cos(2.0 * np.pi / 2.5e-3 * (
-        leaning.displacement(0)[:, 0] - example.BELT_SPEED * leaning.time))
-    work = leaning.energies.belt_normal_work
-    assert work[-1] > 0.2 * leaning.energies.belt_friction_work[-1]
+        inclined.displacement(0)[:, 0] - example.BELT_SPEED * inclined.time))
+    work = inclined.energies.belt_normal_work
+    assert work[-1] > 0.2 * inclined.energies.belt_friction_work[-1]
     # Between impacts the outputs resolve the force: the first wave's work by quadrature.
-    part = slice(0, int(np.argmax(leaning.normal_force[:, 0] > 25.0)))
+    part = slice(0, int(np.argmax(inclined.normal_force[:, 0] > 25.0)))
     if part.stop > 200:
-        power = -leaning.normal_force[part, 0] * slope[part] * example.BELT_SPEED
-        found = np.trapezoid(power, leaning.time[part])
+        power = -inclined.normal_force[part, 0] * slope[part] * example.BELT_SPEED
+        found = np.trapezoid(power, inclined.time[part])
         assert found == pytest.approx(work[part.stop - 1], rel=2e-2)
 
 

@@ -264,13 +264,13 @@ def test_arrows_lean_with_the_slope_of_waves():
     trajectory = still(q, waviness=1e-4)
     system = trajectory.system.with_(friction=ConstantFriction(0.0))
     for normal, factor in (("surface", 1.0), ("vertical", 0.0)):
-        leaning = type(trajectory)(
+        inclined = type(trajectory)(
             system.with_(ground=replace(system.ground, normal=normal)), trajectory.time,
             trajectory.modal_coordinates, trajectory.modal_velocities, trajectory.work)
-        forces = motion_of(leaning).forces
+        forces = motion_of(inclined).forces
         assert (forces[:, :, 1] > 0.0).all()
         k = 2.0 * np.pi / 0.03
-        places = system.basis.contact_x - 0.02 * leaning.time[:, None]
+        places = system.basis.contact_x - 0.02 * inclined.time[:, None]
         slope = 1e-4 * k * np.cos(k * places)
         np.testing.assert_allclose(forces[:, :, 0], -factor * slope * forces[:, :, 1],
                                    rtol=1e-6, atol=1e-12)

@@ -52,7 +52,7 @@ def true_fields(trajectory):
 
 @pytest.mark.parametrize("make", [run, lambda: run(waviness=2e-4), stack_run,
                                   lambda: stack_run(angle=0.7)],
-                         ids=["flat", "wavy", "two bodies", "leaning"])
+                         ids=["flat", "wavy", "two bodies", "inclined"])
 def test_displacements_stresses_and_forces_are_those_of_the_run(make, tmp_path):
     trajectory = make()
     shown = Shown(report(trajectory, tmp_path / "run.html"))

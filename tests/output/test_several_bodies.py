@@ -60,17 +60,17 @@ def trajectory():
 
 
 @pytest.fixture(scope="module")
-def leaning():
+def inclined():
     return stack_run(angle=0.7)
 
 
-def test_forces_act_along_the_directions_of_each_node(leaning):
+def test_forces_act_along_the_directions_of_each_node(inclined):
     """Along the inclined face friction acts in -t, the normal force along n."""
     t, n = np.array([np.cos(0.7), np.sin(0.7)]), np.array([-np.sin(0.7), np.cos(0.7)])
-    forces = contact_forces(leaning)
-    assert np.abs(leaning.friction_force).max() > 1.0
-    np.testing.assert_allclose(forces @ n, leaning.normal_force, rtol=1e-12)
-    np.testing.assert_allclose(forces @ t, -leaning.friction_force, rtol=1e-12, atol=1e-9)
+    forces = contact_forces(inclined)
+    assert np.abs(inclined.friction_force).max() > 1.0
+    np.testing.assert_allclose(forces @ n, inclined.normal_force, rtol=1e-12)
+    np.testing.assert_allclose(forces @ t, -inclined.friction_force, rtol=1e-12, atol=1e-9)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7])
@@ -91,14 +91,14 @@ def test_forces_on_the_two_bodies_cancel(angle):
     np.testing.assert_allclose(moment.sum(axis=1), outer, atol=1e-12 * largest)
 
 
-def test_both_sides_are_drawn_with_opposite_forces(leaning):
-    motion = motion_of(leaning, given_scale=50.0)
+def test_both_sides_are_drawn_with_opposite_forces(inclined):
+    motion = motion_of(inclined, given_scale=50.0)
     assert not motion.has_ground
     assert len(motion.footed) == 8
-    field = leaning.system.basis.mode_shapes
+    field = inclined.system.basis.mode_shapes
     for frame in (0, 7):
         places = motion.contact_places(frame)
-        q = leaning.modal_coordinates[motion.indices[frame]].copy()
+        q = inclined.modal_coordinates[motion.indices[frame]].copy()
         own = field.nodes[:8] + 50.0 * (field.shapes[:8] @ q)  # the block's lowest row
         np.testing.assert_allclose(places[:8], own, atol=1e-14)
         # Feet lie on the drawn upper edge of the beam, whose cells are straight.
@@ -136,8 +136,8 @@ def test_names_stand_inside_their_bodies():
 
 
 @rendering
-def test_pictures_of_two_bodies_show_arrows_in_their_directions(leaning, tmp_path):
-    motion = motion_of(leaning)
+def test_pictures_of_two_bodies_show_arrows_in_their_directions(inclined, tmp_path):
+    motion = motion_of(inclined)
     with scene_of(motion, 480, 270) as scene:
         corners = scene.parts[-1].arrow_corners(motion.contact_places(3), motion.forces[3])
     tails, tips = corners.reshape(-1, 7, 2)[:, [0, 3]].mean(axis=1), corners.reshape(-1, 7, 2)[:, 5]
@@ -145,10 +145,10 @@ def test_pictures_of_two_bodies_show_arrows_in_their_directions(leaning, tmp_pat
     drawn /= np.linalg.norm(drawn, axis=1)[:, None]
     np.testing.assert_allclose(
         drawn, forces / np.linalg.norm(forces, axis=1)[:, None], atol=1e-6)
-    image = imread(picture(leaning, tmp_path / "a.png", size=(640, 360)))[..., :3]
+    image = imread(picture(inclined, tmp_path / "a.png", size=(640, 360)))[..., :3]
     red = (np.abs(image - np.array([178, 24, 43]) / 255.0) < 0.05).all(axis=2)
     assert 100 < red.sum() < 0.05 * red.size
-    render_mode(leaning.system.basis, tmp_path / "mode.png", 8, frames=2, size=(320, 180))
+    render_mode(inclined.system.basis, tmp_path / "mode.png", 8, frames=2, size=(320, 180))
 
 
 @rendering
@@ -192,7 +192,7 @@ def test_the_chart_sums_the_forces_of_each_interface(trajectory):
     assert overlay.chart_height > 0
 
 
-def test_contact_maps_have_a_row_an_interface(trajectory, leaning):
+def test_contact_maps_have_a_row_an_interface(trajectory, inclined):
     figure = plot_contact_map(trajectory)
     axes = figure.axes
     assert [axis.get_title(loc="left") for axis in axes[:4]] == [
@@ -206,7 +206,7 @@ def test_contact_maps_have_a_row_an_interface(trajectory, leaning):
         np.testing.assert_allclose(drawn, loads[rows], rtol=1e-9)
     states = np.asarray(axes[3].collections[0].get_array())
     np.testing.assert_array_equal(states, trajectory.contact_state[:, 8:].T)
-    (row, _), *_ = [figure.axes[:2] for figure in [plot_contact_map(leaning)]]
+    (row, _), *_ = [figure.axes[:2] for figure in [plot_contact_map(inclined)]]
     assert row.get_ylabel() == "position along the face s [mm]"
     assert row.get_ylim() == pytest.approx((0.0, 0.05))
 
@@ -413,22 +413,22 @@ def test_pvd_frames_hold_the_bodies(trajectory, tmp_path):
     np.testing.assert_array_equal(frame.point_data["body"], [0] * 40 + [1] * 105)
 
 
-def test_tables_name_interfaces_and_hold_forces_in_global_axes(leaning, trajectory, tmp_path):
+def test_tables_name_interfaces_and_hold_forces_in_global_axes(inclined, trajectory, tmp_path):
     import xarray
 
-    data = to_xarray(leaning)
+    data = to_xarray(inclined)
     assert data.node_interface.values.tolist() == ["shoe"] * 8
     assert data.mode_body.values.tolist() == ["block"] * 5 + ["beam"] * 5
     np.testing.assert_allclose(data.node_position, np.linspace(0.0, 0.05, 8), atol=1e-15)
-    forces = contact_forces(leaning)
+    forces = contact_forces(inclined)
     for axis, name in enumerate(("contact_force_x", "contact_force_y")):
         np.testing.assert_array_equal(data[name], forces[..., axis])
     n = np.column_stack([data.node_normal_x, data.node_normal_y])
     np.testing.assert_allclose(data.contact_force_x * n[:, 0] + data.contact_force_y * n[:, 1],
-                               leaning.normal_force, rtol=1e-12)
+                               inclined.normal_force, rtol=1e-12)
     relative = data.node_relative_displacement.sel(direction="n")
-    np.testing.assert_allclose(relative, -leaning.penetration, atol=1e-18)
-    with xarray.open_dataset(export.export_netcdf(leaning, tmp_path / "a.nc"),
+    np.testing.assert_allclose(relative, -inclined.penetration, atol=1e-18)
+    with xarray.open_dataset(export.export_netcdf(inclined, tmp_path / "a.nc"),
                              engine="scipy") as stored:
         assert stored.node_interface.values.astype(str).tolist() == ["shoe"] * 8
     with export.export_csv(trajectory, tmp_path / "a.csv").open(newline="") as file:

@@ -42,7 +42,7 @@ def test_faces_name_their_interface_and_its_bodies():
     assert dict(linked.summary())["bodies"] == "block, beam"
 
 
-def test_a_leaning_face_is_measured_along_itself():
+def test_a_inclined_face_is_measured_along_itself():
     (face,) = contact_faces(stack(angle=0.7))
     assert (face.axis, face.label) == ("s", "position along the face s")
     np.testing.assert_allclose(face.abscissa, np.linspace(0.0, 0.05, 8), atol=1e-15)

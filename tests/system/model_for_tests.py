@@ -74,7 +74,7 @@ class Model:
         F = self.normal(j, u, v)
         return F, self.friction(j, slip, F), u, v, slip, slope
 
-    def leaning(self, F, slope):
+    def inclined(self, F, slope):
         """Force on a node in -x that belongs to its normal force."""
         return F * slope if self.values["ground.normal"] == "surface" else 0.0
 
@@ -90,7 +90,7 @@ class Model:
         force[1, 1] = -self.values["load.normal"]
         for j in range(self.n):
             F, R, *_, slope = self.node(j, t, y)
-            force[2 + j] = [-R - self.leaning(F, slope), F, 0.0]
+            force[2 + j] = [-R - self.inclined(F, slope), F, 0.0]
         total = -self.C @ rate - self.w**2 * q
         for point in range(2 + self.n):
             for i in range(3):
@@ -143,7 +143,7 @@ class Model:
         for j in range(self.n):
             F, R, u, v, slip, slope = self.node(j, t, y)
             # Work of the normal force on the body beyond the work that goes into the contact.
-            out["belt_normal"] += F * slope * slip - self.leaning(F, slope) * (
+            out["belt_normal"] += F * slope * slip - self.inclined(F, slope) * (
                 slip + self.values["ground.speed"])
             out["belt_friction"] -= R * self.values["ground.speed"]
             out["contact_damping"] += (F - self.normal(j, u, 0.0)) * v

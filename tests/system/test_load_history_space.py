@@ -225,13 +225,13 @@ def test_faces_of_any_direction(normal):
     law = JenkinsFriction(2e4, 0.4)
     basis = node(law).basis
     travel = (0.0, 3e-4, -2e-4)
-    leaning = replace(basis, contact_normals=np.array([normal]), on_ground=np.array([False]))
+    inclined = replace(basis, contact_normals=np.array([normal]), on_ground=np.array([False]))
     direction = np.array([0.3, -0.5, 0.7])
     side = SlidingTranslation(0.0, tuple(direction))
-    system = fc.ContactSystem(leaning, normal=LinearContact(1e6), friction=law, load=fc.Load(10.0),
+    system = fc.ContactSystem(inclined, normal=LinearContact(1e6), friction=law, load=fc.Load(10.0),
                               sliding={"contact": side})
     history = load_history(system, LoadPath(travel=travel, steps=9), rtol=1e-9)
-    along = leaning.tangents[0] @ (direction / np.linalg.norm(direction))
+    along = inclined.tangents[0] @ (direction / np.linalg.norm(direction))
     flat = load_history(jenkins(), LoadPath(travel=tuple(along[0] * np.array(travel)),
                                             travel_y=tuple(along[1] * np.array(travel)), steps=9),
                         rtol=1e-9)

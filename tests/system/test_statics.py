@@ -314,9 +314,9 @@ def test_beam_on_waves_is_in_balance():
         F, _, u = contact(system, q, time)
         spring = 1e5 * system.basis.T[0, 0] @ q
         x = system.basis.contact_T[:, 0] @ q
-        leaning = F @ slope(ground, system.basis.contact_x + x - 0.01 * time)
+        inclined = F @ slope(ground, system.basis.contact_x + x - 0.01 * time)
         assert F.sum() == pytest.approx(40.0, rel=1e-8)
-        assert spring == pytest.approx(-leaning, abs=1e-8)
+        assert spring == pytest.approx(-inclined, abs=1e-8)
         moment = F @ (system.basis.contact_x - 0.1) + 0.01 * spring
         assert moment == pytest.approx(0.0, abs=1e-8)
         assert ((F > 0.0) == (u > 0.0)).all()

@@ -47,7 +47,7 @@ LAWS: dict[str, Any] = {
 EVEN = fc.Ground(speed=BELT_SPEED)
 # The source keeps the contact force vertical; "surface" makes it normal to the slope.
 WAVY = fc.Ground(speed=BELT_SPEED, amplitude=200e-6, wavelength=2.5e-3, normal="vertical")
-LEANING = replace(WAVY, normal="surface")
+INCLINED = replace(WAVY, normal="surface")
 
 
 def basis(modes: int) -> fc.ModalBasis:
@@ -98,7 +98,7 @@ CASES = {
     "b: two modes": lambda: oscillator(2),
     "c: three modes": lambda: oscillator(3),
     "d: three modes, waves": lambda: oscillator(3, WAVY),
-    "three modes, leaning force": lambda: oscillator(3, LEANING),
+    "three modes, inclined force": lambda: oscillator(3, INCLINED),
     "three modes, four waves": lambda: oscillator(3, fourier_waves()),
     "three modes, wave spectrum": lambda: oscillator(3, spectrum_of_waves()),
     "three modes, random friction": lambda: oscillator(3, random_friction()),
@@ -240,7 +240,7 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
     names = list(runs)
     shown = {name: run.between(run.time[-1] - 20 * PERIOD) for name, run in runs.items()}
     figure({n: shown[n] for n in names[:3]}, folder / "phase.png")
-    side_by_side({"vertical": shown[names[2]], "leaning": shown[names[3]]}, folder / "leaning.png")
+    side_by_side({"vertical": shown[names[2]], "inclined": shown[names[3]]}, folder / "inclined.png")
 
     block = soft_block()
     print(f"Soft block: {block.basis.contact_nodes} contact nodes, elastic modes from "

@@ -61,7 +61,7 @@ class Forced:
         return list(self.field.parameters)[self.free]
 
     def at(self, value: float) -> "Forced":
-        """The same with another value of the parameter."""
+        """These orbits at another value of the parameter."""
         values = self.values.copy()
         values[self.free] = value
         return replace(self, values=values)

@@ -1,4 +1,4 @@
-"""What each method of periodic orbits does for their branches.
+"""Methods of periodic orbits: how each starts, continues and leaves branches.
 
 All starts of branches are motions: an orbit and a direction on a fine mesh, as collocation has
 them. Each method projects these to unknowns of its own. Points know their method by what is stored
@@ -32,7 +32,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """What is asked of a branch of orbits; see :func:`fecontact.bifurcation.orbit_branch`.
+    """Arguments of a branch of orbits; see :func:`fecontact.bifurcation.orbit_branch`.
 
     Attributes
     ----------
@@ -147,7 +147,7 @@ def stepped_off(
     start: tuple[Any, Array, Array], request: Request,
     follow: Callable[[Array, Array, ContinuationOptions], Branch],
 ) -> Branch:
-    """Branch that leaves a point where it cannot be told from another.
+    """Branch that leaves a point at which two branches meet.
 
     It may bend strongly there: the first step is shorter if the corrector fails.
     """

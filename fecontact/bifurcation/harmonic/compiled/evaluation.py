@@ -187,7 +187,7 @@ def evaluate_plain(u: Vector, derivatives: bool, e: Equations) -> float:
 
 @kernel(by_address=True)
 def evaluate_sampled(u: Vector, derivatives: bool, e: Equations) -> float:
-    """As :func:`evaluate_plain`, of any contact forces, also with internal variables."""
+    """Like :func:`evaluate_plain`, for any contact forces, internal variables included."""
     workspace = e.workspace
     m, c = e.springs.shape[1], len(e.offsets)
     T = take_parameter(u[len(u) - 1], e)
@@ -507,7 +507,7 @@ def condense_plain(u: Vector, T: float, central: bool, e: Equations) -> None:
 
 @kernel(by_address=True)
 def condense_sampled(u: Vector, T: float, central: bool, e: Equations) -> None:
-    """As :func:`condense_plain`, of any contact forces, also with internal variables."""
+    """Like :func:`condense_plain`, for any contact forces, internal variables included."""
     workspace = e.workspace
     c, s = len(e.offsets), workspace.coupled[0]
     _take_rows(s, e)
