@@ -68,8 +68,7 @@ def ring_down(
     Returns
     -------
     AmplitudeCurve
-        One point for each window, with standard deviations by the noise beside the mode, and the
-        degrees of freedom of these estimates.
+        One point for each window, with standard deviations by the noise beside the mode.
 
     Raises
     ------

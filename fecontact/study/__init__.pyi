@@ -2,7 +2,7 @@ from .bodies_section import BodyBasisSettings, BodySections, InterfaceSettings, 
 from .convergence import study_convergence
 from .fit_section import FitDataSettings, FitParameter, FitSettings, PosteriorSettings
 from .geometry_section import MeshFile
-from .links_section import FaceWeldSettings
+from .links_section import FaceWeldSettings, ShakerSettings
 from .materials_section import MaterialSettings
 from .measurement_section import MeasurementSettings
 from .preload_section import PreloadSettings
@@ -38,6 +38,7 @@ __all__ = [
     "PreloadSettings",
     "Reduced",
     "RenderSettings",
+    "ShakerSettings",
     "SimulationSettings",
     "Span",
     "Strobing",

@@ -65,17 +65,17 @@ class ShakerSettings(Shaker):
     armature_mass : float
         Mass of armature and coil [kg].
     suspension_stiffness, suspension_damping : float
-        Suspension of the armature in the frame, which stands.
+        Suspension of the armature in the frame, which stands [N/m], [N s/m].
     stinger_stiffness, stinger_damping : float
-        Stinger along ``direction``, without bending moments.
+        Stinger along ``direction``, without bending moments [N/m], [N s/m].
     direction : list
         Direction of the force, [x, y] or [x, y, z].
     force_factor : float
-        Force per current; 1 for a drive that is a force in N.
+        Force per current [N/A]; 1 for a drive that is a force in N.
     resistance : float, optional
-        Resistance of the coil: the drive is a voltage.
+        Resistance of the coil [Ohm]: the drive is a voltage.
     inductance : float
-        Inductance of the coil.
+        Inductance of the coil [H].
     """
 
     first: str

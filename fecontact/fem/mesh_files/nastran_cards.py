@@ -17,16 +17,17 @@ Card = tuple[Line, list[str]]
 def all_cards(path: Path, case: list[str] | None = None) -> Iterator[tuple[Line, str, list[str]]]:
     """Line, name and fields of each card, with those of its continuations.
 
-    Lines before BEGIN BULK, the case control, are added to ``case``.
+    With ``case`` the file is that of one body: lines before BEGIN BULK, the case control, are added
+    to it.
 
     Raises
     ------
     MeshError
-        For a file that includes itself or a missing one.
+        For a file that includes itself or a missing one, and for one of a body with superelements.
     """
     begin: Line = 0
     name, card = "", list[str]()
-    for place, line in _lines(path, (), [] if case is None else case):
+    for place, line in _lines(path, (), case):
         head, fields = _parted(line)
         if name and head[:1] in ("", "+", "*"):
             card += fields
@@ -46,22 +47,23 @@ def cards(path: Path, name: str) -> Iterator[Card]:
 
 
 def _lines(
-    path: Path, outer: tuple[Path, ...], case: list[str]
+    path: Path, outer: tuple[Path, ...], case: list[str] | None
 ) -> Iterator[tuple[Line, str]]:
     """Lines without comments; those of an included file stand in place of its INCLUDE."""
     rows = path.read_text(encoding="utf-8", errors="replace").splitlines()
     start = next((number for number, row in enumerate(rows)
                   if row[:40].strip().upper().startswith("BEGIN BULK")), -1)
-    case += rows[: max(start, 0)]
+    if case is not None:
+        case += rows[: max(start, 0)]
     for number, row in enumerate(rows[start + 1 :], start=start + 2):
         line = row.partition("$")[0].rstrip().expandtabs()
         if not line.strip():
             continue
-        if row[:5].upper() == "BEGIN":
+        if case is not None and row[:5].upper() == "BEGIN":
             raise MeshError(f"Line {number} begins a superelement ({shown(line)}), which is not "
                             f"read; give one file for each body.")
         if match := _INCLUDE.match(line):
-            yield from _lines(_included(path, match[1].strip(), outer), (*outer, path), [])
+            yield from _lines(_included(path, match[1].strip(), outer), (*outer, path), None if case is None else [])
         else:
             yield f"{number} of {path.name}" if outer else number, line
 
