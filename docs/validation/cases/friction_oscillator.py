@@ -240,7 +240,8 @@ def main(folder: Path = Path("friction-oscillator"), quick: bool = False) -> Non
     names = list(runs)
     shown = {name: run.between(run.time[-1] - 20 * PERIOD) for name, run in runs.items()}
     figure({n: shown[n] for n in names[:3]}, folder / "phase.png")
-    side_by_side({"vertical": shown[names[2]], "inclined": shown[names[3]]}, folder / "inclined.png")
+    side_by_side({"vertical": shown[names[2]], "inclined": shown[names[3]]},
+                 folder / "inclined.png")
 
     block = soft_block()
     print(f"Soft block: {block.basis.contact_nodes} contact nodes, elastic modes from "

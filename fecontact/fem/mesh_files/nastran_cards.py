@@ -63,7 +63,8 @@ def _lines(
             raise MeshError(f"Line {number} begins a superelement ({shown(line)}), which is not "
                             f"read; give one file for each body.")
         if match := _INCLUDE.match(line):
-            yield from _lines(_included(path, match[1].strip(), outer), (*outer, path), None if case is None else [])
+            yield from _lines(_included(path, match[1].strip(), outer), (*outer, path),
+                              None if case is None else [])
         else:
             yield f"{number} of {path.name}" if outer else number, line
 
