@@ -75,8 +75,8 @@ def verdict(vertical: Trajectory, inclined: Trajectory) -> str:
     open_part = float((inclined.normal_force == 0.0).mean())
     return fill(
         f"With the inclined force the slopes carry the mass up to {swings[0] / swings[1]:.1f} "
-        f"times as far, {carried:.0%} of the belt's work are its normal force's, and after long slips "
-        f"across a wave the mass is thrown off ({open_part:.0%} of the time) and lands with "
+        f"times as far, {carried:.0%} of the belt's work are its normal force's, and after long "
+        f"slips across a wave the mass is thrown off ({open_part:.0%} of the time) and lands with "
         f"{inclined.normal_force.max() / friction.NORMAL_FORCE:.0f} times its load. The several "
         f"loops of the source are those of the vertical force.", 100)
 
