@@ -7,7 +7,6 @@ from fecontact import (
     BoundaryLoad,
     ContactSystem,
     ElasticBody,
-    Interface,
     Load,
     Material,
     Mesh,
@@ -20,8 +19,8 @@ from fecontact import (
 from fecontact.analysis import amplification, buckling_loads, whitehead_bound
 from fecontact.bifurcation import (
     ContinuationOptions,
+    EngineOrder,
     HarmonicBalance,
-    Repeats,
     contact_field,
     frequency_response,
 )
@@ -33,7 +32,13 @@ from fecontact.laws import (
     LinearContact,
     PrescribedForce,
 )
-from fecontact.reduction import PointPairing, WholeWheel, cyclic_basis, sector_modes
+from fecontact.reduction import (
+    PointPairing,
+    WholeWheel,
+    cyclic_basis,
+    cyclic_basis_from_bases,
+    sector_modes,
+)
 
 TURN = 2.0 * np.pi
 STEEL = Material(2.1e11, 0.3, 7850.0, thermal_expansion=1.2e-5)
@@ -137,22 +142,20 @@ def rings() -> list[Comparison]:
 
 def friction_ring() -> list[Comparison]:
     """One of 24 masses with Jenkins elements to its neighbours, engine order 6, one harmonic."""
-    names = ("before", "own", "after")
     row = np.array([[1.0], [0.0], [0.0]])
+    mass = basis_from_matrices([[1.0]], [[1.0]], {"P": row}, damping=[[0.02]])
+    wheel = cyclic_basis_from_bases({"own": mass}, 24, {
+        "damper": PointPairing("own", "P", "next_own", "P")})
     signal = Harmonic(1.0, 1.1 / TURN, 0.5 * np.pi)
-    system = ContactSystem(
-        bodies={name: basis_from_matrices([[1.0]], [[1.0]], {"P": row}, damping=[[0.02]])
-                for name in names},
-        interfaces=[Interface(f"{one}-{two}", PointPairing(one, "P", two, "P"),
-                              PrescribedForce(2.0), JenkinsFriction(0.2, 0.5))
-                    for one, two in (names[:2], names[1:])],
-        load=Load(forces=(PointLoad("own.P", "x", signal=signal),)))
+    system = ContactSystem(wheel.basis, normal=PrescribedForce(2.0),
+                           friction=JenkinsFriction(0.2, 0.5),
+                           load=Load(forces=(PointLoad("own.P", "x", signal=signal),)))
     field = contact_field(system, {"w": (1.1, lambda system, w: system.with_(
         {"load.forces.0.signal.frequency_hz": w / TURN}))})
     found = frequency_response(
         field, (1.1, 1.2), "w", observe=("own.P", "x"), options=ContinuationOptions(points=1),
         method=HarmonicBalance(1, 4096, stability=None, sampling_tolerance=1e-3,
-                               repeats=Repeats("own", {"before": -0.25, "after": 0.25})))
+                               repeats=EngineOrder(wheel, 6)))
     return [Comparison("friction ring, engine order 6, W = 1.1: amplitude", 6.711291,
                        found.amplitude()[0])]
 
