@@ -1,7 +1,5 @@
 """The README and the pages of docs: code runs, tables are read, commands parse."""
 
-import ast
-import importlib
 import re
 import shlex
 import tomllib
@@ -579,15 +577,3 @@ def test_what_is_not_run_has_a_reason():
     reasons = [found["reason"] for text in TEXTS.values() for found in BLOCK.finditer(text)
                if found["reason"]]
     assert sorted(reasons) == ["needs files of Nastran", "needs mpi4py and mpiexec"]
-
-
-@pytest.mark.parametrize("path", sorted(
-    path.relative_to(ROOT).as_posix() for folder in ("docs", "benchmarks", "examples")
-    for path in (ROOT / folder).rglob("*.py")))
-def test_names_that_scripts_import_exist(path):
-    """Scripts that take minutes are not run by tests; what they import must be there."""
-    for node in ast.walk(ast.parse((ROOT / path).read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("fecontact"):
-            module = importlib.import_module(str(node.module))
-            for name in (alias.name for alias in node.names):
-                assert hasattr(module, name) or importlib.import_module(f"{node.module}.{name}")

@@ -9,10 +9,13 @@ import sys
 import textwrap
 import typing
 from functools import cache, cached_property
+from pathlib import Path
 
 import pytest
 
 import fecontact
+
+ROOT = Path(__file__).parents[1]
 
 NAMESPACES = ("fem", "half_space", "laws", "reduction", "integrate", "analysis", "bifurcation",
               "measured", "study", "sweeps", "fitting", "system", "plot", "io")
@@ -180,3 +183,15 @@ def test_core_loads_no_libraries_of_pictures_and_meshes():
             f"print(sorted(set({heavy}) & set(sys.modules)))")
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("path", sorted(
+    path.relative_to(ROOT).as_posix() for folder in ("docs", "benchmarks", "examples")
+    for path in (ROOT / folder).rglob("*.py")))
+def test_names_that_scripts_import_exist(path):
+    """Scripts that take minutes are not run by tests; what they import must be there."""
+    for node in ast.walk(ast.parse((ROOT / path).read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("fecontact"):
+            module = importlib.import_module(str(node.module))
+            for name in (alias.name for alias in node.names):
+                assert hasattr(module, name) or importlib.import_module(f"{node.module}.{name}")
