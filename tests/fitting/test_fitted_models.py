@@ -121,6 +121,20 @@ def test_normal_load_and_coefficient_are_found_as_their_product_alone():
 
 # Motions -----------------------------------------------------------------------------------------
 
+def test_dry_friction_of_a_decay():
+    """Den Hartog: each half period the middle of the swing is mu N / k to the other side."""
+    mu, w, start = 0.02, np.sqrt(5e4 / 2.0), 6e-3
+    off, times = mu * 50.0 / 5e4, np.linspace(0.0, 2.0, 20001)
+    half = np.floor(times * w / np.pi)
+    sign = 1.0 - 2.0 * (half % 2)
+    x = sign * ((start - (2.0 * half + 1.0) * off) * np.cos(times * w - np.pi * half) + off)
+    options = {"window": 6.0, "frequency_hz": w / (2.0 * np.pi)}
+    first = mass(friction=ConstantFriction(0.015, smoothing_slope=1e4))
+    found = fc.fit(first, {"friction.friction_coefficient": (5e-3, 0.025)}, DecayData(
+        ring_down(times, x, **options), state(first, start), 2.0, options=options))
+    assert found.estimates == pytest.approx([mu], rel=1e-3)
+
+
 def test_amplitudes_beyond_a_run_go_on_linearly():
     """A linear decay has one frequency and one damping ratio at all amplitudes."""
     data = DecayData(AmplitudeCurve([1e-9, 1e-4, 1.0], [25.0] * 3, [0.01] * 3),
