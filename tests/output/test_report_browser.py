@@ -329,7 +329,7 @@ def test_a_cell_of_a_sweep_shows_its_case(browser, tmp_path):
 def test_a_point_of_a_fit_is_read(browser, tmp_path):
     places = np.linspace(0.0, 1.0, 5)
     data = FunctionData(along, 1e4 * places + 30.0, 40.0, places, ("place [m]", "force [N]"))
-    held = ContactSystem(run().system.basis, drive=Drive(stiffness_x=1e4))
+    held = run().system.with_(drive=Drive(stiffness_x=1e4))
     found = fit(held, {"drive.stiffness_x": (1e3, 1e5)}, data)
     path = report_fit(found, tmp_path / "fit.html", title=EVIL)
     with Opened(browser, path) as opened:

@@ -38,11 +38,11 @@ class Diagram extends Chart {
   }
 }
 
-async function build(host, data, told) {
+async function build(host, data, dataset) {
   units = data.units;
   const { orbits } = data, samples = data.samples;
   const phases = Float64Array.from({ length: samples }, (_, k) => k / (samples - 1));
-  const clock = new Clock(phases, told);
+  const clock = new Clock(phases, dataset);
   const part = ({ values, columns }, number) => values.slice(number * samples * columns, (number + 1) * samples * columns);
   if (data.bodies) data.coordinates = { columns: orbits.coordinates.columns, values: [] };
   const line = (name) => ({ name: "", colour: data.branches[0].colour, [name]: phases });
@@ -60,7 +60,7 @@ async function build(host, data, told) {
     history.lines[0].colour = phase.lines[0].colour = branch.colour;
     facts.replaceChildren(table([], [["branch", branch.name], ...data.columns.map((name, k) =>
       [name, branch.rows[place][k]]).filter(([, text]) => text)]));
-    told.orbit = number;
+    dataset.orbit = number;
     if (orbits.scales) {
       const scale = Math.log(orbits.scales[number]), slider = timing.more.querySelector("[aria-label=deformation]");
       slider.max = max(slider.max, scale + 2.3);
@@ -89,5 +89,5 @@ async function build(host, data, told) {
   refresh();
   const [first] = diagrams[0].lines;
   choose({ line: first, index: first.kept[0], number: 0 });
-  return { close: ready(host, told, refresh, player, timing), clock };
+  return { close: ready(host, dataset, refresh, player, timing), clock };
 }

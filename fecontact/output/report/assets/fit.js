@@ -2,7 +2,7 @@
 
 const rowsOf = (title, headings, rows, kind = "many") => section(title, ...rows.length ? [table(headings, rows, kind)] : []);
 
-async function build(host, data, told) {
+async function build(host, data, dataset) {
   const facts = el("div", {}, el("p.legend", {}, "Click on a point of a chart."));
   const all = [], still = (diagram, height, pick) => {
     const chart = new StillChart({ ...diagram, height }, pick);
@@ -17,7 +17,7 @@ async function build(host, data, told) {
       const [{ x }] = pair[0].lines;
       facts.replaceChildren(table([], [["", pair[0].name],
         [pair[0].xLabel, (pair[0].log.includes("x") ? 10 ** x[index] : x[index]).toPrecision(5)], ...texts]));
-      told.point = index;
+      dataset.point = index;
     };
     const pair = [still(values, 260, choose), still(residuals, 110, choose)];
     [values, residuals].forEach(({ title, unit }, k) => { pair[k].name = unit ? `${title} [${unit}]` : title; });
@@ -39,5 +39,5 @@ async function build(host, data, told) {
     ...cards("Study, in SI units", data.study), foot(data));
   const resize = () => { for (const chart of all) chart.resize(); };
   resize();
-  return { close: ready(host, told, resize) };
+  return { close: ready(host, dataset, resize) };
 }

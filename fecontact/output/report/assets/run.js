@@ -27,9 +27,9 @@ function states(contact) {
   `longest arrow: ${quantity(contact.largest, "N")}`);
 }
 
-async function build(host, data, told) {
+async function build(host, data, dataset) {
   units = data.units;
-  const clock = new Clock(data.time.values, told);
+  const clock = new Clock(data.time.values, dataset);
   const player = data.bodies ? new Player(data, clock) : null;
   const charts = data.charts.map((one) => new Chart(clock, overTime(one, clock)));
   const phases = data.phases.map(({ title, x, y }) => {
@@ -62,10 +62,10 @@ async function build(host, data, told) {
     () => { for (const one of all) one.point(); });
   refresh();
   clock.set(clock.time);
-  const close = ready(host, told, refresh, player, timing);
+  const close = ready(host, dataset, refresh, player, timing);
   data.rest().then(() => {
     data.whole = true;
-    told.whole = round(performance.now());
+    dataset.whole = round(performance.now());
     for (const one of maps) one.resize();
     clock.set(clock.time);
   });

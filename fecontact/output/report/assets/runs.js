@@ -1,8 +1,8 @@
 // The page of a comparison of runs.
 
-async function build(host, data, told) {
+async function build(host, data, dataset) {
   units = data.units;
-  const clock = data.time ? new Clock(data.time.values, told) : null;
+  const clock = data.time ? new Clock(data.time.values, dataset) : null;
   const charts = clock ? data.charts.map((one) => new Chart(clock, { ...overTime(one, clock), height: 180 })) : [];
   const spectra = data.spectra.map((one) => new Spectrum(one));
   const all = [...charts, ...spectra], nodes = (some) => some.map((one) => one.node);
@@ -17,5 +17,5 @@ async function build(host, data, told) {
   clock?.watchers.push(() => { for (const one of charts) one.point(); });
   resize();
   clock?.set(clock.time);
-  return { close: ready(host, told, resize, null, timing) };
+  return { close: ready(host, dataset, resize, null, timing) };
 }

@@ -82,12 +82,12 @@ class Cases extends Chart {
   }
 }
 
-async function build(host, data, told) {
+async function build(host, data, dataset) {
   units = data.units;
   for (const column of data.columns) column.values = column.values.map((value) => value ?? NaN);
   const facts = el("div");
   const cases = new Cases(data, (index) => {
-    told.case = index;
+    dataset.case = index;
     facts.replaceChildren(table([], data.rows[index].map((text, k) => [data.headings[k], text])
       .filter(([, text]) => text)));
   });
@@ -96,5 +96,5 @@ async function build(host, data, told) {
   ...cards("Study, in SI units", data.study), foot(data));
   cases.resize();
   cases.clock.set(0);
-  return { close: ready(host, told, () => cases.resize()) };
+  return { close: ready(host, dataset, () => cases.resize()) };
 }

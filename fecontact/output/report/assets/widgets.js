@@ -27,9 +27,9 @@ class ColourBar {
 }
 
 class Clock {
-  constructor(times, told) {
+  constructor(times, dataset) {
     this.watchers = [];
-    this.told = told;
+    this.dataset = dataset;
     this.load(times);
   }
 
@@ -52,7 +52,7 @@ class Clock {
   set(time) {
     this.put(time);
     for (const watch of this.watchers) watch();
-    this.told.time = this.time;
+    this.dataset.time = this.time;
   }
 
   shown() { return this.range.map((time) => time / this.unit); }
@@ -138,7 +138,7 @@ function controls(data, clock, player, resize, lap = 12) {
       const next = clock.time + passed * speed();
       clock.set(next > clock.range[1] ? clock.range[0] : next);
     }
-    if (player) clock.told.frame = player.cost.toFixed(2);
+    if (player) clock.dataset.frame = player.cost.toFixed(2);
     requestAnimationFrame(frame);
   };
   return timing;
@@ -182,7 +182,7 @@ function foot(data) {
 }
 
 // What goes on while a page is there, and what ends it.
-function ready(host, told, refresh, player, timing) {
+function ready(host, dataset, refresh, player, timing) {
   let width = host.clientWidth;
   const watch = new ResizeObserver(() => {
     if (host.clientWidth !== width) { width = host.clientWidth; refresh(); }
@@ -190,7 +190,7 @@ function ready(host, told, refresh, player, timing) {
   watch.observe(host);
   const keys = styled === document.documentElement ? window : styled;
   if (timing) keys.addEventListener("keydown", timing.key);
-  told.ready = round(performance.now());
+  dataset.ready = round(performance.now());
   return () => {
     watch.disconnect();
     if (timing) keys.removeEventListener("keydown", timing.key);
@@ -199,7 +199,7 @@ function ready(host, told, refresh, player, timing) {
   };
 }
 
-// Builds a page in a host, which its `root` gives colours and is told what it shows, and again where
+// Builds a page in a host with the colours of its `root`, which notes what is shown; builds it again where
 // the page changes between light and dark; returns what ends it.
 async function show(host, block, root, built) {
   let close;
