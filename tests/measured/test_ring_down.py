@@ -1,8 +1,11 @@
 """Frequency and damping over amplitude, against oscillators that are known in closed form."""
 
+import importlib
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.signal.windows import blackmanharris
 from scipy.special import ellipk
 
 import fecontact as fc
@@ -203,3 +206,19 @@ def test_degrees_of_freedom_of_the_deviations_are_those_of_their_scatter(window,
     # Of 200 variances the scatter is known to about 15 %.
     assert freedom.min() == pytest.approx(found[0].deviation_freedom, rel=0.45)
     assert freedom.max() > freedom.min()
+
+
+@pytest.mark.parametrize(("half", "apart", "windows"), [(60, 60, 1), (60, 60, 8), (90, 20, 12)])
+def test_freedom_of_the_noise_is_that_of_many_draws(half, apart, windows):
+    """Twice the squared mean over the variance of the noise power, from white noise itself."""
+    module = importlib.import_module("fecontact.measured.ring_down")
+    step, f = 1e-3, 40.0
+    averaged = (min(module._AVERAGED, windows) + 1) // 2
+    places = module._beside(f, 1.0 / (2.0 * half * step))
+    turn = np.exp(-2j * np.pi * step * places[:, None] * np.arange(2 * half + 1))
+    noise = np.random.default_rng(5).standard_normal((8000, 2 * half + 1 + apart * (averaged - 1)))
+    power = np.mean([np.abs(noise[:, k * apart : k * apart + 2 * half + 1]
+                            @ (turn * blackmanharris(2 * half + 1)).T) ** 2
+                     for k in range(averaged)], axis=(0, 2))
+    assert module._noise_freedom(half, step, f, apart, windows) == pytest.approx(
+        2.0 * power.mean() ** 2 / power.var(), rel=0.08)
