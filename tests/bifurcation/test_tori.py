@@ -293,7 +293,7 @@ def test_multipliers_of_given_jacobians():
         return J
 
     for unknown in (0, 1):
-        found = stability_of(jacobians, (f1, f2), (3, 3), 15, unknown)
+        found = stability_of(jacobians, (f1, f2), 0.0, 24, 15, unknown)
         assert found.multipliers == pytest.approx([1.0, np.exp(-0.7 / f1)], rel=1e-6)
         assert found.trivial.tolist() == [0][:unknown]
     assert TorusStability(np.array([1.01, 0.5]), np.array([0])).stable

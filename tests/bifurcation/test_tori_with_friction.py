@@ -135,8 +135,13 @@ def test_the_ground_may_be_the_second_frequency_only_by_name():
         torus_branch(field, steady(system, 1.0, 1.0), second="load")
 
 
-def test_elements_that_switch_are_refused():
-    system = oscillator(0.2e-3, JenkinsFriction(1e5, 0.4))
-    with pytest.raises(InputError, match="elastic Coulomb elements"):
-        torus_branch(contact_field(system, ["drive.amplitude_x"]),
-                     steady(oscillator(0.2e-3), 1.0, 1.0))
+@pytest.mark.parametrize(("amplitude", "most"), [(0.2e-3, 1e-6), (0.5e-3, 0.02)])
+def test_an_element_slides_on_waves(amplitude, most):
+    system = oscillator(amplitude, JenkinsFriction(1e5, 0.4))
+    run = steady(system)
+    point = torus_branch(contact_field(system, ["drive.amplitude_x"]), run, second="drive",
+                         method=TorusBalance(9, 60),
+                         options=ContinuationOptions(points=1)).points[0]
+    assert misfit(torus_motion(point), run)[:4].max() < most
+    assert point.values["truncation_error"] < most
+    assert point.values["stable"]

@@ -18,9 +18,10 @@ from fecontact.bifurcation.continuation.problem import (
 )
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.harmonic.layout import Layout
+from fecontact.bifurcation.harmonic.layout import Layout, layout_of
 from fecontact.bifurcation.orbits.branches import as_motion
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.tori.elements import elements_of
 from fecontact.bifurcation.tori.excitation import Excitation, excitation_of
 from fecontact.bifurcation.tori.from_run import fitted
 from fecontact.bifurcation.tori.method import SecondExcitation, TorusBalance
@@ -82,8 +83,8 @@ def torus_branch(
     Raises
     ------
     InputError, AnalysisError
-        If the start or the excitations do not suit, for friction by elastic Coulomb elements, or
-        if no torus is found near the start.
+        If the start or the excitations do not suit, for elastic Coulomb elements beside other
+        internal variables, or if no torus is found near the start.
     """
     require_field(field)
     require_kind("torus_branch", (BranchPoint, PeriodicMotion, Trajectory, FieldRun, tuple),
@@ -92,11 +93,6 @@ def torus_branch(
     require_kind("torus_branch", (str, SecondExcitation, type(None)), second=second)
     require_finite("torus_branch", direction=direction)
     require_flags("torus_branch", both=both)
-    if isinstance(field, ContactField) and slider_counts(field.system()).any():
-        raise InputError("torus_branch: elastic Coulomb elements (JenkinsFriction, IwanFriction, "
-                         "FourParameterIwanFriction) switch along a motion, which series of two "
-                         "angles do not resolve; take a smooth friction law, or "
-                         "fecontact.simulate.")
     chosen = options_of(options, bounds)
     name = (start.branch.parameter_name if parameter is None and isinstance(start, BranchPoint)
             else field.parameter_or_only(parameter))
@@ -130,20 +126,33 @@ def torus_branch(
 
 
 def _layout(field: VectorField) -> Layout:
-    modes = field.system().basis.modes if isinstance(field, ContactField) else 0
-    return Layout(field.dimension, modes)
+    """Layout of the states: deflections of elastic Coulomb elements follow from displacements."""
+    if not isinstance(field, ContactField):
+        return Layout(field.dimension)
+    found = layout_of(field)
+    return found if slider_counts(field.system()).any() else replace(found, memory=0, nodes=0)
 
 
 def _problem(
     excitation: Excitation, values: Array, free: int, method: TorusBalance, X: Array,
-    frequencies: tuple[float, float], amplitudes: Array, given: Any,
+    frequencies: tuple[float, float], amplitudes: Array, given: Any, kept: Array | None = None,
 ) -> TorusProblem:
     scales, width, options = given
     sizes, limits = sizes_of(scales, amplitudes + 1e-300)
+    layout = _layout(excitation.field)
+    elements = elements_of(excitation.field, layout)
+    if elements is not None and kept is not None:
+        elements = replace(elements, kept=replace(elements.kept, offsets=kept))
     return TorusProblem(
         excitation, values, free, method.orders, method.counts, X,
         np.concatenate([sizes, frequencies, [width_of(width, options, values[free])]]),
-        _layout(excitation.field), method.stability, method.tolerance, limits)
+        layout, method.stability, method.tolerance, limits, elements)
+
+
+def _kept(field: VectorField, motion: PeriodicMotion) -> Array | None:
+    """Deflections that elements have which never slide, less their displacements."""
+    elements = elements_of(field, _layout(field))
+    return None if elements is None else elements.kept.left_by(motion.states).offsets
 
 
 def _unknowns(problem: TorusProblem, X: Array, frequencies: tuple[float, float]) -> Array:
@@ -181,7 +190,8 @@ def _from_neimark_sacker(
     X, amplitudes = _of_orbit(_layout(field), motion, method.orders)
     frequencies = (1.0 / motion.period, point.angle / (2.0 * np.pi * motion.period))
     values = point.parameter_values(field)
-    problem = _problem(excitation, values, free, method, X, frequencies, amplitudes, given)
+    problem = _problem(excitation, values, free, method, X, frequencies, amplitudes, given,
+                       _kept(field, motion))
     u = _unknowns(problem, X, frequencies)
     leaving = np.zeros_like(X)
     rows = np.arange(2 * method.orders[0] + 1, 6 * method.orders[0] + 3)
@@ -228,7 +238,8 @@ def _from_motion(
         fit, frequencies, orders = fitted(motion.times, motion.states[:, layout.columns], known,
                                           method.orders)
         X, amplitudes = with_orders(fit, orders, method.orders), motion.amplitudes
-    problem = _problem(excitation, values, free, method, X, frequencies, amplitudes, given)
+    problem = _problem(excitation, values, free, method, X, frequencies, amplitudes, given,
+                       _kept(field, motion))
     return problem, _unknowns(problem, X, frequencies)
 
 
@@ -247,7 +258,8 @@ def _from_torus(
     scales = np.asarray(known["scales"], dtype=float)
     frequencies = float(motion.frequencies[0]), float(motion.frequencies[1])
     problem = _problem(excitation, values, free, own, X, frequencies, scales[: layout.states],
-                       (given[0], given[1] or float(scales[-1]), given[2]))
+                       (given[0], given[1] or float(scales[-1]), given[2]),
+                       known.get("kept_deflections"))
     u = _unknowns(problem, X, frequencies)
     tangent = np.zeros_like(u)
     L = len(motion.coefficients)
@@ -290,5 +302,8 @@ def _followed(
         "torus_harmonics": np.array(problem.orders), "torus_samples": np.array(problem.samples),
         "torus_multipliers": int(problem.multipliers), "tolerance": problem.tolerance,
         "torus_displacements": problem.layout.displacements, "periods": problem.excitation.periods}
+    if problem.elements is not None:
+        attributes |= {"torus_memory": problem.layout.memory,
+                       "kept_deflections": problem.elements.kept.offsets}
     return continue_branch(problem, u, options, name=name, tangent=tangent, direction=direction,
                            both=both, attributes=attributes)

@@ -49,6 +49,14 @@ class Excitation:
         return (None if self.first is None else self.first(values) / self.periods,
                 None if self.second is None else self.second(values))
 
+    def without_elements(self) -> "Excitation":
+        """The excitation of the field without elastic Coulomb elements."""
+        assert isinstance(self.field, ContactField)
+        shifted = self.shifted
+        return replace(self, field=self.field.without_elements(),
+                       shifted=shifted.without_elements() if isinstance(shifted, ContactField)
+                       else None)
+
     def on_lines(
         self, taus: Array, x: Array, values: Array, frequency: float, active: Iterable[int] = (),
         *, derivatives: bool = True,

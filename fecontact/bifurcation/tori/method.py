@@ -20,8 +20,9 @@ class TorusBalance:
 
     The motion is x(t) = X(2 pi f1 t, 2 pi f2 t) with the harmonics k1 f1 + k2 f2, |k1| <= H1,
     0 <= k2 <= H2. Forces are evaluated on a grid of both angles (alternating frequency and time),
-    so that all smooth laws work unchanged. Displacements of contact systems, internal variables of
-    friction and the states of other fields are unknown: (2 H1 + 1) (2 H2 + 1) numbers each.
+    so that all smooth laws work unchanged; elastic Coulomb elements are followed along motions.
+    Displacements of contact systems, other internal variables of friction and the states of other
+    fields are unknown: (2 H1 + 1) (2 H2 + 1) numbers each.
 
     Parameters
     ----------

@@ -103,8 +103,10 @@ def torus_motion(point: BranchPoint) -> TorusMotion:
     first, second = (int(H) for H in known["torus_harmonics"])
     names, m = tuple(map(str, known["state_names"])), int(known["torus_displacements"])
     k = orders(first, second)
-    X = point.u[: (2 * len(k) - 1) * (len(names) - m)].reshape(2 * len(k) - 1, -1)
+    c = int(known.get("torus_memory", 0))
+    X = point.u[: (2 * len(k) - 1) * (len(names) - m - c)].reshape(2 * len(k) - 1, -1)
+    z = np.asarray(point.values["memory"]) if c else np.zeros((len(X), 0))
     frequencies = np.array([point.values["frequency_1"], point.values["frequency_2"]], dtype=float)
     speeds = turned(X[:, :m], 2.0 * np.pi * k @ frequencies)
     return TorusMotion(frequencies, (first, second),
-                       np.concatenate([X[:, :m], speeds, X[:, m:]], axis=1), names)
+                       np.concatenate([X[:, :m], speeds, X[:, m:], z], axis=1), names)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,6 +11,7 @@ from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, en
 from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.woodbury import Factors
 from fecontact.bifurcation.orbits.same_orbit import shrunk
+from fecontact.bifurcation.tori.elements import Friction, TorusElements
 from fecontact.bifurcation.tori.excitation import Excitation
 from fecontact.bifurcation.tori.series import (
     complex_coefficients,
@@ -25,6 +26,7 @@ from fecontact.bifurcation.tori.stability import (
     RESOLVED,
     TorusStability,
     fastest_change,
+    intervals_for,
     stability_of,
 )
 from fecontact.core.errors import AnalysisError
@@ -32,6 +34,8 @@ from fecontact.core.types import Array
 
 # Relative step of differences in a parameter that changes a prescribed frequency.
 _DIFFERENCE = 1e-5
+# Part of their limits by which elements that do not slide are short of them.
+_WITHIN = 1e-6
 # Points per harmonic among which extremes are sought.
 _FINE = 16
 # Test function whose zero ends a branch of tori that shrink to an orbit.
@@ -64,7 +68,9 @@ class TorusProblem(Problem):
     scales : (d + 3,) array
         Scales in the step length: of each state, of both frequencies and of the parameter.
     layout : Layout
-        How states become unknowns; internal variables are series.
+        How states become unknowns; internal variables are series, but those of elements.
+    elements : TorusElements, optional
+        Elastic Coulomb elements, whose deflections follow from the displacements.
     multipliers : bool
         Whether points have multipliers.
     tolerance : float
@@ -84,6 +90,7 @@ class TorusProblem(Problem):
     multipliers: bool = True
     tolerance: float = 0.05
     limits: Array | None = None
+    elements: TorusElements | None = None
 
     keeps_matrix: ClassVar[bool] = True
     ends: ClassVar[Mapping[str, BranchStatus]] = {_SHRINKS: BranchStatus.SINGLE_FREQUENCY}
@@ -137,10 +144,23 @@ class TorusProblem(Problem):
     def ratio(self, frequencies: tuple[float, float]) -> float:
         """Ratio r of the lines on which the equations are evaluated; see `.series`."""
         # Without a second excitation the rates do not change across a torus but by its states.
-        return 0.0 if self.excitation.shifted is None else frequencies[1] / frequencies[0]
+        alone = self.excitation.shifted is None and self.elements is None
+        return 0.0 if alone else frequencies[1] / frequencies[0]
+
+    @cached_property
+    def bare(self) -> Excitation:
+        """Field and excitations without elements."""
+        return self.excitation if self.elements is None else self.excitation.without_elements()
+
+    def friction(self, u: Array, taus: Array, count: int, *, derivatives: bool = False) -> Friction:
+        """Friction of the elements on lines; see :meth:`TorusElements.friction`."""
+        assert self.elements is not None
+        X = np.ascontiguousarray(self.coefficients(u)[:, : self.layout.displacements])
+        return self.elements.friction(X, self.orders, self.frequencies(u), taus, count,
+                                      self.parameters(u), derivatives=derivatives)
 
     def whole(self, X: Array, frequencies: tuple[float, float]) -> Array:
-        """Coefficients (L, d) of all states."""
+        """Coefficients (L, d - c) of all states but deflections of elements."""
         m = self.layout.displacements
         if not m:
             return X
@@ -150,7 +170,7 @@ class TorusProblem(Problem):
     def states(
         self, u: Array, taus: Array, count: int, ratio: float
     ) -> Array:
-        """States (count, P, d) on lines at tau (P,)."""
+        """States (count, P, d - c) on lines at tau (P,), without deflections of elements."""
         c = complex_coefficients(self.whole(self.coefficients(u), self.frequencies(u)),
                                  *self.orders)
         return on_lines(c, taus, count, ratio)
@@ -200,11 +220,17 @@ class TorusProblem(Problem):
         """Frequencies, extremes of the states, errors and stability."""
         frequencies = self.frequencies(u)
         fine = [_FINE * H for H in self.orders]
-        x = self.states(u, np.arange(fine[0]) / fine[0], fine[1], 0.0)
+        taus, memory = np.arange(fine[0]) / fine[0], linearisation.memory
+        x = self.states(u, taus, fine[1], 0.0)
+        if self.elements is not None:
+            x = np.concatenate([x, on_lines(complex_coefficients(memory, *self.orders), taus,
+                                            fine[1], 0.0)], axis=2)
         found = {"frequency_1": frequencies[0], "frequency_2": frequencies[1],
                  "minimum": x.min(axis=(0, 1)), "maximum": x.max(axis=(0, 1)),
                  "truncation_error": linearisation.truncation_error,
                  "sampling_error": linearisation.sampling_error}
+        if self.elements is not None:
+            found |= {"memory": memory}
         if self.multipliers:
             stability: TorusStability = linearisation.stability
             found |= {"multipliers": stability.multipliers, "stable": stability.stable,
@@ -266,7 +292,7 @@ class TorusLinearisation:
         return self.problem.states(self.u, self._taus, self.problem.samples[1], self.ratio)
 
     def _evaluated(self, active: tuple[int, ...], derivatives: bool) -> tuple[Array, Array, Array]:
-        return self.problem.excitation.on_lines(
+        return self.problem.bare.on_lines(
             self._taus, self._states, self.problem.parameters(self.u), self.frequencies[0], active,
             derivatives=derivatives)
 
@@ -280,7 +306,34 @@ class TorusLinearisation:
         """Rates (N2, N1, b) of the equations at the samples."""
         f = (self.derivatives[0] if "derivatives" in self.__dict__
              else self._evaluated((), False)[0])
-        return f[:, :, self.problem.layout.rows]
+        found = f[:, :, self.problem.layout.rows]
+        if self.problem.elements is not None:
+            found = found - np.einsum("qpjt,jti->qpi", self._friction.forces, self._tangents)
+        return found
+
+    @cached_property
+    def _friction(self) -> Friction:
+        return self.problem.friction(self.u, self._taus, self.problem.samples[1],
+                                     derivatives="derivatives" in self.__dict__)
+
+    @property
+    def _tangents(self) -> Array:
+        """Rows (n, t, m) of the displacements of nodes along their tangents."""
+        return np.asarray(self._axes[:, ::2])
+
+    @property
+    def _axes(self) -> Array:
+        """Rows (n, d, m) of the displacements of nodes along their axes."""
+        assert self.problem.elements is not None
+        rows: Array = self.problem.elements.field.arrays(self.problem.parameters(self.u)).rows
+        return rows
+
+    @cached_property
+    def memory(self) -> Array:
+        """Coefficients (L, c) of the deflections of elements."""
+        if self.problem.elements is None:
+            return np.zeros((len(self.problem.reference), 0))
+        return projected(self._friction.deflections, *self.problem.orders, self.ratio)
 
     @cached_property
     def _turns(self) -> Array:
@@ -337,7 +390,21 @@ class TorusLinearisation:
             out[rows, q, rows, q] -= turns**2
         out[cosines[1:, None], y, sines[:, None], y] += turns
         out[sines[:, None], y, cosines[1:, None], y] -= turns
+        if problem.elements is not None:
+            self._add_elements(out)
         return out
+
+    def _add_elements(self, out: Array) -> None:
+        """Add the derivatives of the forces of elements to those of the balance."""
+        problem = self.problem
+        L = len(problem.reference)
+        friction = problem.friction(self.u, self._taus, problem.samples[1], derivatives=True)
+        for rows, axes, tangents in zip(friction.rows, self._axes, self._tangents, strict=True):
+            if rows.any():
+                t = rows.shape[2]
+                hat = projected(rows.reshape(*rows.shape[:2], -1), *problem.orders,
+                                self.ratio).reshape(L, t, len(axes), L)
+                out += np.einsum("ltak,ti,am->likm", hat, tangents, axes, optimize=True)
 
     @cached_property
     def _by_common(self) -> Array:
@@ -345,6 +412,9 @@ class TorusLinearisation:
         problem, m = self.problem, self.problem.layout.displacements
         _, by_velocity, by_parameter = self._blocks
         X, columns = problem.coefficients(self.u), []
+        if problem.elements is not None:
+            # The lines turn with the frequencies, and limits may depend on any parameter.
+            return np.array([self._by_differences(place) for place in range(-problem.common, 0)]).T
         for i in problem.unknown:
             moved = turned(X, 2.0 * np.pi * problem.pairs[:, i])
             speeds = on_lines(complex_coefficients(moved[:, :m], *problem.orders), self._taus,
@@ -354,18 +424,24 @@ class TorusLinearisation:
                 moved -= projected(np.einsum("qpij,qpj->qpi", by_velocity, speeds),
                                    *problem.orders, self.ratio)
             columns.append(moved.reshape(-1))
-        h = _DIFFERENCE * max(abs(float(self.u[-1])), 1e-3)
-        sides = []
-        for sign in (1.0, -1.0):
-            beside = self.u.copy()
-            beside[-1] += sign * h
-            sides.append(beside)
+        sides = self._beside(-1)
         if problem.frequencies(sides[0]) == problem.frequencies(sides[1]):
             columns.append(-projected(by_parameter, *problem.orders, self.ratio).reshape(-1))
         else:
-            up, down = (TorusLinearisation(problem, side).balance for side in sides)
-            columns.append((up - down) / (2.0 * h))
+            columns.append(self._by_differences(-1))
         return np.array(columns).T
+
+    def _beside(self, place: int) -> tuple[Array, Array]:
+        """Unknowns with more and with less of one of them."""
+        step = np.zeros_like(self.u)
+        step[place] = _DIFFERENCE * max(abs(float(self.u[place])), 1e-3)
+        return self.u + step, self.u - step
+
+    def _by_differences(self, place: int) -> Array:
+        """Derivatives (L b,) of the balance to an unknown, by differences."""
+        more, less = self._beside(place)
+        up, down = (TorusLinearisation(self.problem, side).balance for side in (more, less))
+        return np.asarray((up - down) / (more[place] - less[place]))
 
     @cached_property
     def condensed(self) -> Array:
@@ -417,6 +493,9 @@ class TorusLinearisation:
         turns = 2.0j * np.pi * (k1 * self.frequencies[0] + k2 * self.frequencies[1])
         by_state, by_velocity, _ = (part.mean(axis=(0, 1)) for part in self._blocks)
         turns = turns[:, :, None, None]
+        if problem.elements is not None:
+            by_state = by_state - np.einsum("jt,jti,jtm->im", self._friction.stiffness,
+                                            self._tangents, self._tangents)
         b = by_state.shape[0]
         power = np.ones(b) + (np.arange(b) < m)
         matrix = turns ** power * np.eye(b) - by_state
@@ -443,16 +522,28 @@ class TorusLinearisation:
     def stability(self) -> TorusStability:
         """Multipliers of the torus, from motions along it."""
         problem = self.problem
-        return stability_of(self._jacobians, self.frequencies, problem.orders,
-                            problem.samples[1] | 1, len(problem.unknown))
+        # Where elements switch within an interval, the error is of its length.
+        least = 0 if problem.elements is None else problem.samples[0]
+        return stability_of(self._jacobians, self.frequencies, self.fastest_change,
+                            max(least, intervals_for(problem.orders)), problem.samples[1] | 1,
+                            len(problem.unknown))
 
-    @property
+    @cached_property
     def fastest_change(self) -> float:
-        """See :func:`fecontact.bifurcation.tori.stability.fastest_change`."""
-        return fastest_change(self._jacobians, self.frequencies[0], self.problem.orders)
+        """See :func:`fecontact.bifurcation.tori.stability.fastest_change`.
 
-    def _jacobians(self, taus: Array, count: int) -> Array:
+        The return of elements to their limits, which collocation damps, does not count.
+        """
+        return fastest_change(partial(self._jacobians, sliding=False), self.frequencies[0],
+                              self.problem.orders)
+
+    def _jacobians(self, taus: Array, count: int, *, sliding: bool = True) -> Array:
         """Derivatives of the rates on lines along the torus."""
         problem, (first, second) = self.problem, self.frequencies
         x = problem.states(self.u, taus, count, second / first)
+        if problem.elements is not None:
+            friction = problem.friction(self.u, taus, count)
+            z = (friction.deflections + friction.sliding if sliding
+                 else (1.0 - _WITHIN) * friction.deflections)
+            x = np.concatenate([x, z], axis=2)
         return problem.excitation.on_lines(taus, x, problem.parameters(self.u), first)[1]

@@ -62,11 +62,16 @@ class TorusStability:
 
 
 def stability_of(
-    jacobians: Jacobians, frequencies: tuple[float, float], orders: tuple[int, int], lines: int,
-    unknown: int,
+    jacobians: Jacobians, frequencies: tuple[float, float], fastest: float, least: int,
+    lines: int, unknown: int,
 ) -> TorusStability:
-    """Multipliers of a torus with a number of ``unknown`` frequencies."""
-    M = transition_matrices(jacobians, frequencies[0], orders, lines)
+    """Multipliers of a torus with a number of ``unknown`` frequencies.
+
+    The linearised equations are solved on at least so many intervals, and on as many as the
+    ``fastest`` change over the period 1 / f1 needs.
+    """
+    intervals = max(least, min(int(fastest / _CHANGES), _MOST))
+    M = transition_matrices(jacobians, frequencies[0], intervals, lines)
     growth = np.exp(exponents(M, frequencies[1] / frequencies[0]))
     near = np.argsort(np.abs(np.log(np.maximum(growth, 1e-300))))
     return TorusStability(growth, near[:unknown])
@@ -78,8 +83,13 @@ def fastest_change(jacobians: Jacobians, frequency: float, orders: tuple[int, in
     return float(np.abs(np.linalg.eigvals(few)).max()) / frequency
 
 
+def intervals_for(orders: tuple[int, int]) -> int:
+    """Intervals of the linearised equations that the harmonics of a torus need at least."""
+    return max(_LEAST, _INTERVALS * orders[0])
+
+
 def transition_matrices(
-    jacobians: Jacobians, frequency: float, orders: tuple[int, int], lines: int
+    jacobians: Jacobians, frequency: float, intervals: int, lines: int
 ) -> Array:
     """Transition matrices M (Q, d, d) over one period 1 / f1 along Q lines.
 
@@ -89,13 +99,12 @@ def transition_matrices(
         Derivatives (Q, P, d, d) of the rates at tau (P,) of Q motions, from equidistant phi.
     frequency : float
         f1 [Hz].
-    orders : (int, int)
-        H1 and H2.
+    intervals : int
+        Equal intervals of a period.
     lines : int
         Q.
     """
-    wanted = int(fastest_change(jacobians, frequency, orders) / _CHANGES)
-    N = max(_LEAST, _INTERVALS * orders[0], min(wanted, _MOST))
+    N = intervals
     points, basis, slopes = radau_rule(_DEGREE)
     J = jacobians(((np.arange(N)[:, None] + points) / N).reshape(-1), lines)
     d = J.shape[-1]

@@ -244,7 +244,7 @@ def _stored(group: Any, path: str | Path) -> Branch:
 
 # Attributes of branches by what they are.
 _COUNTS = ("degree", "displacements", "harmonics", "memory", "memory_nodes", "mode_number",
-           "periods", "samples", "torus_displacements")
+           "periods", "samples", "torus_displacements", "torus_memory")
 _LAYOUT = ("displacements", "harmonics", "memory", "memory_nodes", "state_names")
 _NUMBERS = ("level",)
 _TEXTS = ("condition", "kind", "level_label", "level_name", "observed", "stability")
@@ -322,12 +322,14 @@ def _require_tori(attributes: dict[str, Any], u: list[Array], stored: dict[str, 
     if missing:
         raise DamagedError(f"it lacks '{missing[0]}'")
     states, m = len(attributes["state_names"]), attributes["torus_displacements"]
-    harmonics = attributes["torus_harmonics"].tolist()
-    if len(harmonics) != 2 or min(harmonics) < 1 or not 2 * m <= states:
+    harmonics, c = attributes["torus_harmonics"].tolist(), attributes.get("torus_memory", 0)
+    if len(harmonics) != 2 or min(harmonics) < 1 or not 2 * m + c <= states:
         raise DamagedError(f"the attribute 'torus_harmonics' is {shown(harmonics)}")
-    count = (2 * harmonics[0] + 1) * (2 * harmonics[1] + 1) * (states - m)
-    if not all(count < len(each) for each in u):
+    L = (2 * harmonics[0] + 1) * (2 * harmonics[1] + 1)
+    if not all(L * (states - m - c) < len(each) for each in u):
         raise DamagedError(f"{states} states do not fit the harmonics {shown(harmonics)}")
+    if c and u and any(np.shape(each) != (L, c) for each in stored.get("memory", [()])):
+        raise DamagedError(f"'values/memory' has no {L} coefficients of {c} deflections")
 
 
 def _write(group: Any, name: str, values: list[Any]) -> None:
