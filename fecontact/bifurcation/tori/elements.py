@@ -177,8 +177,9 @@ class _Line(NamedTuple):
 def _carry(line: _Line, stiffness: float, begun: Block, rows: Array4, ends: Block) -> None:
     """Add ``stiffness`` times the derivatives of z to ``rows`` (Q, P, t, d L).
 
-    Those at the ends of the lines, less those of the displacements there, fill ``ends`` (Q, t, d L);
-    ``begun`` (Q, t, d L) are those with which lines begin, less those of the displacements.
+    Those at the ends of the lines, less those of the displacements there, fill ``ends``
+    (Q, t, d L); ``begun`` (Q, t, d L) are those with which lines begin, less those of the
+    displacements.
     """
     Q, P, L = line.values.shape
     t, columns = begun.shape[1], begun.shape[2]
