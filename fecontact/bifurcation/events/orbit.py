@@ -13,6 +13,7 @@ from fecontact.bifurcation.events.phases import Motion, Phase
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbits.floquet import FloquetTests
 from fecontact.bifurcation.orbits.shooting import run_from
+from fecontact.bifurcation.orbits.unknowns import FreeParameters
 from fecontact.core.errors import AnalysisError
 from fecontact.core.ties import first_largest
 from fecontact.core.types import Array
@@ -28,7 +29,7 @@ _FINER, _FINEST = 1e-2, 1e-13
 
 
 @dataclass(frozen=True, eq=False)
-class EventOrbit(FloquetTests, Problem):
+class EventOrbit(FreeParameters, FloquetTests, Problem):
     r"""A periodic orbit of a set-valued system whose K phases are known.
 
     Within a phase the contact state is kept, whatever its conditions say, so that the equations are
@@ -115,12 +116,6 @@ class EventOrbit(FloquetTests, Problem):
     def period(self, u: Array) -> float:
         """Period [s]."""
         return float(self.durations(u).sum())
-
-    def parameters(self, u: Array) -> Array:
-        """Parameter values (k,)."""
-        values = self.values.copy()
-        values[self.free] = u[-1]
-        return values
 
     def motion(self, u: Array) -> Motion:
         """The system at the parameters of u."""

@@ -21,6 +21,7 @@ from fecontact.bifurcation.harmonic.series import (
     series,
 )
 from fecontact.bifurcation.harmonic.woodbury import Factors, WoodburySolver, contact_directions
+from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, Integers
 from fecontact.system.elastic_sliders import without_elements
@@ -34,7 +35,7 @@ _NOTHING_KEPT = Kept(np.zeros((0, 0)), np.zeros(0), *np.zeros((2, 0), dtype=np.i
 
 
 @dataclass(frozen=True, eq=False)
-class Balance:
+class Balance(OrbitUnknowns):
     """Equations of a periodic orbit of x' = f(t, x, p) with truncated Fourier series.
 
     With tau = t / T, displacements q and other states y are Fourier series with H harmonics,
@@ -103,8 +104,7 @@ class Balance:
     @cached_property
     def autonomous(self) -> bool:
         """Whether the period is an unknown."""
-        return (self.turn is None and self.fixed is None
-                and self.field.forcing_period(self.values) is None)
+        return self.turn is None and self.fixed is None and super().autonomous
 
     @cached_property
     def series(self) -> Series:
@@ -135,32 +135,15 @@ class Balance:
             left = np.union1d(left, self.waves.left_out(self.reference.shape))
         return left
 
-    @cached_property
-    def common(self) -> int:
-        """Number of unknowns beside functions of time."""
-        return 1 + self.autonomous
-
     def coefficients(self, u: Array) -> Array:
         """Coefficients (2 H + 1, b) of q and y."""
         return u[: self.size].reshape(self.reference.shape)
 
     def period(self, u: Array) -> float:
         """Period T [s] of the orbit."""
-        if self.autonomous:
-            return float(u[-2])
         if self.turn is not None:
             return self.periods * self.turn / float(u[-1])
-        if self.fixed is not None:
-            return self.periods * self.fixed
-        given = self.field.forcing_period(self.parameters(u))
-        assert given is not None
-        return self.periods * given
-
-    def parameters(self, u: Array) -> Array:
-        """Parameter values (k,)."""
-        values = self.values.copy()
-        values[self.free] = u[-1]
-        return values
+        return super().period(u) if self.fixed is None else self.periods * self.fixed
 
     @cached_property
     def onsets(self) -> Array:

@@ -16,12 +16,13 @@ from fecontact.bifurcation.orbits.collocation_kernels import (
 )
 from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of
 from fecontact.bifurcation.orbits.mesh import Rule, rule
+from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
 
 
 @dataclass(frozen=True, eq=False)
-class CollocationEquations:
+class CollocationEquations(OrbitUnknowns):
     """Equations of a periodic orbit of x' = f(t, x, p), one parameter free.
 
     With time scaled to [0, 1], x is a polynomial of degree m on each of N intervals, continuous
@@ -65,11 +66,6 @@ class CollocationEquations:
     periods: int = 1
     second: int | None = None
 
-    @cached_property
-    def autonomous(self) -> bool:
-        """Whether the period is an unknown."""
-        return self.field.forcing_period(self.values) is None
-
     @property
     def intervals(self) -> int:
         """Number N of intervals."""
@@ -79,16 +75,6 @@ class CollocationEquations:
     def size(self) -> int:
         """Number N m d of nodal unknowns."""
         return self.reference.size
-
-    @cached_property
-    def common(self) -> int:
-        """Number of unknowns common to all intervals."""
-        return len(self.active) + self.autonomous
-
-    @cached_property
-    def active(self) -> tuple[int, ...]:
-        """Indices of the parameters that are unknowns, in their order in u."""
-        return (self.free,) if self.second is None else (self.second, self.free)
 
     @cached_property
     def ranges(self) -> Array:
@@ -142,22 +128,6 @@ class CollocationEquations:
     def nodes(self, u: Array) -> Array:
         """Nodes (N m, d) of the orbit."""
         return u[: self.size].reshape(self.reference.shape)
-
-    def period(self, u: Array) -> float:
-        """Period T [s] of the orbit."""
-        if self.autonomous:
-            return float(u[self.size])
-        given = self.field.forcing_period(self.parameters(u))
-        assert given is not None
-        return self.periods * given
-
-    def parameters(self, u: Array) -> Array:
-        """Parameter values (k,)."""
-        values = self.values.copy()
-        values[self.free] = u[-1]
-        if self.second is not None:
-            values[self.second] = u[-2]
-        return values
 
     def weights(self) -> Array:
         """Weights of the inner product: mean over the orbit of the scaled states, T, parameter."""

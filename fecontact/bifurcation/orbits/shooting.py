@@ -20,6 +20,7 @@ from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests, floquet_
 from fecontact.bifurcation.orbits.mesh import interpolate, require_segments
 from fecontact.bifurcation.orbits.motions import solver_text
 from fecontact.bifurcation.orbits.same_orbit import VANISHING, near_saddle, same_place, shrunk
+from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array
 from fecontact.integrate.ensembles import ensemble
@@ -40,7 +41,7 @@ _RETURNS = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class ShootingProblem(FloquetTests, Problem):
+class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
     """Equations of a periodic orbit of a contact system, one parameter free.
 
     The period is divided into K segments; the run from the start x_j of each ends at the start of
@@ -106,16 +107,6 @@ class ShootingProblem(FloquetTests, Problem):
     event_precision: ClassVar[float] = 1e-9
     ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
 
-    @cached_property
-    def autonomous(self) -> bool:
-        """Whether the period is an unknown."""
-        return self.field.forcing_period(self.values) is None
-
-    @property
-    def common(self) -> int:
-        """Number of unknowns common to all segments."""
-        return 2 if self.autonomous else 1
-
     def attributes(self) -> dict[str, Any]:
         """Attributes of a branch from which the problem of its points is restored."""
         found = {"state_names": list(self.field.state_names),
@@ -133,20 +124,6 @@ class ShootingProblem(FloquetTests, Problem):
     def starts(self, u: Array) -> Array:
         """Starts (K, d) of the segments."""
         return np.ascontiguousarray(u[: -self.common].reshape(-1, self.field.dimension))
-
-    def period(self, u: Array) -> float:
-        """Period T [s] of the orbit."""
-        if self.autonomous:
-            return float(u[-2])
-        given = self.field.forcing_period(self.parameters(u))
-        assert given is not None
-        return self.periods * given
-
-    def parameters(self, u: Array) -> Array:
-        """Parameter values (k,)."""
-        values = self.values.copy()
-        values[self.free] = u[-1]
-        return values
 
     @cached_property
     def phase_row(self) -> Array:

@@ -11,6 +11,7 @@ from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, en
 from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.woodbury import Factors
 from fecontact.bifurcation.orbits.same_orbit import shrunk
+from fecontact.bifurcation.orbits.unknowns import FreeParameters
 from fecontact.bifurcation.tori.elements import Friction, TorusElements
 from fecontact.bifurcation.tori.excitation import Excitation
 from fecontact.bifurcation.tori.series import (
@@ -43,7 +44,7 @@ _SHRINKS = "torus shrinks"
 
 
 @dataclass(frozen=True, eq=False)
-class TorusProblem(Problem):
+class TorusProblem(FreeParameters, Problem):
     """Equations of a torus X(theta1, theta2), along which theta_i' = 2 pi f_i.
 
     With D = 2 pi (f1 d/dtheta1 + f2 d/dtheta2), displacements q and other states y are Fourier
@@ -124,12 +125,6 @@ class TorusProblem(Problem):
     def coefficients(self, u: Array) -> Array:
         """Coefficients (L, b) of q and y."""
         return u[: self.size].reshape(self.reference.shape)
-
-    def parameters(self, u: Array) -> Array:
-        """Parameter values (k,)."""
-        values = self.values.copy()
-        values[self.free] = u[-1]
-        return values
 
     def frequencies(self, u: Array) -> tuple[float, float]:
         """f1 and f2 [Hz]."""

@@ -1,0 +1,56 @@
+"""Parameters and period among the unknowns of orbits and tori.
+
+The last unknowns are the free parameters; the period of an orbit stands before them where it is
+unknown, which it is if rates do not depend on time.
+"""
+
+from functools import cached_property
+
+from fecontact.core.types import Array
+from fecontact.system.fields.vector_field import VectorField
+
+
+class FreeParameters:
+    """Values (k,) of parameters, of which one is followed, ``free``, or a ``second`` one too."""
+
+    values: Array
+    free: int
+    second: int | None = None
+
+    @cached_property
+    def active(self) -> tuple[int, ...]:
+        """Indices of the parameters that are unknowns, in their order in u."""
+        return (self.free,) if self.second is None else (self.second, self.free)
+
+    def parameters(self, u: Array) -> Array:
+        """Parameter values (k,)."""
+        values = self.values.copy()
+        values[self.free] = u[-1]
+        if self.second is not None:
+            values[self.second] = u[-2]
+        return values
+
+
+class OrbitUnknowns(FreeParameters):
+    """Period and parameters of an orbit over ``periods`` periods of the forcing of a field."""
+
+    field: VectorField
+    periods: int
+
+    @cached_property
+    def autonomous(self) -> bool:
+        """Whether the period is an unknown."""
+        return self.field.forcing_period(self.values) is None
+
+    @cached_property
+    def common(self) -> int:
+        """Number of unknowns that are no states: parameters, and the period if it is unknown."""
+        return len(self.active) + self.autonomous
+
+    def period(self, u: Array) -> float:
+        """Period T [s] of the orbit."""
+        if self.autonomous:
+            return float(u[-self.common])
+        given = self.field.forcing_period(self.parameters(u))
+        assert given is not None
+        return self.periods * given
