@@ -149,12 +149,12 @@ def test_frequencies_keep_their_digits_beside_stiff_springs():
 def test_a_bolt_presses_two_masses_together_with_its_preload(bolt):
     """F of the contact = N_0, or c (s + e); action equals reaction: the base carries nothing."""
     contact, k = 1e6, 1e4
+    spring = Spring("top.p", "floor.p", k, 20.0, direction=(0.0, 1.0), **bolt)
     system = ContactSystem(
         bodies={"top": mass(1.0), "floor": mass(3.0)},
         interfaces=[Interface("joint", PointPairing("top", "p", "floor", "p"),
                               LinearContact(contact), ConstantFriction(0.0))],
-        links=[Spring("top.p", "floor.p", k, direction=(0.0, 1.0), **bolt),
-               Bushing("floor.p", None, (1e5, 1e5, 1e5)), Bushing("top.p", None, (1e5, 0.0, 1e5))])
+        links=[spring, Bushing("floor.p", None, (1e5, 1e5, 1e5)), Bushing("top.p", None, (1e5, 0.0, 1e5))])
     q = equilibrium(system).modal_coordinates
     basis = system.basis
     top, floor = (basis.T[basis.point_index(name), 1] @ q for name in ("top.p", "floor.p"))
@@ -162,6 +162,13 @@ def test_a_bolt_presses_two_masses_together_with_its_preload(bolt):
     # c (s + e) + N_0 = F with e = -F / contact
     wanted = 500.0 / (1.0 + k / contact)
     assert force == pytest.approx(wanted, rel=1e-9)
+    assert spring.tension(basis, q) == pytest.approx(wanted, rel=1e-9)
+    rows = basis.T[[basis.point_index(name) for name in ("top.p", "floor.p")], 1]
+    rising = np.linalg.lstsq(rows, [0.3, -0.2], rcond=None)[0]
+    assert spring.tension(basis, [q, 0.0 * q], rising) == pytest.approx(
+        [wanted + 10.0, 510.0], rel=1e-9)
+    with pytest.raises(InputError, match="numbers for each state"):
+        spring.tension(basis, q[1:])
     assert floor == pytest.approx(0.0, abs=1e-12)
     loaded = ContactSystem(basis, system.normal, system.friction, load=Load(gravity=None))
     assert (loaded.arrays.constant_load == system.arrays.constant_load).all()

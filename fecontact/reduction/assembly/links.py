@@ -19,7 +19,7 @@ from fecontact.core.errors import (
     require_not_negative,
     shown,
 )
-from fecontact.core.types import Array, Coordinates
+from fecontact.core.types import Array, ArrayLike, Coordinates
 from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw
 from fecontact.reduction.assembly.changed_modes import in_modes
@@ -76,6 +76,24 @@ class Spring:
         check_ends(self)
         require_not_negative("Spring", stiffness=self.stiffness, damping=self.damping)
         require_finite("Spring", preload=self.preload, shortening=self.shortening)
+
+    def tension(
+        self, basis: ModalBasis, coordinates: ArrayLike, velocities: ArrayLike | None = None
+    ) -> Array:
+        """N [N] at modal coordinates (..., m) and velocities of a basis that this spring is in.
+
+        Without velocities that of a state at rest. Raises InputError for unknown points and another
+        number of coordinates.
+        """
+        row, motions = relative_row(basis, self), []
+        for name, given in (("coordinates", coordinates), ("velocities", velocities)):
+            values = np.zeros(basis.modes) if given is None else np.asarray(given, dtype=float)
+            if values.shape[-1:] != (basis.modes,):
+                raise InputError(f"Spring: {name} must have {basis.modes} numbers for each state, "
+                                 f"not the shape {values.shape}.")
+            motions.append(values @ row)
+        return np.asarray(self.stiffness * (motions[0] + self.shortening)
+                          + self.damping * motions[1] + self.preload)
 
 
 class NonlinearSpring:
