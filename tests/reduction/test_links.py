@@ -154,7 +154,8 @@ def test_a_bolt_presses_two_masses_together_with_its_preload(bolt):
         bodies={"top": mass(1.0), "floor": mass(3.0)},
         interfaces=[Interface("joint", PointPairing("top", "p", "floor", "p"),
                               LinearContact(contact), ConstantFriction(0.0))],
-        links=[spring, Bushing("floor.p", None, (1e5, 1e5, 1e5)), Bushing("top.p", None, (1e5, 0.0, 1e5))])
+        links=[spring, Bushing("floor.p", None, (1e5, 1e5, 1e5)),
+               Bushing("top.p", None, (1e5, 0.0, 1e5))])
     q = equilibrium(system).modal_coordinates
     basis = system.basis
     top, floor = (basis.T[basis.point_index(name), 1] @ q for name in ("top.p", "floor.p"))
