@@ -1,11 +1,11 @@
 """Decks of our own, read by this package and solved by CalculiX: displacements and frequencies.
 
 Each deck is solved twice by ``ccx`` (Debian: calculix-ccx) in a temporary folder, a static step and
-frequencies; ``read_mesh`` reads it too. Ten-node tetrahedra and eight-node bricks, also those with
-incompatible modes, have equal stiffness in both. CalculiX integrates the mass of tetrahedra at
-fewer points, and gives bricks with incompatible modes another mass. Other elements are read as
-others: bricks C3D8R with incompatible modes, C3D20 and C3D20R with 27 nodes, wedges C3D15 with 18;
-CalculiX integrates C3D6 at two points. Of these frequencies alone are compared.
+frequencies; ``read_mesh`` reads it too. Tetrahedra of ten nodes and bricks of eight and twenty,
+also those with incompatible modes, have equal stiffness in both. CalculiX integrates the mass of
+tetrahedra at fewer points, and gives bricks with incompatible modes another mass. Bricks C3D8R are
+read with incompatible modes. Bricks C3D20R and wedges, which CalculiX integrates at fewer points
+(C3D6 at two, C3D15 at nine), are integrated fully. Of these frequencies alone are compared.
 
 Public decks, which are no part of this package, follow if their files are given: the blade of
 NASA's rotor 37 (one part of fifteen-node wedges, free, beside CalculiX), and the Brake-Reuss beam,
@@ -40,7 +40,7 @@ EDGES = {4: ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
 # Corners of elements, and whether their edges have middles.
 ELEMENTS_OF = {"C3D10": (4, True), "C3D8": (8, False), "C3D8I": (8, False), "C3D8R": (8, False),
                "C3D20": (8, True), "C3D20R": (8, True), "C3D6": (6, False), "C3D15": (6, True)}
-SAME = ("C3D10", "C3D8", "C3D8I")
+SAME = ("C3D10", "C3D8", "C3D8I", "C3D20")
 # Set of all elements of the blade, and frequencies that the author of the beam's deck gives [Hz].
 ELEMENTS, BEAM = "Eall", (70.323, 151.26, 609.25)
 MATERIAL = "*MATERIAL, NAME=STEEL\n*ELASTIC\n2.1e11, 0.3\n*DENSITY\n7850.\n"

@@ -17,10 +17,10 @@ def plane(triangles, degree, kind="stress", **options):
     return ElasticBody(mesh, MATERIAL, thickness=0.3, degree=degree, plane=kind, **options)
 
 
-def ring(element):
+def ring(element, **options):
     """A solid ring of curved cells."""
     return ElasticBody(generate(Ring(0.5, 0.2, 0.1, element_size=0.3, layers=1, element=element)),
-                       MATERIAL)
+                       MATERIAL, **options)
 
 
 def mixed(degree, **options):
@@ -38,4 +38,7 @@ BODIES = {
     "hexahedra": lambda: block_body((2, 1, 1), material=MATERIAL, degree=1),
     "hexahedra, curved": lambda: ring("hexahedron"),
     "mixed": lambda: mixed(1), "mixed, quadratic": lambda: mixed(2),
+    "quadrilaterals, serendipity": lambda: plane(False, 2, bricks="serendipity"),
+    "hexahedra, curved, serendipity": lambda: ring("hexahedron", bricks="serendipity"),
+    "mixed, serendipity": lambda: mixed(2, bricks="serendipity"),
 }

@@ -40,6 +40,7 @@ from fecontact.fem.constraints import (
 from fecontact.fem.element_block import ElementBlock
 from fecontact.fem.elements.cell_geometry import centres_of
 from fecontact.fem.elements.cell_kinds import (
+    CELL_KINDS,
     HEXAHEDRON,
     blocks_of,
     edges_around,
@@ -65,10 +66,11 @@ _BYTES = {(2, 3): 7e3, (2, 4): 9.5e3, (3, 4): 7.5e3, (3, 5): 9e3, (3, 6): 1e4, (
 class ElasticBody(Summarised):
     """A linear elastic body, plane or solid, of quadratic (or linear) finite elements.
 
-    Displacement nodes are the mesh nodes, then the middles of the edges, then those of four-sided
-    faces of solids, then the centres of quadrilaterals and hexahedra; the degrees of freedom d k,
-    d k + 1, ... are the displacements of node k in x, y, ..., d = 2 or 3 being the dimension.
-    Quadratic elements follow curved edges of the mesh (isoparametric); linear ones are straight.
+    Displacement nodes are the mesh nodes, then the middles of the edges, then, of elements that are
+    not serendipity ones, those of four-sided faces of solids, then the centres of quadrilaterals
+    and hexahedra; the degrees of freedom d k, d k + 1, ... are the displacements of node k in x, y,
+    ..., d = 2 or 3 being the dimension. Quadratic elements follow curved edges of the mesh
+    (isoparametric); linear ones are straight.
 
     Parameters
     ----------
@@ -92,10 +94,11 @@ class ElasticBody(Summarised):
     constraints : sequence of LinearEquation, Tie or Coupling, optional
         Linear equations between displacements, see :mod:`fecontact.fem.constraints`; by default
         those of the mesh, which a file may hold.
-    bricks : 'full' or 'incompatible', optional
-        Hexahedra with ``degree = 1``: trilinear displacements alone, or with incompatible modes
-        of each cell, which bend without locking; by default those of the mesh. See
-        :mod:`fecontact.fem.incompatible_modes`.
+    bricks : 'full', 'incompatible' or 'serendipity', optional
+        Kind of quadrilaterals, hexahedra, wedges and pyramids; by default that of the mesh.
+        ``'incompatible'`` lets hexahedra with ``degree = 1`` bend without locking, see
+        :mod:`fecontact.fem.incompatible_modes`. ``'serendipity'`` with ``degree = 2`` are elements
+        of 8, 20, 15 and 13 nodes, without those in the middles of faces and cells.
     attachments : sequence of PointMass or PointSpring, optional
         Masses, springs and dashpots at points, see :mod:`fecontact.fem.attachments`; by default
         those of the mesh, which a file may hold.
@@ -138,7 +141,7 @@ class ElasticBody(Summarised):
             object.__setattr__(self, "bricks", self.mesh.bricks)
         require_choice("ElasticBody", "bricks", self.bricks, get_args(Bricks))
         plain, count = "triangles" if self.dimension == 2 else "tetrahedra", len(self.mesh.cells)
-        needed = sum(len(block.nodes) * block.kind.unknowns(int(self.degree))
+        needed = sum(len(block.nodes) * block.kind.unknowns(int(self.degree), self.serendipity)
                      * _BYTES[self.dimension, block.kind.corners] for block in self.mesh.blocks)
         require_memory("ElasticBody: the number of cells", count, needed / count,
                        f", by a larger element_size, or {plain} or degree = 1")
@@ -164,7 +167,8 @@ class ElasticBody(Summarised):
         curved = f", {len(mesh.curved_cells)} curved" if len(mesh.curved_cells) else ""
         return [
             ("mesh", f"{mesh.cells_in_words}{curved}, {len(mesh.nodes)} nodes, degree "
-             f"{self.degree}{', incompatible modes' if self.has_incompatible_modes else ''}"),
+             f"{self.degree}{', incompatible modes' if self.has_incompatible_modes else ''}"
+             f"{', serendipity' if self.serendipity else ''}"),
             *((axis, span(values, "m")) for axis, values in zip("xyz", mesh.nodes.T, strict=False)),
             ("thickness", f"{self.thickness:.4g} m, plane {self.plane}") if self.dimension == 2
             else ("volume", f"{mesh.volume:.4g} m³"),
@@ -179,6 +183,11 @@ class ElasticBody(Summarised):
         """True for eight-node bricks with incompatible modes."""
         return (self.dimension, self.degree, self.bricks) == (3, 1, "incompatible") and (
             HEXAHEDRON.name in self.mesh.cell_counts)
+
+    @property
+    def serendipity(self) -> bool:
+        """True for quadratic elements without nodes in the middles of faces and cells."""
+        return self.degree == 2 and self.bricks == "serendipity"
 
     @property
     def dimension(self) -> int:
@@ -244,8 +253,8 @@ class ElasticBody(Summarised):
         found = []
         for number, block in enumerate(self.mesh.blocks):
             kind = block.kind
-            members = (block.ordered if self.degree == 1
-                       else self.mesh._second_order.members[number])
+            members = (block.ordered if self.degree == 1 else self.mesh._second_order.members[
+                number][:, : kind.count(2, self.serendipity)])
             found.append(ElementBlock(
                 kind, block.numbers, np.ascontiguousarray(members), self.nodes,
                 members.shape[1] if self.curved else kind.corners,
@@ -273,7 +282,10 @@ class ElasticBody(Summarised):
     @cached_property
     def nodes(self) -> Array:
         """Reference places (N, d) of the displacement nodes [m]."""
-        return self.mesh.nodes if self.degree == 1 else self.mesh._second_order.places
+        if self.degree == 1:
+            return self.mesh.nodes
+        places, mesh = self.mesh._second_order.places, self.mesh
+        return places[: len(mesh.nodes) + len(mesh.edges[0])] if self.serendipity else places
 
     @cached_property
     def stiffness(self) -> Any:
@@ -526,17 +538,19 @@ class ElasticBody(Summarised):
         """Displacement nodes (k, n) of mesh edges (k, 2) or of faces (k, 3) or (k, 4).
 
         Edges: start, (middle,) end. Faces: corners, then of quadratic elements the middles between
-        successive corners, then the centre of four-sided ones: 3 or 6 of triangles, 4 or 9 of
-        quadrilaterals; rows of triangles beside quadrilaterals are filled by their last node.
+        successive corners, then the centre of four-sided ones: 3 or 6 of triangles, 4, 9 or, of
+        serendipity elements, 8 of quadrilaterals; rows of triangles beside quadrilaterals are
+        filled by their last node.
         """
         if self.dimension == 2 or self.degree == 1:
             return self.edge_nodes(facets) if self.dimension == 2 else np.asarray(facets)
-        found = np.empty((len(facets), {3: 6, 4: 9}[facets.shape[1]]), np.int64)
+        kind = CELL_KINDS[2, facets.shape[1]]
+        found = np.empty((len(facets), kind.count(2, self.serendipity)), np.int64)
         for which, some in blocks_of(facets):
             count = some.shape[1]
             parts = [some, *(self.edge_nodes(some[:, [i, (i + 1) % count]])[:, 1:2]
                              for i in range(count))]
-            if count == 4:
+            if count == 4 and not self.serendipity:
                 first = len(self.mesh.nodes) + len(self.mesh.edges[0])
                 faces = self.mesh._second_order.faces
                 parts.append(first + row_numbers(faces, np.sort(some, axis=1))[:, None])

@@ -24,6 +24,7 @@ from fecontact.fem.elements.cell_kinds import (
     unordered,
 )
 from fecontact.fem.elements.refinement import PARTS
+from fecontact.fem.elements.serendipity_parts import serendipity_parts
 from fecontact.fem.faces.surface import drawn_facets
 from fecontact.fem.incompatible_modes import mode_gradients
 from fecontact.fem.interpolation import element_kind, interpolation
@@ -156,6 +157,8 @@ def linear_cells(nodes: Array, elements: Integers) -> Integers:
         kind = element_kind(dimension, rows.shape[1])
         if rows.shape[1] == kind.corners:
             found.append(rows[:, np.argsort(kind.order)])
+        elif rows.shape[1] < len(kind.places):
+            found += serendipity_parts(kind, rows)
         else:
             found += [rows[:, list(part)] for part in PARTS[dimension, kind.corners]]
     return oriented(nodes, padded(found))[0]

@@ -32,8 +32,8 @@ def interpolation(
         Places of the displacement nodes [m].
     elements : (E, k) integer array
         Nodes of the elements in the order of ``CellKind.places``, straight or curved: 3 or 6 of
-        triangles, 4 or 9 of quadrilaterals, 4 or 10 of tetrahedra, 5 or 14 of pyramids, 6 or 18 of
-        wedges, 8 or 27 of hexahedra. Shorter rows are filled by their last node.
+        triangles, 4, 8 or 9 of quadrilaterals, 4 or 10 of tetrahedra, 5, 13 or 14 of pyramids, 6,
+        15 or 18 of wedges, 8, 20 or 27 of hexahedra. Shorter rows are filled by their last node.
     place : d floats
         [m].
     name : str
@@ -81,9 +81,9 @@ def interpolation(
 
 
 def element_kind(dimension: int, count: int) -> CellKind:
-    """Kind of elements with that many nodes, linear or quadratic."""
+    """Kind of elements with that many nodes, linear, serendipity or quadratic."""
     return next(kind for (of, corners), kind in CELL_KINDS.items()
-                if of == dimension and count in (corners, len(kind.places)))
+                if of == dimension and count in kind.counts)
 
 
 def _curved(nodes: Array, elements: Integers, kind: CellKind) -> Array:

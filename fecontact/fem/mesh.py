@@ -45,8 +45,9 @@ from fecontact.fem.elements.refinement import (
 from fecontact.fem.elements.structured import structured
 from fecontact.fem.material import AnyMaterial
 
-# Eight-node bricks: trilinear displacements alone, or with incompatible modes of each cell.
-Bricks = Literal["full", "incompatible"]
+# Elements that are no triangles and tetrahedra: with all their nodes; with incompatible modes, of
+# degree 1; without nodes in the middles of faces and cells, of degree 2.
+Bricks = Literal["full", "incompatible", "serendipity"]
 
 
 class _Checked:
@@ -161,8 +162,8 @@ class Mesh(Summarised):
         Numbers of cells, such as those of one material.
     materials : mapping of name to Material or AnisotropicMaterial
         Materials of groups of cells that a file holds, for bodies of this mesh; none by default.
-    bricks : 'full' or 'incompatible'
-        Kind of the eight-node bricks of a file, for bodies of this mesh with ``degree = 1``.
+    bricks : 'full', 'incompatible' or 'serendipity'
+        Kind of the elements of a file, for bodies of this mesh, see :class:`fecontact.ElasticBody`.
     attachments : sequence of PointMass or PointSpring
         Masses and springs at points that a file holds, for bodies of this mesh; none by default.
     temperature : (N,) or (N + E,) array

@@ -283,7 +283,7 @@ def _fine_parts(count: int) -> tuple[Array, Array]:
     """Centres (g, 2) in local coordinates, and weights (g,), of equal parts of a facet."""
     n = _FINE
     i, j = (grid.ravel() for grid in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
-    if count in (4, 9):
+    if count in (4, 8, 9):
         return np.stack([i + 0.5, j + 0.5], axis=1) / n, np.full(n * n, 1.0 / n**2)
     upright, turned = i + j < n, i + j < n - 1
     third = 1.0 / 3.0

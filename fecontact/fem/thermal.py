@@ -72,7 +72,9 @@ def _of_mesh(body: ElasticBody, word: str) -> Array:
                          "*INITIAL CONDITIONS, TYPE=TEMPERATURE; this one holds none, give "
                          "numbers.")
     values = body.mesh.temperature
-    return values[: len(body.nodes)] if body.degree == 1 else at_second_order(body.mesh, values)
+    if len(body.nodes) <= len(values):
+        return values[: len(body.nodes)]
+    return at_second_order(body.mesh, values)
 
 
 def thermal_moduli(body: ElasticBody) -> Array:

@@ -18,7 +18,7 @@ from fecontact.core.types import Coordinates
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.material import AnyMaterial, Material
-from fecontact.fem.mesh import Mesh
+from fecontact.fem.mesh import Bricks, Mesh
 from fecontact.fem.points import Patch
 from fecontact.fem.rotation import Rotation
 from fecontact.integrate.initial_state import PointStart, RigidStart
@@ -61,9 +61,10 @@ class BodySettings:
         Plane stress for thin bodies, plane strain for long bodies. An error for a solid.
     degree : 1 or 2
         Polynomial degree of the finite elements.
-    bricks : 'full' or 'incompatible', optional
-        Hexahedra with ``degree = 1``: fully integrated, or with incompatible modes; by default as
-        in the mesh file.
+    bricks : 'full', 'incompatible' or 'serendipity', optional
+        Kind of the elements, by default as in the mesh file. Hexahedra with ``degree = 1`` may have
+        incompatible modes. With ``degree = 2``, serendipity elements have 8, 20, 15 or 13 nodes,
+        others nodes in the middles of faces and cells too.
     fixed : mapping of name to 'x', 'y', 'xy', of solids also 'z', 'xz', 'yz', 'xyz', or 'hinge'
         Supports on boundaries and points of the mesh: held directions, or 'hinge' for a hole that
         turns about its centre. In a solid 'hinge_x', 'hinge_y', 'hinge_z' give the axis. At
@@ -81,7 +82,7 @@ class BodySettings:
     thickness: Annotated[float | None, Unit("m")] = None
     plane: Literal["stress", "strain"] = "stress"
     degree: Literal[1, 2] = 2
-    bricks: Literal["full", "incompatible"] | None = None
+    bricks: Bricks | None = None
     fixed: Mapping[str, str] = field(default_factory=dict)
     rotation: Rotation | None = None
 

@@ -16,6 +16,8 @@ from fecontact.fem.follower_pressure import follower_pressure
 from fecontact.reduction import eigenfrequencies_hz
 
 DEGREES = pytest.mark.parametrize("degree", [1, 2])
+ELEMENTS = pytest.mark.parametrize("elements", [
+    {"degree": 1}, {"degree": 2}, {"degree": 2, "bricks": "serendipity"}])
 GRADIENT = np.array([[0.3, -0.2], [0.1, 0.4]])
 
 
@@ -28,13 +30,13 @@ def mixed(columns=6, rows=4, size=(0.2, 0.1), **options):
     return rectangle(*size, columns, rows, triangles=cut, **options)
 
 
-@DEGREES
+@ELEMENTS
 @pytest.mark.parametrize("plane", ["stress", "strain"])
-def test_constant_strain_in_a_distorted_mixed_mesh(degree, plane):
+def test_constant_strain_in_a_distorted_mixed_mesh(elements, plane):
     """Patch test: no forces inside, the exact work, and the exact stress at all nodes."""
     mesh = mixed(warp=skewed)
     assert mesh.cell_counts == {"triangles": 24, "quadrilaterals": 12}
-    body = ElasticBody(mesh, degree=degree, plane=plane, thickness=0.02)
+    body = ElasticBody(mesh, **elements, plane=plane, thickness=0.02)
     u = body.nodes @ GRADIENT.T
     forces = (body.stiffness @ u.ravel()).reshape(-1, 2)
     inside = np.ones(len(u), bool)
@@ -65,8 +67,9 @@ def test_a_mixed_body_has_its_mass_and_three_rigid_motions(degree):
     assert frequencies[3] > 1000.0
 
 
-@pytest.mark.parametrize(("degree", "order"), [(1, 2), (2, 4)])
-def test_frequencies_converge_as_the_order_of_the_elements(degree, order):
+@pytest.mark.parametrize(("elements", "order"), [
+    ({"degree": 1}, 2), ({"degree": 2}, 4), ({"degree": 2, "bricks": "serendipity"}, 4)])
+def test_frequencies_converge_as_the_order_of_the_elements(elements, order):
     """A rectangle with sliding edges: shear waves c_s / 2 |(l / a, m / b)|."""
     size, steel = (1.0, 0.8), Material()
     slide = {"left": "x", "right": "x", "bottom": "y", "top": "y"}
@@ -75,7 +78,7 @@ def test_frequencies_converge_as_the_order_of_the_elements(degree, order):
     errors = []
     for count in (1, 2):
         mesh = mixed(8 * count, 8 * count, size)
-        body = ElasticBody(mesh, steel, plane="strain", degree=degree, fixed=slide)
+        body = ElasticBody(mesh, steel, plane="strain", **elements, fixed=slide)
         errors.append(eigenfrequencies_hz(body, 1)[0] / exact - 1.0)
     assert 0.0 < errors[1] < errors[0]
     assert np.log2(errors[0] / errors[1]) > order - 0.2

@@ -44,9 +44,10 @@ def tension(force, point="bolt"):
     return Load(forces=(PointLoad(point, "x", signal=force),))
 
 
-@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("elements", [
+    {"degree": 1}, {"degree": 2}, {"degree": 2, "bricks": "serendipity"}])
 @pytest.mark.parametrize("cells", ["hexahedra", "tetrahedra", "mixed"])
-def test_a_bar_between_walls(cells, degree):
+def test_a_bar_between_walls(cells, elements):
     """The force F shortens it by F L / (E A), with the stress F / A; held, it is the whole bar."""
     if cells == "mixed":  # along z, turned to x: the section has triangles and quadrilaterals
         whole = mixed_mesh((1, 2, 6), (A, A, L)).placed(rotation=(0.0, 90.0, 0.0))
@@ -56,14 +57,14 @@ def test_a_bar_between_walls(cells, degree):
         walls_of = ("left", "right")
     mesh = with_pretension(whole, "bolt", ACROSS)
     assert len({*widths(mesh.boundaries["bolt-below"]).tolist()}) == 1 + (cells == "mixed")
-    walls = ElasticBody(mesh, BAR, degree=degree, fixed=dict.fromkeys(walls_of, "xyz"))
+    walls = ElasticBody(mesh, BAR, **elements, fixed=dict.fromkeys(walls_of, "xyz"))
     found = static_solution(walls, tension(1e4))
     moved = walls.motion_rows("bolt") @ found.displacement.ravel()
     assert moved == pytest.approx([1e4 * L / (E * A**2), 0.0, 0.0, 0.0, 0.0, 0.0], rel=1e-9)
     assert found.stress[:, 0] == pytest.approx(1e4 / A**2, rel=1e-6)
-    held = ElasticBody(mesh, BAR, degree=degree, fixed={walls_of[0]: "xyz", "bolt": "x"})
+    held = ElasticBody(mesh, BAR, **elements, fixed={walls_of[0]: "xyz", "bolt": "x"})
     assert eigenfrequencies_hz(held, 4) == pytest.approx(eigenfrequencies_hz(
-        ElasticBody(whole, BAR, degree=degree, fixed={walls_of[0]: "xyz"}), 4), rel=1e-8)
+        ElasticBody(whole, BAR, **elements, fixed={walls_of[0]: "xyz"}), 4), rel=1e-8)
 
 
 @pytest.mark.parametrize("triangles", [False, lambda at: at[:, 1] > 0.5 * A])

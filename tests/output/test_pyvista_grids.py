@@ -13,15 +13,16 @@ from fecontact.laws import ConstantFriction, LinearContact
 pytest.importorskip("pyvista")
 
 
-@pytest.mark.parametrize("kind", ["plane", "mixed plane", "bricks", "mixed"])
+@pytest.mark.parametrize("kind", [
+    "plane", "mixed plane", "serendipity plane", "bricks", "mixed", "serendipity mixed"])
 def test_a_grid_has_the_fields_of_the_run(kind):
     space = "plane" not in kind
     lines = [np.linspace(0.0, 0.1, 4), np.linspace(0.0, 0.02, 3), np.linspace(0.0, 0.02, 3)]
-    mesh = (mixed_mesh((1, 2, 2), (0.1, 0.02, 0.02)) if kind == "mixed"
+    mesh = (mixed_mesh((1, 2, 2), (0.1, 0.02, 0.02)) if "mixed" in kind and space
             else rectangle(0.1, 0.02, 3, 2, triangles=lambda at: at[:, 0] > 0.05)
-            if kind == "mixed plane" else fc.Mesh.grid(*lines[: 3 if space else 2]))
-    basis = fc.modal_basis(fc.ElasticBody(mesh), 8,
-                           contact="contact" if kind == "mixed" else "bottom")
+            if "mixed" in kind else fc.Mesh.grid(*lines[: 3 if space else 2]))
+    body = fc.ElasticBody(mesh, bricks="serendipity" if "serendipity" in kind else "full")
+    basis = fc.modal_basis(body, 8, contact="contact" if "mixed" in kind and space else "bottom")
     system = fc.ContactSystem(basis, LinearContact(1e8), ConstantFriction(0.3),
                               load=fc.Load(gravity=(0.0, 0.0, -9.81)[3 - mesh.nodes.shape[1] :]))
     run = fc.simulate(system, 1e-3, outputs=11)

@@ -36,12 +36,14 @@ from fecontact.system.tables import system_tables
 SIZE = (0.2, 0.1, 0.05)
 # Kinds of solids, and those of their cells in VTK.
 CELLS = {"hexahedra": {"vtkHexahedron"}, "tetrahedra": {"vtkTetra"},
-         "mixed": {"vtkTetra", "vtkPyramid", "vtkWedge", "vtkHexahedron"}}
+         "mixed": {"vtkTetra", "vtkPyramid", "vtkWedge", "vtkHexahedron"},
+         "serendipity": {"vtkTetra"}}
 KINDS = pytest.mark.parametrize("kind", list(CELLS))
 
 
 def solid(kind="hexahedra", counts=(4, 2, 1)):
-    body = (fc.ElasticBody(mixed_mesh((1, 2, 1), SIZE)) if kind == "mixed"
+    body = (fc.ElasticBody(mixed_mesh((1, 2, 1), SIZE), bricks=(
+        "full" if kind == "mixed" else kind)) if kind in ("mixed", "serendipity")
             else block_body(counts, SIZE, tetrahedra=kind == "tetrahedra"))
     return fc.modal_basis(body, 8, contact_nodes=4, B=(0.0, 0.05, 0.05),
                           C=(0.1, 0.05, 0.05))

@@ -137,7 +137,7 @@ def test_modes_of_ansys():
     points = dict(zip(places.labels[::3, 0].tolist(), places.matrix.reshape(-1, 3), strict=True))
     recovery = Recovery.of(shown, modes, points)
     own = fc.modal_basis(body, 12, contact=())
-    # The example has a material in other units; bricks of 20 nodes differ from those of 27.
+    # The modes of the example belong to another material than its archive holds.
     ratio = own.frequencies_hz[6:] / hertz.matrix[:, 0]
     assert ratio == pytest.approx(ratio[0], rel=1.2e-2)
     at = [int(np.linalg.norm(own.mode_shapes.nodes - place, axis=1).argmin())

@@ -41,36 +41,35 @@ def curved_sector(radii, angles, heights, kept=lambda radius, height: True):
 
 
 def test_segment_of_a_disc():
-    """Deck segment: 12 x 4 x 2 bricks of 20 nodes, N = 12, nodal diameter 2; ours have 27."""
+    """Deck segment: 12 x 4 x 2 bricks of 20 nodes, N = 12, nodal diameter 2."""
     sector = curved_sector(np.linspace(0.1, 1.0, 13), np.linspace(0.0, np.pi / 6.0, 5),
                            np.linspace(0.0, 0.1, 3))
-    found = sector_modes(ElasticBody(sector, STEEL), CyclicSymmetry("low", "high", 12), 3,
-                         diameters=[2])
-    assert found.frequencies_hz[0] == pytest.approx([130230.4, 819388.7, 1130438.0], rel=2e-4)
+    body = ElasticBody(sector, STEEL, bricks="serendipity")
+    found = sector_modes(body, CyclicSymmetry("low", "high", 12), 3, diameters=[2])
+    assert found.frequencies_hz[0] == pytest.approx([130230.4, 819388.7, 1130438.0], rel=3e-5)
 
 
 def test_slender_disc_on_a_long_shaft():
-    """Deck rotor: each frequency lies between those of two kinds of 20-node bricks.
+    """Deck rotor, its 20-node bricks integrated fully: output of CalculiX 2.20.
 
-    Of reduced integration the first three are published with CalculiX' tests; the others, and all
-    of full integration, are output of CalculiX 2.20 for the same deck. The stress is that of the
-    rotation at 2795.6 Hz, near which the first mode whirls: seen from the rotor it is slow, the
-    small difference of large numbers.
+    The stress is that of the rotation at 2795.6 Hz, near which the first mode whirls: seen from the
+    rotor it is slow, the small difference of large numbers. The deck's own bricks of reduced
+    integration, whose first three frequencies are published with CalculiX' tests, differ more.
     """
-    reduced = [0.810, 1868.10, 2313.45, 3721.27, 5546.77, 6106.52, 7168.06]
+    reduced = [0.810, 1868.10, 2313.45]
     full = [27.586, 1859.85, 2377.07, 3729.51, 5576.46, 6226.86, 7177.60]
     z = np.concatenate([np.linspace(0.0, 50.0, 11), np.linspace(50.25, 100.25, 11)])
     sector = curved_sector(np.array([0.5, 0.75, 1.0, 3.0, 5.0]), np.array([0.0, np.pi / 8.0]), z,
                            lambda radius, height: radius < 1.0 or 50.0 < height < 50.25)
     speed = np.sqrt(3.0853e8)
     found = sector_modes(
-        ElasticBody(sector, STEEL, fixed={"ends": "xyz"}), CyclicSymmetry("low", "high", 16), 8,
-        diameters=[0, 1], rotation=Rotation(speed))
+        ElasticBody(sector, STEEL, fixed={"ends": "xyz"}, bricks="serendipity"),
+        CyclicSymmetry("low", "high", 16), 8, diameters=[0, 1], rotation=Rotation(speed))
     seen = np.sort(np.concatenate([one.ravel() for one in found.rotation.frequencies_hz(speed)]))
-    for ours, one, other in zip(seen[:7], reduced, full, strict=True):
-        assert min(one, other) < ours < max(one, other)
-    assert seen[1:7] == pytest.approx(full[1:], rel=5e-3)
-    assert seen[1:3] == pytest.approx(reduced[1:3], rel=3e-2)
+    assert seen[0] == pytest.approx(full[0], abs=1.0)
+    assert seen[1:4] == pytest.approx(full[1:4], rel=5e-4)
+    assert seen[4:7] == pytest.approx(full[4:], rel=4e-3)
+    assert seen[1:3] == pytest.approx(reduced[1:], rel=3e-2)
 
 
 def waves_of_a_ring(inner, outer, n, material, terms=12):

@@ -253,20 +253,12 @@ def second_order_places(
     """Places (M, k, d) of the second-order nodes of cells, in the order of ``kind.places``.
 
     ``middles`` (M, edges, d) are those of the edges. Middles of faces and of cells follow from
-    these: x = sum over edges / 2 - sum over corners / 4 for a face, half of both for a cell.
+    these, see ``CellKind.inner_weights``.
     """
     corners = nodes[cells[:, list(kind.order)]]
-    places = [corners, middles]
-    local = np.array(kind.places, float)
-    edges = [{*edge} for edge in kind.edges]
-    groups = kind.four_sided + ([tuple(range(kind.corners))] if kind.has_centre else [])
-    assert len(local) == kind.corners + len(edges) + len(groups)
-    for group in groups:
-        inside = [number for number, edge in enumerate(edges) if edge <= {*group}]
-        share = 0.5 if len(group) == 4 else 0.25
-        places.append((share * middles[:, inside].sum(axis=1)
-                       - 0.25 * nodes[cells[:, list(group)]].sum(axis=1))[:, None])
-    return np.concatenate(places, axis=1)
+    places = np.concatenate([corners, middles], axis=1)
+    inner = np.einsum("si,msd->mid", kind.inner_weights, places)
+    return np.concatenate([places, inner], axis=1)
 
 
 def curved_volumes(places: Array, kind: CellKind) -> Array:

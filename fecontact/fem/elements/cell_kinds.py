@@ -7,6 +7,7 @@ their bottom, then their top.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -48,13 +49,39 @@ class CellKind:
     mirrored: tuple[int, ...]
     places: tuple[tuple[float, ...], ...]
 
-    def unknowns(self, degree: int) -> int:
+    def unknowns(self, degree: int, serendipity: bool = False) -> int:
         """About how many displacement components a cell of a large mesh adds."""
-        return _UNKNOWNS[self.dimension, self.corners, degree]
+        return _UNKNOWNS[self.dimension, self.corners][self.counts.index(
+            self.count(degree, serendipity))]
 
-    def count(self, degree: int) -> int:
+    def count(self, degree: int, serendipity: bool = False) -> int:
         """Number of nodes of an element of degree 1 or 2."""
-        return self.corners if degree == 1 else len(self.places)
+        return self.counts[0 if degree == 1 else 1 if serendipity else 2]
+
+    @property
+    def counts(self) -> tuple[int, int, int]:
+        """Numbers of nodes of linear, serendipity and quadratic elements.
+
+        Serendipity elements have nodes at corners and in the middles of edges.
+        """
+        return self.corners, self.corners + len(self.edges), len(self.places)
+
+    @cached_property
+    def inner_weights(self) -> Array:
+        """Weights (s, i) of values at the s nodes of serendipity elements for the i other places.
+
+        These are middles of four-sided faces, then of the cell: half the sum over the edges less a
+        quarter of that over the corners of a face; a quarter of each for a hexahedron.
+        """
+        edges = [{*edge} for edge in self.edges]
+        groups = self.four_sided + [tuple(range(self.corners))] * self.has_centre
+        assert len(self.places) == self.counts[1] + len(groups)
+        weights = np.zeros((self.counts[1], len(groups)))
+        for column, group in enumerate(groups):
+            weights[[self.order.index(corner) for corner in group], column] = -0.25
+            inside = [self.corners + k for k, edge in enumerate(edges) if edge <= {*group}]
+            weights[inside, column] = 0.5 if len(group) == 4 else 0.25
+        return weights
 
     @property
     def simplex(self) -> bool:
@@ -94,9 +121,9 @@ class CellKind:
         return np.array(self.places[: self.corners], float).mean(axis=0)
 
 
-_UNKNOWNS = {(2, 3, 1): 1, (2, 3, 2): 4, (2, 4, 1): 2, (2, 4, 2): 8,
-             (3, 4, 1): 1, (3, 4, 2): 5, (3, 5, 1): 2, (3, 5, 2): 7, (3, 6, 1): 2, (3, 6, 2): 12,
-             (3, 8, 1): 3, (3, 8, 2): 24}
+# Of linear, serendipity and quadratic elements.
+_UNKNOWNS = {(2, 3): (1, 4, 4), (2, 4): (2, 6, 8), (3, 4): (1, 5, 5), (3, 5): (2, 6, 7),
+             (3, 6): (2, 8, 12), (3, 8): (3, 12, 24)}
 
 _H = 0.5
 # Corners of the hexahedron in the order of its nodes, and its edges between these.
@@ -241,13 +268,24 @@ class CellBlock:
 def shape_functions(dimension: int, count: int, local: Array) -> tuple[Array, Array]:
     """Shape functions (..., k) and their derivatives (..., k, d) at local coordinates (..., d).
 
-    ``count`` is k: 2 or 3 on a line, 3, 6, 4 or 9 in the plane, 4, 10, 5, 14, 6, 18, 8 or 27 in
-    space. The functions are in the order of ``CellKind.places``, on a line start, end, middle;
-    coordinates run from 0 to 1. Derivatives at the top of a pyramid are those along its axis.
+    ``count`` is k: 2 or 3 on a line; 3, 6, 4, 8 or 9 in the plane; 4, 10, 5, 13, 14, 6, 15, 18, 8,
+    20 or 27 in space. The functions are in the order of ``CellKind.places``, on a line start, end,
+    middle; coordinates run from 0 to 1. Derivatives at the top of a pyramid are those along its
+    axis.
+
+    Serendipity elements of 8, 13, 15 or 20 nodes have the functions of quadratic ones whose values
+    in the middles of faces and cells follow from the others by ``CellKind.inner_weights``.
     """
     if dimension == 1:
         value, slope = _line(count == 2, local[..., 0])
         return value, slope[..., None]
+    if count in _SERENDIPITY[dimension]:
+        kind = _SERENDIPITY[dimension][count]
+        values, slopes = shape_functions(dimension, len(kind.places), local)
+        weights = kind.inner_weights
+        return (values[..., :count] + values[..., count:] @ weights.T,
+                slopes[..., :count, :] + np.einsum("si,...id->...sd", weights,
+                                                   slopes[..., count:, :]))
     if count in _SIMPLEX[dimension]:
         return _simplex(dimension, count, local)
     if dimension == 3 and count in (6, 18):
@@ -266,6 +304,9 @@ def shape_functions(dimension: int, count: int, local: Array) -> tuple[Array, Ar
 
 
 _SIMPLEX = {2: (3, 6), 3: (4, 10)}
+_SERENDIPITY = {dimension: {kind.counts[1]: kind for kind in CELL_KINDS.values()
+                            if kind.dimension == dimension and not kind.simplex}
+                for dimension in (2, 3)}
 _LINE = {0: 0, 1: 1, _H: 2}
 
 

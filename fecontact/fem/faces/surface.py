@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elements.cell_kinds import blocks_of, padded, shape_functions, widths
+from fecontact.fem.elements.serendipity_parts import lowest_first
 
 # Points a direction: exact for moments of quadratic displacements over plane facets, and to about
 # 1e-8 over facets that span a tenth of a radius.
@@ -87,8 +88,9 @@ class Surface:
         Reference places of the displacement nodes of the body [m].
     facets : (k, n) integer array
         Nodes of each facet: 3 or 4 corners, counter-clockwise seen from outside the body, of
-        quadratic elements then the middles between successive corners and the centre of four-sided
-        facets. Triangles beside four-sided ones are filled by their last node.
+        quadratic elements then the middles between successive corners and, but for serendipity
+        elements, the centre of four-sided facets. Triangles beside four-sided ones are filled by
+        their last node.
     covered : (k, g) bool array, optional
         Quadrature points that count, as of a face of which a part has no partner; all by default.
     """
@@ -229,12 +231,14 @@ def linear_facets(facets: Integers) -> tuple[Integers, Integers]:
     """First-order facets (p, 3) or (p, 4) between all nodes of facets, and the facet of each part.
 
     Parts have the orientation of their facet. The first part of each comes first, then the second
-    part of each, and so on. Four-sided ones beside triangles are cut into triangles.
+    part of each, and so on. Four-sided ones beside triangles are cut into triangles, in facets of 8
+    nodes as the cells behind them are, see ``serendipity_parts``.
     """
     found, owner = [], []
     for which, rows in blocks_of(facets):
         for part in _PARTS[rows.shape[1]]:
-            found.append(rows[:, list(part)])
+            own = rows[:, list(part)]
+            found.append(lowest_first(own) if rows.shape[1] == 8 and len(part) == 4 else own)
             owner.append(np.arange(len(facets))[which])
     parts, of = drawn_facets(padded(found))
     of = np.concatenate(owner)[of]
@@ -279,6 +283,7 @@ _PARTS = {
     3: ((0, 1, 2),),
     4: ((0, 1, 2, 3),),
     6: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+    8: ((0, 4, 7), (4, 1, 5), (5, 2, 6), (6, 3, 7), (4, 5, 6, 7)),
     9: ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
 }
 
@@ -292,7 +297,7 @@ def _cross_matrices(vectors: Array) -> Array:
 
 
 def quadrature(count: int) -> tuple[Array, Array]:
-    """Local coordinates (g, 2) and weights (g,) of facets of 3, 6, 4 or 9 nodes.
+    """Local coordinates (g, 2) and weights (g,) of facets of 3, 6, 4, 8 or 9 nodes.
 
     Exact for polynomials of degree 6 over triangles, 7 in each direction over squares.
     """
@@ -300,7 +305,7 @@ def quadrature(count: int) -> tuple[Array, Array]:
     s, w = 0.5 * (1.0 + points), 0.5 * weights
     u, v = (grid.ravel() for grid in np.meshgrid(s, s, indexing="ij"))
     both = np.outer(w, w).ravel()
-    if count in (4, 9):
+    if count in (4, 8, 9):
         return np.stack([u, v], axis=1), both
     # A square collapsed to a triangle.
     return np.stack([u, v * (1.0 - u)], axis=1), both * (1.0 - u)

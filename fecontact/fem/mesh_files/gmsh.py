@@ -13,16 +13,14 @@ from numpy.typing import NDArray
 
 from fecontact.core.errors import MeshError
 from fecontact.core.types import Array, Integers
-from fecontact.fem.elements.cell_kinds import blocks_of
+from fecontact.fem.elements.cell_kinds import blocks_of, row_numbers
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files.raw import NODES, PLANE, RawMesh
 
 _KINDS = {15: "vertex", 1: "line", 8: "line3", 2: "triangle", 9: "triangle6",
           3: "quad", 16: "quad8", 10: "quad9", 4: "tetra", 11: "tetra10", 5: "hexahedron",
-          17: "hexahedron20", 12: "hexahedron27", 6: "wedge", 18: "wedge15", 7: "pyramid",
-          19: "pyramid13"}
-# Solid elements that are not read, with their numbers of nodes.
-_SOLIDS = {13: 18, 14: 14}
+          17: "hexahedron20", 12: "hexahedron27", 6: "wedge", 18: "wedge15",
+          13: "wedge18", 7: "pyramid", 19: "pyramid13", 14: "pyramid14"}
 
 # Elements of one kind with their physical groups (2.2: one or none, 4.1: those of the entity).
 _Block = tuple[str, Integers, list[int]]
@@ -172,8 +170,6 @@ def _elements_22(numbers: _Numbers) -> list[_Block]:
 def _kind(code: int) -> tuple[str, int]:
     if code in _KINDS:
         return _KINDS[code], NODES[_KINDS[code]]
-    if code in _SOLIDS:
-        return "solid", _SOLIDS[code]
     raise MeshError(f"The mesh holds elements of Gmsh's type {code}, which are not read; mesh with "
                     f"triangles, quadrilaterals, tetrahedra, hexahedra or wedges.")
 
@@ -213,9 +209,10 @@ def _raw_mesh(
     )
 
 
-# Gmsh's types of elements by number of corners and dimension, of first and second order.
-_CODES = {(2, 1): (1, 8), (3, 2): (2, 9), (4, 2): (3, 16), (4, 3): (4, 11), (5, 3): (7, 19),
-          (6, 3): (6, 18), (8, 3): (5, 17)}
+# Gmsh's types of elements by number of corners and dimension: of first order, serendipity elements
+# and others of second order.
+_CODES = {(2, 1): (1, 8, 8), (3, 2): (2, 9, 9), (4, 2): (3, 16, 10), (4, 3): (4, 11, 11),
+          (5, 3): (7, 19, 14), (6, 3): (6, 18, 13), (8, 3): (5, 17, 12)}
 # Edges of elements in the order of Gmsh's second-order nodes.
 _EDGES = {
     (2, 1): ((0, 1),), (3, 2): ((0, 1), (1, 2), (2, 0)), (4, 2): ((0, 1), (1, 2), (2, 3), (3, 0)),
@@ -225,13 +222,19 @@ _EDGES = {
     (8, 3): ((0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6),
              (6, 7)),
 }
+# Four-sided faces in the order of the nodes in their middles.
+_FACES = {
+    (4, 2): ((0, 1, 2, 3),), (5, 3): ((0, 1, 2, 3),),
+    (6, 3): ((0, 1, 4, 3), (0, 2, 5, 3), (1, 2, 5, 4)),
+    (8, 3): ((0, 1, 2, 3), (0, 1, 5, 4), (0, 3, 7, 4), (1, 2, 6, 5), (2, 3, 7, 6), (4, 5, 6, 7)),
+}
 
 
 def write_msh(mesh: Mesh, stream: TextIO) -> None:
     """Write a mesh as Gmsh 4.1 text: groups are physical groups, all cells the group ``body``.
 
-    Cells of the same groups stand together, in their order. Meshes with curved edges are written
-    with elements of second order.
+    Cells of the same groups stand together, in their order. Meshes with curved edges and those of
+    serendipity elements are written with elements of second order.
     """
     group_names = sorted({*mesh.points, *mesh.boundaries})
     number = {name: k for k, name in enumerate(group_names, start=1)}
@@ -278,7 +281,7 @@ def write_msh(mesh: Mesh, stream: TextIO) -> None:
            for tag, (node, owners) in enumerate(vertices.items(), start=1)])
     lines([(tag, *box, len(owners), *owners, 0) for tag, owners in enumerate(groups, start=1)])
     lines([(entity, *box, len(owned), *owned, 0) for entity, owned in enumerate(tags, start=1)])
-    places = _with_middles(mesh)
+    places = _places(mesh)
     count = len(places)
     stream.write(f"$EndEntities\n$Nodes\n1 {count} 1 {count}\n{d} 1 0 {count}\n")
     lines([(tag,) for tag in range(1, count + 1)])
@@ -289,8 +292,9 @@ def write_msh(mesh: Mesh, stream: TextIO) -> None:
     blocks += [(d - 1, tag, *_elements(mesh, some, d - 1))
                for tag, rows in enumerate(groups.values(), start=1)
                for _, some in blocks_of(np.array(rows))]
-    blocks += [(d, entity + 1, *_elements(mesh, some, d)) for entity in range(len(tags))
-               for _, some in blocks_of(mesh.cells[block == entity])]
+    blocks += [(d, entity + 1, *_elements(mesh, one.nodes[chosen], d, one.numbers[chosen]))
+               for entity in range(len(tags)) for one in mesh.blocks
+               if (chosen := block[one.numbers] == entity).any()]
     total = sum(len(rows) for *_, rows in blocks)
     stream.write(f"$EndNodes\n$Elements\n{len(blocks)} {total} 1 {total}\n")
     tag = 0
@@ -301,19 +305,38 @@ def write_msh(mesh: Mesh, stream: TextIO) -> None:
     stream.write("$EndElements\n")
 
 
-def _with_middles(mesh: Mesh) -> Array:
-    """Nodes, and of a curved mesh the middles of all edges behind them."""
-    curved = len(mesh.curved_edges) > 0
-    return np.concatenate([mesh.nodes, mesh.edge_middles]) if curved else mesh.nodes
+def _order(mesh: Mesh) -> int:
+    """0 for elements of first order, 1 for serendipity elements, 2 for others of second order."""
+    if mesh.bricks == "serendipity":
+        return 1
+    return 2 if len(mesh.curved_edges) else 0
 
 
-def _elements(mesh: Mesh, corners: Integers, dimension: int) -> tuple[int, list[Any]]:
-    """Gmsh's type and rows of nodes of elements (k, n), with the middles of a curved mesh."""
-    key = corners.shape[1], dimension
-    if not len(mesh.curved_edges):
+def _places(mesh: Mesh) -> Array:
+    """Nodes of elements of that order."""
+    if _order(mesh) == 2:
+        return mesh._second_order.places
+    return np.concatenate([mesh.nodes, mesh.edge_middles]) if _order(mesh) else mesh.nodes
+
+
+def _elements(
+    mesh: Mesh, corners: Integers, dimension: int, numbers: Integers | None = None
+) -> tuple[int, list[Any]]:
+    """Gmsh's type and rows of nodes of elements (k, n); ``numbers`` (k,) are those of cells."""
+    key, order = (corners.shape[1], dimension), _order(mesh)
+    if not order:
         return _CODES[key][0], corners.tolist()
     ends = np.sort(corners[:, np.array(_EDGES[key])], axis=2)
-    known = mesh.edges[0]
-    keys = known[:, 0] * len(mesh.nodes) + known[:, 1]
-    middles = np.searchsorted(keys, ends[..., 0] * len(mesh.nodes) + ends[..., 1])
-    return _CODES[key][1], np.concatenate([corners, len(mesh.nodes) + middles], axis=1).tolist()
+    known, count = mesh.edges[0], len(mesh.nodes)
+    keys = known[:, 0] * count + known[:, 1]
+    rows = [corners, count + np.searchsorted(keys, ends[..., 0] * count + ends[..., 1])]
+    if order == 2 and mesh.dimension == 3 and key in _FACES:
+        faces, sides = mesh._second_order.faces, corners[:, np.array(_FACES[key])]
+        found = row_numbers(faces, np.sort(sides.reshape(-1, 4), axis=1))
+        rows.append(count + len(known) + found.reshape(len(corners), -1))
+    if order == 2 and numbers is not None:
+        which = next(k for k, one in enumerate(mesh.blocks) if one.nodes.shape[1] == key[0])
+        if mesh.blocks[which].kind.has_centre:
+            chosen = np.searchsorted(mesh.blocks[which].numbers, numbers)
+            rows.append(mesh._second_order.members[which][chosen, -1:])
+    return _CODES[key][order], np.concatenate(rows, axis=1).tolist()

@@ -22,12 +22,14 @@ from fecontact.fem.mesh_files.raw_constraints import constraints_of_mesh
 
 PLANE = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4}
 SOLID = {"tetra": 4, "tetra10": 4, "hexahedron": 8, "hexahedron20": 8, "hexahedron27": 8,
-         "wedge": 6, "wedge15": 6, "pyramid": 5, "pyramid13": 5}
+         "wedge": 6, "wedge15": 6, "wedge18": 6, "pyramid": 5, "pyramid13": 5, "pyramid14": 5}
 CORNERS = {**PLANE, **SOLID}
 NODES = {"vertex": 1, "line": 2, "line3": 3,
          "triangle": 3, "triangle6": 6, "quad": 4, "quad8": 8, "quad9": 9,
          "tetra": 4, "tetra10": 10, "hexahedron": 8, "hexahedron20": 20, "hexahedron27": 27,
-         "wedge": 6, "wedge15": 15, "pyramid": 5, "pyramid13": 13}
+         "wedge": 6, "wedge15": 15, "wedge18": 18, "pyramid": 5, "pyramid13": 13, "pyramid14": 14}
+# Elements without nodes in the middles of faces and cells.
+_SERENDIPITY = {"quad8", "hexahedron20", "wedge15", "pyramid13"}
 
 _UNREAD_SOLIDS = ("wedge", "penta", "pyramid", "polyhedron", "voxel", "solid", "tetra", "hexa",
                   "VTK_LAGRANGE_TETRA", "VTK_LAGRANGE_HEXA", "VTK_LAGRANGE_WEDGE",
@@ -75,7 +77,7 @@ class RawMesh:
     materials : mapping of name to Material or AnisotropicMaterial
         Materials of groups of elements in the unit of the file, with forces in N.
     bricks : 'full' or 'incompatible'
-        Kind of the eight-node bricks.
+        Kind of the eight-node bricks; elements of the second order say theirs.
     temperature : (N,) array, optional
         Changes of temperature at the nodes.
     numbers : (n,) integer array, optional
@@ -178,6 +180,7 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
         tetrahedra, pyramids, wedges and hexahedra.
     """
     blocks = _cells_of_body(raw.cells)
+    bricks = "serendipity" if {kind for kind, _ in blocks} & _SERENDIPITY else raw.bricks
     of_corners = [block[:, :CORNERS[kind]] for kind, block in blocks]
     corners = np.concatenate([block.ravel() for block in of_corners])
     points = np.asarray(raw.points, float) * scale
@@ -225,7 +228,7 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     kept = np.sort(distinct)
     regions = _cell_groups(raw, dimension, number, cells[kept])
     mesh = Mesh(points[used], cells[kept], {}, {}, ends[once], middles[once],
-                cell_groups=regions, bricks=raw.bricks,
+                cell_groups=regions, bricks=bricks,
                 node_numbers=None if raw.numbers is None else raw.numbers[used])
     if raw.temperature is not None:
         mesh = replace(mesh, temperature=_temperature(raw.temperature, mesh, used, number,

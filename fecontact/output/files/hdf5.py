@@ -329,8 +329,8 @@ def _elements(group: Any, nodes: int, dimension: int) -> Any:
         return None
     elements = indices(group, "elements", (None, None), nodes)
     _require_widths("elements", elements, "nodes", sorted(
-        number for (of, corners), kind in CELL_KINDS.items() if of == dimension
-        for number in (corners, len(kind.places))))
+        number for (of, _), kind in CELL_KINDS.items() if of == dimension
+        for number in kind.counts))
     return elements
 
 
