@@ -3,7 +3,7 @@
 import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -150,6 +150,21 @@ class Imported:
                        "[friction]."])]
         head = "".join(f"# {line}\n" for text in comments for line in text.splitlines())
         return f"{head}\n{tomli_w.dumps(tables)}"
+
+    def contradictions(self, name: str, who: str) -> Iterator[str]:
+        """Sentences on constraints of a body that do not fit together, or to its supports."""
+        mesh = self.meshes[name]
+        if not mesh.constraints:
+            return
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", ModelWarning)
+            try:
+                fixed: Any = self._body(name).get("fixed", {})
+                _ = ElasticBody(mesh, fixed=fixed).elimination
+            except FecontactError as error:
+                yield (f"The constraints and supports of {who} do not fit together, so that the "
+                       f"study stops: {error}")
+        yield from (f"{one.message}" for one in caught if issubclass(one.category, ModelWarning))
 
     def _geometry(self, file: str, name: str) -> dict[str, object]:
         return {"file": file, "scale": self.scale, **({"part": name} if self.has_parts else {})}
@@ -354,8 +369,10 @@ def imported(path: str | Path, scale: float = 1.0) -> Imported:
             notes.append(f"{face} and {other} do not become an interface: {error}")
             continue
         interfaces.append((face, other))
-    return Imported(path, scale, meshes, contents, tuple(interfaces), tuple(dict.fromkeys(notes)),
-                    has_parts)
+    found = Imported(path, scale, meshes, contents, tuple(interfaces), has_parts=has_parts)
+    for name in meshes:
+        notes += found.contradictions(name, who[name])
+    return replace(found, notes=tuple(dict.fromkeys(notes)))
 
 
 def _contact_nodes(meshes: Mapping[str, Mesh], *faces: str) -> int:

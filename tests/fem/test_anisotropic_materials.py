@@ -559,7 +559,7 @@ def test_orientations_that_are_not_read_are_warned_of(tmp_path, lines, message):
 
 
 @pytest.mark.parametrize(("change", "message"), [
-    (("O\n1", "P\n1"), r"A section names the orientation 'O', which the file does not hold.*'P'"),
+    (("O\n1", "P\n1"), r"The section of 'ALL' names the orientation 'O', which the file .*'P'"),
     (("0, 1, 0\n", "2, 0, 0\n"), r"The points of the orientation 'O' give no axes: .* span no pla"),
     (("0.3, 0.25", "3.9, 0.25"), r"nu_12 = 3\.9 must lie between"),
 ])
@@ -569,6 +569,13 @@ def test_bad_orientations_and_constants_of_decks_are_refused(tmp_path, change, m
     with pytest.raises((MeshError, InputError), match=message) as caught:
         read(tmp_path, text.replace(*change))
     assert str(caught.value).startswith(str(tmp_path / "a.inp"))
+
+
+def test_unknown_orientations_of_isotropic_materials_are_refused(tmp_path):
+    text = deck("ORTHO", "", ", ORIENTATION=O").replace(
+        f"TYPE=ORTHO\n{CONSTANTS['ORTHO']}", "TYPE=ISO\n7e10, 0.33\n")
+    with pytest.raises(MeshError, match=r"The section of 'ALL' names the orientation 'O', which"):
+        read(tmp_path, text)
 
 
 def test_cylindrical_axes_are_radial_circumferential_and_along_the_line():

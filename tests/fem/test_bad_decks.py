@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fecontact import ElasticBody, InputError, MeshError, ModelWarning, read_mesh
+from fecontact import ElasticBody, InputError, MeshError, ModelWarning, Study, read_mesh
 from fecontact.study.imported import imported
 
 PLACES = [(x, y, z) for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
@@ -138,6 +138,31 @@ def test_couplings_that_determine_a_node_twice_name_it(tmp_path):
     mesh = read_mesh(written(tmp_path, "a.inp", text))
     with pytest.raises(InputError, match=r"'C2' and Coupling 'C1' determine .* at \(0, 0, 0\) i"):
         _ = ElasticBody(mesh).expansion
+    (note,) = (one for one in imported(tmp_path / "a.inp").notes if "fit together" in one)
+    assert note.startswith("The constraints and supports of the body do not fit together, so that")
+    assert "determine the displacement in x of node 1 of the file at (0, 0, 0) in d" in note
+
+
+def test_imports_name_nodes_that_a_support_and_a_constraint_determine(tmp_path):
+    """Held at the nodes that a rigid body moves; without the support it is sound."""
+    points = NODES.rstrip() + "\n98, 0.5, 0.5, 2\n"
+    text = (points + BRICK + STEEL + "*SURFACE, NAME=A\n1, S2\n*NSET, NSET=HELD\n5,\n"
+            "*COUPLING, CONSTRAINT NAME=C, REF NODE=98, SURFACE=A\n*KINEMATIC\n")
+    held = "*BOUNDARY\nHELD, 1, 3\n"
+    found = imported(written(tmp_path, "a.inp", text + held))
+    (note,) = (one for one in found.notes if "fit together" in one)
+    assert "a support and Coupling 'C' determine the displacement in" in note
+    assert "of node 5 of the file" in note
+    with pytest.raises(InputError, match="a support and Coupling 'C' determine"):
+        Study.from_toml(found.toml(tmp_path), tmp_path / "a.toml").system()
+    assert not any("fit together" in one for one in imported(
+        written(tmp_path, "a.inp", text)).notes)
+
+
+def test_imports_name_ties_without_partners(tmp_path):
+    tie = "*SURFACE, NAME=L\n1, S1\n*SURFACE, NAME=U\n1, S2\n*TIE, NAME=T\nL, U\n"
+    notes = imported(written(tmp_path, "a.inp", NODES + BRICK + STEEL + tie)).notes
+    assert any("Tie 'T': no node of 'L' lies within tolerance" in note for note in notes)
 
 
 def test_names_with_spaces(tmp_path):

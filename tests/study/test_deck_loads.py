@@ -272,6 +272,27 @@ def test_forces_of_nastran_and_ansys_are_those_of_a_deck(file, load, tmp_path):
     assert found == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize(("system", "expected"), [
+    # Axes x, y, z of the system lie along the basic y, z, x.
+    ("CORD2R,4,0,7.,7.,7.,8.,7.,7.\n+,7.,9.,7.\n", (3.0, 1.0, -2.0)),
+    # The tip lies at a quarter turn: r is y, theta is -x.
+    ("CORD2C,4,0,.2,0.,0.,.2,0.,1.\n+,1.,0.,0.\n", (2.0, 1.0, 3.0)),
+    # Below the axis by a quarter turn, and a quarter turn about it: theta is -z, phi is -x.
+    ("CORD2S,4,0,.2,0.,.05,.2,0.,1.\n+,1.,0.,.05\n", (-3.0, 1.0, 2.0)),
+])
+def test_forces_of_nastran_along_axes_of_systems(tmp_path, system, expected):
+    more = f"{system}FORCE,7,{TIP},4,10.,1.,-2.,3.\nMOMENT,7,{TIP},4,-2.,1.,-2.,3.\n"
+    more += "GRAV,7,4,2.,0.,3.,4.\n" * ("CORD2R" in system)
+    (tmp_path / "a.bdf").write_text(bulk(more))
+    found = nastran_contents(tmp_path / "a.bdf")
+    assert found.distributed.unread == []
+    assert [component for _, component, _ in found.forces] == list(COMPONENTS)
+    assert [value for *_, value in found.forces] == pytest.approx(
+        [factor * value for factor in (10.0, -2.0) for value in expected])
+    if "CORD2R" in system:
+        assert found.distributed.gravity == [("", pytest.approx((8.0, 0.0, 6.0)))]
+
+
 def test_rotation_of_an_archive_is_that_of_a_deck(tmp_path):
     expected, _ = displacement(tmp_path, "*DLOAD\nEALL, CENTRIF, 2500., 0., 0., 0., 0., 3., 4.\n")
     found, study = displacement(tmp_path, "OMEGA,  0.0    ,  30.0    ,  40.0\n", 1.0, "a.cdb")
@@ -294,8 +315,9 @@ def test_moments_of_nastran_act_on_points_that_others_follow(tmp_path):
 @pytest.mark.parametrize(("file", "load", "sentences"), [
     ("a.bdf", pload4(2.0, *UP, side=TOP) + pload4(2.0, *UP, side=TOP, number=8),
      ("Each of the sets of loads '7', '8', of which no LOAD = of the case control names",)),
-    ("a.bdf", "RFORCE,7,1,,3.,0.,0.,1.\nGRAV,7,4,9.81,0.,0.,1.\n" + pload4("1.,2.,3.", 1),
-     ("RFORCE is left out", "GRAV along the axes of the system 4 is left out",
+    ("a.bdf", "RFORCE,7,1,,3.,0.,0.,1.\nGRAV,7,4,9.81,0.,0.,1.\n"
+     "CORD2C,4,0,0.,0.,0.,0.,0.,1.\n+,1.,0.,0.\n" + pload4("1.,2.,3.", 1),
+     ("RFORCE is left out", "GRAV along the axes of the round system 4 is left out",
       "PLOAD4 with a direction or a pressure that varies is left out")),
     ("a.bdf", "PLOAD4,7,1,2.,,,,1,2\n", ("PLOAD4 on no side of a solid element (the element 1)",)),
     ("a.bdf", f"SPC,3,{TIP},3,.001\n", ("SPC with displacements other than zero is left out",)),

@@ -83,6 +83,21 @@ def test_plane_elements_of_ansys_say_it_by_an_option(tmp_path, kind, option, pla
     assert any("no thickness" in note for note in notes)
 
 
+@pytest.mark.parametrize("constants", [
+    "R,       1,  5.0E-003    ,\n", "R,2,9.\nRLBLOCK,       2,       2,       1,       7\n"
+    "(2i8,6g16.9)\n(7g16.9)\n       1       1 5.000000000E-03\n       2       1 8.00000000     \n"])
+def test_real_constants_of_ansys_are_thicknesses(tmp_path, constants):
+    """Of elements in plane stress with a thickness; others have none."""
+    pytest.importorskip("mapdl_archive")
+    path = archive(tmp_path / "a.cdb", 182, NODES, CELLS)
+    path.write_text(path.read_text().replace("NBLOCK", f"{constants}KEYOP,1,3,3\nNBLOCK", 1))
+    notes, found = study(path)
+    assert (found.body.plane, found.body.thickness) == ("stress", 0.005)
+    assert not any("thickness" in note for note in notes)
+    path.write_text(path.read_text().replace("KEYOP,1,3,3", "KEYOP,1,3,0"))
+    assert study(path)[1].body.thickness == 1.0
+
+
 def test_axisymmetric_elements_of_ansys_are_refused(tmp_path):
     pytest.importorskip("mapdl_archive")
     path = archive(tmp_path / "a.cdb", 182, NODES, CELLS)

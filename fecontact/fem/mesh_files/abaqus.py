@@ -551,12 +551,18 @@ class _Assembly:
                 raise MeshError(f"The section of '{name}' names the material '{wanted}', which the "
                                 f"file does not hold{nearest(wanted.upper(), self.materials)}; its "
                                 f"materials are: {choices(self.materials)}.")
+            turned = options.get("ORIENTATION", "")
+            if turned and turned.upper() not in self.orientations:
+                raise MeshError(f"The section of '{name}' names the orientation '{turned}', which "
+                                f"the file does not hold"
+                                f"{nearest(turned.upper(), self.orientations)}; its orientations "
+                                f"are: {choices(self.orientations)}.")
             try:
                 made = material(wanted, self.materials[wanted.upper()])
             except (InputError, ValueError) as error:
                 raise MeshError(f"The material '{wanted}' cannot be read: {error}") from None
             if isinstance(made, AnisotropicMaterial):
-                made = self._oriented(made, part, options.get("ORIENTATION", ""), name, bodies)
+                made = self._oriented(made, part, turned, name, bodies)
             if isinstance(made, str):
                 return {}, [made]
             found[self._set_name(part, name)] = made

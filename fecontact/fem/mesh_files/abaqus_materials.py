@@ -9,8 +9,6 @@ from fecontact.core.errors import (
     InputError,
     MeshError,
     ModelWarning,
-    choices,
-    nearest,
     shown,
 )
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
@@ -80,16 +78,13 @@ def _expansion(name: str, given: Mapping[str, Given], isotropic: bool) -> float:
 
 
 def orientation(name: str, given: Mapping[str, Given]) -> MaterialAxes | CylindricalAxes | str:
-    """Axes that a line *ORIENTATION names; or why they are not read.
+    """Axes that a line *ORIENTATION of the file gives; or why they are not read.
 
     Raises
     ------
     MeshError
-        If the file holds no orientation of this name, or its points span no axes.
+        If its points span no axes.
     """
-    if name.upper() not in given:
-        raise MeshError(f"A section names the orientation '{name}', which the file does not hold"
-                        f"{nearest(name.upper(), given)}; its orientations are: {choices(given)}.")
     options, lines = given[name.upper()]
     system = options.get("SYSTEM", "RECTANGULAR").upper()
     by = options.get("DEFINITION", "COORDINATES").upper()

@@ -26,7 +26,14 @@ _OF_ALL = re.compile(r"^\s*(ACEL|OMEGA)\s*,([^\n]*)", re.MULTILINE | re.IGNORECA
 # Types of elements and their options 3; plane elements, and options of plane strain.
 _TYPE = re.compile(r"^\s*ET\s*,\s*(\d+)\s*,\s*(?:PLANE)?(\d+)", re.MULTILINE | re.IGNORECASE)
 _OPTION = re.compile(r"^\s*KEYOPT?\s*,\s*(\d+)\s*,\s*3\s*,\s*(\d+)", re.MULTILINE | re.IGNORECASE)
-_PLANE, _STRAIN = ("2", "42", "82", "182", "183"), ("2", "5")
+_PLANE, _STRAIN, _WITH_THICKNESS = ("2", "42", "82", "182", "183"), ("2", "5"), "3"
+# Real constants, by a command or in a block; and elements, with their material, type and set of
+# real constants first.
+_REAL = re.compile(r"^\s*R\s*,\s*(\d+)\s*,([^\n]*)", re.MULTILINE | re.IGNORECASE)
+_REALS = re.compile(r"^\s*RLBLOCK\s*,[^\n]*\n\([^\n]*\n\([^\n]*\n((?:[ \t]*[-\d][^\n]*\n)*)",
+                    re.MULTILINE | re.IGNORECASE)
+_ELEMENTS = re.compile(r"^\s*EBLOCK\s*,[^\n]*\n\([^\n]*\n((?:[ \t]*\d[^\n]*\n)*)",
+                       re.MULTILINE | re.IGNORECASE)
 _LABELS = {"F": ("FX", "FY", "FZ", "MX", "MY", "MZ"),
            "D": ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")}
 
@@ -125,6 +132,29 @@ def plane_states(text: str) -> set[str]:
     return {options.get(kind, "0") for kind, name in _TYPE.findall(text) if name in _PLANE}
 
 
+def thicknesses(text: str) -> tuple[float, ...]:
+    """Real constants of the elements in plane stress with a thickness, each once.
+
+    Raises
+    ------
+    MeshError
+        For values that are no numbers.
+    """
+    options = dict(_OPTION.findall(text))
+    kinds = {kind for kind, name in _TYPE.findall(text)
+             if name in _PLANE and options.get(kind) == _WITH_THICKNESS}
+    used = {row[2]: None for rows in _ELEMENTS.findall(text)
+            for row in map(str.split, rows.splitlines()) if len(row) > 10 and row[1] in kinds}
+    found = {number: _numbers("R", rest)[:1] for number, rest in _REAL.findall(text)}
+    for rows in _REALS.findall(text):
+        for row in map(str.split, rows.splitlines()):
+            # Rows of a set that goes on hold values alone.
+            if len(row) > 2 and row[0].isdigit() and row[1].isdigit():
+                found[row[0]] = _numbers("RLBLOCK", row[2])
+    return tuple(dict.fromkeys(value for number in used for value in found.get(number, ())
+                               if value > 0.0))
+
+
 def archive_contents(path: Path) -> DeckContents:
     """Loads and supports of an archive as those of a deck.
 
@@ -142,7 +172,8 @@ def archive_contents(path: Path) -> DeckContents:
         forces=tuple((f"node {node}", component, value)
                      for node, component, value in found.forces),
         distributed=found.distributed, planes=tuple(sorted({
-            "strain" if state in _STRAIN else "stress" for state in plane_states(text)})))
+            "strain" if state in _STRAIN else "stress" for state in plane_states(text)})),
+        thicknesses=thicknesses(text))
 
 
 def _numbers(command: str, text: str) -> list[float]:

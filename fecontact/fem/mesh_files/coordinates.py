@@ -17,3 +17,22 @@ def cartesian(places: Array, system: str) -> Array:
     if system == "S":
         r, z = r * np.cos(np.radians(z)), r * np.sin(np.radians(z))
     return np.column_stack([r * np.cos(theta), r * np.sin(theta), z])
+
+
+def directions(places: Array, system: str) -> Array:
+    """Unit vectors (k, 3, 3), by rows, along the coordinates at places (k, 3) in a system R, C, S.
+
+    The places are Cartesian coordinates. On the axis of C and S, r is along x.
+    """
+    found = np.tile(np.eye(3), (len(places), 1, 1))
+    if system == "R":
+        return found
+    angle = np.arctan2(places[:, 1], places[:, 0])
+    c, s = np.cos(angle), np.sin(angle)
+    found[:, 0, 0], found[:, 0, 1], found[:, 1, 0], found[:, 1, 1] = c, s, -s, c
+    if system == "S":
+        above = np.arctan2(places[:, 2], np.hypot(places[:, 0], places[:, 1]))[:, None]
+        radial, z = found[:, 0].copy(), found[:, 2].copy()
+        found[:, 0] = np.cos(above) * radial + np.sin(above) * z
+        found[:, 2] = np.cos(above) * z - np.sin(above) * radial
+    return found

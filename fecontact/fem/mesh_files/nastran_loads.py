@@ -1,8 +1,8 @@
 """Loads and supports of Nastran's bulk data.
 
     PLOAD4          pressure on a side of a solid element, positive into it
-    GRAV            acceleration of the whole model
-    FORCE, MOMENT   at a grid point, along the axes of the model
+    GRAV            acceleration of the whole model; all three along the axes of any system
+    FORCE, MOMENT   at a grid point
     SPC, SPC1       displacements held at zero
 
 The first ``LOAD =`` and ``SPC =`` of the case control choose the set that acts, the only set does
@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from fecontact.core.errors import choices
+from fecontact.core.types import Array
 from fecontact.fem.elements.cell_kinds import CELL_KINDS
 from fecontact.fem.mesh_files.deck_contents import COMPONENTS, DeckContents
 from fecontact.fem.mesh_files.distributed_loads import DistributedLoads
@@ -89,20 +90,23 @@ class _Loads:
         self._bulk = bulk
         self.keywords: Counter[str] = Counter()
         self.distributed = DistributedLoads(
-            kinds="FORCE, MOMENT and GRAV along the axes of the model, and equal pressures of "
-                  "PLOAD4 on sides of solid elements")
+            kinds="FORCE, MOMENT, GRAV and equal pressures of PLOAD4 on sides of solid elements")
         self.forces: list[tuple[int, str, float]] = []
         self.sides: dict[str, list[tuple[int, ...]]] = {}
         self._factors = self._chosen()
         for name, first in (("FORCE", 0), ("MOMENT", 3)):
             for line, fields, factor in self._acting(name):
-                bulk.rows(line, fields[1:2], name)
-                for component, value in zip(COMPONENTS[first:first + 3],
-                                            _vector(line, fields[3:]), strict=True):
+                (row,) = bulk.rows(line, fields[1:2], name)
+                vector = self._vector(line, fields[2:], bulk.points[row])
+                for component, value in zip(COMPONENTS[first:first + 3], vector, strict=True):
                     if value:
                         self.forces.append((whole(line, fields[1]), component, factor * value))
         for line, fields, factor in self._acting("GRAV"):
-            x, y, z = _vector(line, fields[2:])
+            if bulk.systems.frame(whole(line, fields[1] or "0"))[0] != "R":
+                self.distributed.unread.append(f"GRAV along the axes of the round system "
+                                               f"{fields[1]}")
+                continue
+            x, y, z = self._vector(line, fields[1:], np.zeros(3))
             self.distributed.gravity.append(("", (factor * x, factor * y, factor * z)))
         self._add_pressures()
         for name in _UNREAD:
@@ -130,14 +134,14 @@ class _Loads:
         """Line, fields and factor of the cards of a name that act."""
         for line, fields in self._bulk.cards[name]:
             self.keywords[name] += 1
-            place = {"GRAV": 1, "PLOAD4": 8}.get(name, 2)
-            axes = fields[place] if len(fields) > place else ""
-            if fields[0] not in self._factors:
-                continue
-            if axes not in ("", "0"):
-                self.distributed.unread.append(f"{name} along the axes of the system {axes}")
-            else:
+            if fields[0] in self._factors:
                 yield line, fields, self._factors[fields[0]]
+
+    def _vector(self, line: Line, words: list[str], place: Array) -> list[float]:
+        """Components in the basic system of a vector by its system, scale and direction."""
+        scale, *along = reals(line, words[1:], 4)
+        axes = self._bulk.systems.along(whole(line, words[0] or "0"), place)
+        return [float(scale * one) for one in np.array(along) @ axes]
 
     def _add_pressures(self) -> None:
         loads = [(line, [*fields, *[""] * 11], factor)
@@ -209,12 +213,6 @@ def _of_case(case: str, key: str) -> str | None:
 def _digits(components: str) -> str:
     """Components from 1 to 6, each once."""
     return "".join(sorted({*components} & {*"123456"}))
-
-
-def _vector(line: Line, words: list[str]) -> list[float]:
-    """Components of a vector by its scale and direction."""
-    scale, *along = reals(line, words, 4)
-    return [scale * one for one in along]
 
 
 def _side(

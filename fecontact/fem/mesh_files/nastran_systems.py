@@ -6,7 +6,7 @@ import numpy as np
 
 from fecontact.core.errors import MeshError, choices
 from fecontact.core.types import Array
-from fecontact.fem.mesh_files.coordinates import cartesian
+from fecontact.fem.mesh_files.coordinates import cartesian, directions
 from fecontact.fem.mesh_files.nastran_cards import Card, Line, reals, whole
 
 _PARALLEL = 1e-9  # sine of the angle between two axes that span no plane
@@ -70,6 +70,18 @@ class Systems:
     def basic(self, number: int, places: Array) -> Array:
         """Places (k, 3) in the basic system from coordinates in a system, angles in degrees."""
         return self._basic(number, places, ())
+
+    def along(self, number: int, place: Array) -> Array:
+        """Unit vectors (3, 3), by rows, of the axes of a system at a place (3,), both basic.
+
+        Of a cylindrical system they point along r, theta, z, of a spherical one along r, theta from
+        the z axis, phi about it.
+        """
+        kind, origin, axes = self.frame(number)
+        own = directions(((place - origin) @ axes.T)[None], kind)[0]
+        if kind == "S":
+            own = np.array([own[0], -own[2], own[1]])
+        return np.asarray(own @ axes)
 
     def _basic(self, number: int, places: Array, outer: tuple[int, ...]) -> Array:
         kind, origin, axes = self.frame(number, outer)
