@@ -6,7 +6,7 @@ from .elements.cell_kinds import CellBlock, CellKind
 from .elimination import Elimination
 from .fields import BodyFields, stress_of
 from .material import AnisotropicMaterial
-from .material_axes import CurveAxes, CylindricalAxes, MaterialAxes
+from .material_axes import CurveAxes, CylindricalAxes, FieldAxes, MaterialAxes
 from .mesh_files import mesh_from
 from .pairing import Pairing, TwoPassPairing, finer_face, pair_both_faces, pair_faces
 from .pairing_report import PairingReport
@@ -27,6 +27,7 @@ __all__ = [
     "CylindricalAxes",
     "ElementBlock",
     "Elimination",
+    "FieldAxes",
     "HingeSupport",
     "LapStrip",
     "LinearEquation",

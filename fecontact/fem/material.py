@@ -122,7 +122,7 @@ class AnisotropicMaterial:
         Symmetric, positive definite [Pa].
     density : float
         rho, positive [kg/m^3].
-    axes : MaterialAxes, CylindricalAxes or CurveAxes
+    axes : MaterialAxes, CylindricalAxes, CurveAxes or FieldAxes
         Axes of the material; by default those of the body: x, y, z.
     loss_factor : float
         Share of the elastic energy that a cycle dissipates, over 2 pi; zero or above.

@@ -1,4 +1,4 @@
-"""Axes of materials: constant, about a line, along a curve; rotation of stiffness and stress."""
+"""Axes of materials: constant, about a line, along a curve, by a field; rotation of stiffness."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from fecontact.core.checks import as_direction, as_place
+from fecontact.core.checks import as_direction, as_floats, as_place
 from fecontact.core.errors import InputError, require_finite, shown
 from fecontact.core.types import Array, Coordinates
 from fecontact.core.units import Unit
@@ -60,9 +60,8 @@ class MaterialAxes:
 
     def at(self, places: Array) -> Array:
         """Axes (1, 3, 3) as rows, the same at all places (n, 3)."""
-        a, third = np.array(self.first), np.cross(self.first, self.second)
-        third /= np.linalg.norm(third)
-        return _turned(np.array([[a, np.cross(third, a), third]]), self.about, self.angle)
+        return _turned(_spanned(np.array([self.first]), np.array([self.second])), self.about,
+                       self.angle)
 
     def moved(self, turn: Array, shift: Array) -> tuple["MaterialAxes", Array]:
         """Axes of the turned or mirrored body, and the signs (3,) of its axes against these."""
@@ -268,7 +267,88 @@ class CurveAxes:
         return replace(self, points=tuple(_three(scale * np.array(one)) for one in self.points))
 
 
-AnyAxes = MaterialAxes | CylindricalAxes | CurveAxes
+@dataclass(frozen=True)
+class FieldAxes:
+    """Axes of a material by a field, such as fibres of a draping or moulding simulation.
+
+    Each cell has the axes given at the place closest to its centre: axis 3 is normal to both of its
+    directions, axis 2 normal to axes 3 and 1. The axes are then turned about one of themselves.
+
+    Parameters
+    ----------
+    places : n (x, y, z)
+        Distinct places [m].
+    along : n (x, y, z)
+        Direction of axis 1 at each of them.
+    across : n (x, y, z)
+        A direction in the plane of axes 1 and 2 there, on the side of axis 2.
+    about : 1, 2 or 3
+        Axis about which the axes are turned.
+    angle : float
+        Angle of this turn by the right-hand rule [degrees].
+
+    Raises
+    ------
+    InputError
+        For other numbers of directions than of places, a place that is given twice, directions that
+        are parallel or zero, and values that are not finite.
+    """
+
+    places: Annotated[tuple[Coordinates, ...], Unit("m")] = ((0.0, 0.0, 0.0),)
+    along: tuple[Coordinates, ...] = ((1.0, 0.0, 0.0),)
+    across: tuple[Coordinates, ...] = ((0.0, 1.0, 0.0),)
+    about: Literal[1, 2, 3] = 1
+    angle: Annotated[float, Unit("degrees")] = 0.0
+
+    def __post_init__(self) -> None:
+        count = len(as_floats(self.places, "FieldAxes: places"))
+        for name in ("places", "along", "across"):
+            given = as_floats(getattr(self, name), f"FieldAxes: {name}")
+            if given.ndim != 2 or given.shape[1] not in (2, 3) or len(given) != count or not (
+                    count and np.isfinite(given).all()):
+                raise InputError(f"FieldAxes: {name} must be {max(count, 1)} finite places or "
+                                 f"directions of three numbers, as many as places, not an array of "
+                                 f"shape {given.shape}.")
+            flat = np.pad(given, ((0, 0), (0, 3 - given.shape[1])))
+            object.__setattr__(self, name, tuple(map(tuple, flat.tolist())))
+        places, along, across = (np.array(one) for one in (self.places, self.along, self.across))
+        if len(np.unique(places, axis=0)) < count:
+            raise InputError("FieldAxes: places holds one place twice; give each place once.")
+        sizes = np.linalg.norm(along, axis=1) * np.linalg.norm(across, axis=1)
+        flat = np.linalg.norm(np.cross(along, across), axis=1) <= _PARALLEL * sizes
+        if flat.any():
+            first = int(np.flatnonzero(flat)[0])
+            raise InputError(f"FieldAxes: along = {shown(self.along[first])} and across = "
+                             f"{shown(self.across[first])} of place {first + 1} span no plane; "
+                             f"give two directions that are neither zero nor parallel.")
+        _require_turn(self)
+
+    @cached_property
+    def _given(self) -> tuple[Any, Array]:
+        """Search tree of the places, and axes (m, 3, 3) there."""
+        from scipy.spatial import KDTree
+
+        return KDTree(np.array(self.places)), _turned(
+            _spanned(np.array(self.along), np.array(self.across)), self.about, self.angle)
+
+    def at(self, places: Array) -> Array:
+        """Axes (n, 3, 3) as rows at places (n, 3)."""
+        tree, axes = self._given
+        return np.asarray(axes[tree.query(places)[1]])
+
+    def moved(self, turn: Array, shift: Array) -> tuple["FieldAxes", Array]:
+        """Axes of the turned or mirrored body, and the signs (3,) of its axes against these."""
+        rows = self._given[1] @ turn.T
+        return FieldAxes(
+            _places(np.array(self.places) @ turn.T + shift), _places(rows[:, 0]),
+            _places(rows[:, 1])), np.array([1.0, 1.0, np.sign(np.linalg.det(turn))])
+
+    def scaled(self, scale: float) -> "FieldAxes":
+        """Axes with lengths in another unit."""
+        return replace(self, places=_places(scale * np.array(self.places)))
+
+
+AnyAxes = MaterialAxes | CylindricalAxes | CurveAxes | FieldAxes
 
 
 def rotated_stiffness(stiffness: Array, axes: Array) -> Array:
@@ -287,6 +367,18 @@ def stress_rotation(axes: Array) -> Array:
     direct = a[:, :, _FIRST] * b[:, :, _SECOND]
     both = direct + a[:, :, _SECOND] * b[:, :, _FIRST]
     return np.asarray(np.where(_FIRST == _SECOND, direct, both))
+
+
+def _spanned(first: Array, second: Array) -> Array:
+    """Axes (n, 3, 3) by rows: along the first directions (n, 3), in the plane with the second."""
+    first = first / np.linalg.norm(first, axis=1, keepdims=True)
+    third = np.cross(first, second)
+    third /= np.linalg.norm(third, axis=1, keepdims=True)
+    return np.stack([first, np.cross(third, first), third], axis=1)
+
+
+def _places(values: Array) -> tuple[Coordinates, ...]:
+    return tuple(_three(one) for one in values)
 
 
 def _turned(axes: Array, about: int, angle: float) -> Array:

@@ -35,11 +35,12 @@ class MaterialSettings:
         In place of these constants 6 rows of 6 numbers, in the order 11, 22, 33, 12, 23, 13 [Pa].
     density : float, optional
         [kg/m^3]; required without ``material``.
-    axes : MaterialAxes, CylindricalAxes or CurveAxes, optional
+    axes : MaterialAxes, CylindricalAxes, CurveAxes or FieldAxes, optional
         ``{first, second}``: directions of axis 1 and in the plane of axes 1 and 2; ``{point,
-        direction}`` of a line around which axis 1 is radial and axis 2 circumferential; or
-        ``{points, third}`` of a curve along which axis 1 leads. All in the coordinates of the
-        placed body; x, y, z by default.
+        direction}`` of a line around which axis 1 is radial and axis 2 circumferential; ``{points,
+        third}`` of a curve along which axis 1 leads; or ``{places, along, across}``, directions as
+        ``first`` and ``second`` at places, of which each cell takes the closest. All in the
+        coordinates of the placed body; x, y, z by default.
     loss_factor : float
         For ``damping = "materials"`` of ``[basis]``.
     """

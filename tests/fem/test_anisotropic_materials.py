@@ -27,6 +27,7 @@ from fecontact.fem import (
     AnisotropicMaterial,
     CurveAxes,
     CylindricalAxes,
+    FieldAxes,
     MaterialAxes,
     Ring,
     Rotation,
@@ -209,7 +210,9 @@ def test_turned_axes_of_a_turned_body_give_the_same_frequencies(tetrahedra):
     for axes in (TILTED, CylindricalAxes((0.2, -0.4, 0.1), (0.1, 1.0, 2.0), about=1, angle=25.0),
                  CylindricalAxes((0.2, -0.4, 0.1), (0.1, 1.0, 2.0), about=3, angle=25.0),
                  *(CurveAxes(((-0.02, 0.01, 0.0), (0.05, 0.03, 0.01), (0.12, 0.0, 0.03)),
-                             (0.1, -0.2, 1.0), about, 25.0) for about in (1, 2, 3))):
+                             (0.1, -0.2, 1.0), about, 25.0) for about in (1, 2, 3)),
+                 FieldAxes(((0.0, 0.0, 0.0), (0.11, 0.02, 0.01)), ((1.0, 1.0, 0.0),
+                           (0.0, 1.0, 3.0)), ((0.0, 0.0, 1.0), (1.0, 0.2, 0.1)), 2, 25.0)):
         of = fully_anisotropic(axes)
         still = Mesh(mesh.nodes, mesh.cells, cell_groups={"all": np.arange(len(mesh.cells))},
                      materials={"all": of})
@@ -360,6 +363,47 @@ def test_places_without_axes_along_a_curve_are_refused():
         CurveAxes(((0, 0, 0), (0, 0, 1))).at(np.ones((1, 3)))
 
 
+def test_axes_by_a_field_are_those_of_the_closest_place():
+    """Samples of cylindrical axes: exact at their places, and within their distance elsewhere."""
+    places = np.random.default_rng(5).uniform([0.05, -0.1, -0.02], [0.1, 0.1, 0.02], (2000, 3))
+    round_ones = CylindricalAxes(about=2, angle=30.0)
+    exact = round_ones.at(places)
+    field = FieldAxes(places[:1000], exact[:1000, 0], exact[:1000, 1] + 0.3 * exact[:1000, 0])
+    found = field.at(places)
+    assert found[:1000] == pytest.approx(exact[:1000], abs=1e-12)
+    gap = np.linalg.norm(places[1000:, None] - places[:1000], axis=2).min(axis=1)
+    assert (np.abs(found - exact)[1000:].max(axis=(1, 2)) < gap / 0.05).all()
+    assert FieldAxes(about=3, angle=90.0).at(np.ones((1, 3)))[0] == pytest.approx(
+        np.array([[0, 1, 0], [-1, 0, 0], [0, 0, 1]]))
+    scaled = field.scaled(2.0).at(2.0 * places)
+    assert scaled == pytest.approx(found, abs=1e-14)
+
+
+def test_a_body_with_the_axes_of_each_cell_is_that_of_the_axes():
+    """A field given at the centres of all cells is the curve that it was taken from."""
+    curve = CurveAxes(((0.0, 0.0, 0.0), (0.05, 0.02, 0.0), (0.1, 0.0, 0.01)))
+    body = ElasticBody(block_mesh((4, 2, 2), (0.1, 0.05, 0.03)), fully_anisotropic(curve))
+    centres = body.cell_centres(np.arange(16))
+    rows = curve.at(centres)
+    field = FieldAxes(centres, rows[:, 0], rows[:, 1])
+    other = ElasticBody(body.mesh, fully_anisotropic(field))
+    assert abs(other.stiffness - body.stiffness).max() < 1e-9 * abs(body.stiffness).max()
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    ({"along": ((1, 0, 0),)}, r"along must be 2 finite .* not an array of shape \(1, 3\)"),
+    ({"across": ((0, 1, 0), (2, 0, 0))}, r"of place 2 span no plane"),
+    ({"across": ((0, 0, 0), (0, 1, 0))}, r"of place 1 span no plane"),
+    ({"places": ((0, 0, 0), (0, 0, 0))}, r"places holds one place twice"),
+    ({"places": ((0, 0, 0), (0, np.nan, 0))}, r"places must be 2 finite"),
+    ({"about": 0}, r"about = 0 must be 1, 2 or 3"),
+])
+def test_bad_fields_are_refused(change, message):
+    with pytest.raises(InputError, match=rf"FieldAxes.*{message}"):
+        FieldAxes(**{"places": ((0, 0, 0), (1, 0, 0)), "along": ((1, 0, 0), (1, 0, 0)),
+                     "across": ((0, 1, 0), (0, 1, 0)), **change})
+
+
 def study_of(tmp_path, materials, damping="0.0"):
     return Study.from_toml(
         "[geometry]\nshape = 'solid-block'\nlength = 0.1\nwidth = 0.05\nheight = 0.02\n"
@@ -384,6 +428,14 @@ def test_materials_of_studies(tmp_path):
         ((0.0, 0.0, 0.0), (0.05, 0.02, 0.0), (0.1, 0.0, 0.0)))
     assert Study.from_tables(along.tables()).elastic_body().materials == (
         along.elastic_body().materials)
+    field = study_of(tmp_path, table.replace(
+        "point = [0.0, 1.0, 0.0], direction = [0.0, 0.0, 1.0]",
+        "places = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]], along = [[1, 0, 0], [1, 1, 0]], "
+        "across = [[0, 1, 0], [0, 1, 0]]"))
+    assert field.elastic_body().materials[0].axes == FieldAxes(
+        ((0.0, 0.0), (0.1, 0.0)), ((1.0, 0.0), (1.0, 1.0)), ((0.0, 1.0), (0.0, 1.0)))
+    assert Study.from_tables(field.tables()).elastic_body().materials == (
+        field.elastic_body().materials)
     fibres = study_of(tmp_path, "[[body.materials]]\nyoungs_modulus = [140e9, 10e9]\n"
                       "poisson_ratio = [0.3, 0.4]\nshear_modulus = 5e9\ndensity = 1600.0\n")
     assert fibres.elastic_body().materials[0] == AnisotropicMaterial.transversely_isotropic(
