@@ -140,11 +140,6 @@ class ElasticBody(Summarised):
         if self.bricks is None:
             object.__setattr__(self, "bricks", self.mesh.bricks)
         require_choice("ElasticBody", "bricks", self.bricks, get_args(Bricks))
-        plain, count = "triangles" if self.dimension == 2 else "tetrahedra", len(self.mesh.cells)
-        needed = sum(len(block.nodes) * block.kind.unknowns(int(self.degree), self.serendipity)
-                     * _BYTES[self.dimension, block.kind.corners] for block in self.mesh.blocks)
-        require_memory("ElasticBody: the number of cells", count, needed / count,
-                       f", by a larger element_size, or {plain} or degree = 1")
         _ = self.anisotropic
         if self.constraints is not None:
             require_kind("ElasticBody", Sequence, constraints=self.constraints)
@@ -313,7 +308,15 @@ class ElasticBody(Summarised):
 
     @cached_property
     def _assembled(self) -> tuple[Any, Any]:
-        """Stiffness and mass of one component of a solid, or of a plane body 1 m thick."""
+        """Stiffness and mass of one component of a solid, or of a plane body 1 m thick.
+
+        InputError if modes would not fit into memory.
+        """
+        plain, count = "triangles" if self.dimension == 2 else "tetrahedra", len(self.mesh.cells)
+        needed = sum(len(block.nodes) * block.kind.unknowns(int(self.degree), self.serendipity)
+                     * _BYTES[self.dimension, block.kind.corners] for block in self.mesh.blocks)
+        require_memory("ElasticBody: the number of cells", count, needed / count,
+                       f", by a larger element_size, or {plain} or degree = 1")
         _, lateral, shear = self.elasticity.T
         K, M = assembled(self.blocks, lateral, shear, self.densities, self.anisotropic)
         if self.has_incompatible_modes:
