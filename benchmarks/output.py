@@ -23,7 +23,7 @@ from fecontact import (
 from fecontact.io import export_pvd
 from fecontact.laws import ExponentialFriction, RoughSurface
 from fecontact.plot import rendering_problem
-from fecontact.system.powers import POWERS
+from fecontact.system.columns import POWERS
 
 FRAMES = 200
 

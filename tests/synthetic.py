@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from fecontact import ContactSystem, Ground, ModalBasis, Trajectory
 from fecontact.laws import ExponentialFriction, RoughSurface
 from fecontact.reduction import ModeShapes
-from fecontact.system.powers import POWERS
+from fecontact.system.columns import POWERS
 
 YOUNGS_MODULUS = 2.1e11
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.system import kernels as kernels
+from fecontact.system import columns
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.node_forces import normal_values
 
@@ -107,21 +107,21 @@ class ContactMotion:
             For nodes that do not exist, for systems without contact nodes, and for runs with rigid
             stops, where impacts are instantaneous.
         """
-        if not trajectory.system.basis.contact_nodes:
+        if not trajectory.basis.contact_nodes:
             raise InputError("The system has no contact nodes, so that its run has no contact "
                              "phases.")
         held = trajectory.held_normal_force
         if held is not None:
             system = trajectory.system
             by_law = system.contact_history(trajectory.time, trajectory.states)[
-                :, :, kernels.NORMAL_FORCE]
+                :, :, columns.NORMAL_FORCE]
             if trajectory.statistics.get("restitution") is not None or (
                     np.abs(by_law - held).max() > 1e-6 * np.abs(held).max()):
                 raise InputError("The impacts of a run with rigid stops take no time, so that it "
                                  "has no contact phases; run it without restitution, with the "
                                  "normal law.")
         chosen = chosen_nodes(trajectory.system, nodes)
-        length = trajectory.system.basis.tributary[chosen]
+        length = trajectory.basis.tributary[chosen]
         return cls(trajectory, chosen, length / length.sum())
 
     @property
@@ -201,7 +201,7 @@ class ContactMotion:
         tiny = 1e-3 * float(np.diff(self.time).min())
         before, after = (
             system.contact_history(t + h, states + h * rates)[:, self.nodes,
-                                                              kernels.PENETRATION_RATE]
+                                                              columns.PENETRATION_RATE]
             for h in (-tiny, tiny))
         return np.asarray((after - before) / (2.0 * tiny))
 

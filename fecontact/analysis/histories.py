@@ -1,6 +1,6 @@
 """Histories of a run by name, such as the displacement x of B or the friction force of node 3."""
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -10,7 +10,9 @@ from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.assembly.contact_faces import node_name
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.system.contact_system import ContactSystem
+
+if TYPE_CHECKING:
+    from fecontact.system.contact_system import ContactSystem
 
 Point = str | int | tuple[float, ...]
 
@@ -65,7 +67,7 @@ def history(
     """
     require_kind("history", Trajectory, trajectory=trajectory)
     unit = quantity_unit(quantity, component)
-    title, basis = quantity.replace("_", " "), trajectory.system.basis
+    title, basis = quantity.replace("_", " "), trajectory.basis
     if quantity in _TOTALS:
         return History(getattr(trajectory, _TOTALS[quantity]).sum(axis=1), unit, title)
     if quantity in _OF_NODES:
@@ -102,12 +104,17 @@ def quantity_unit(quantity: str, component: str = "x") -> str:
     return unit.replace("m", "rad") if turns else unit
 
 
-def usual_component(system: ContactSystem) -> str:
+def usual_component(system: "ContactSystem") -> str:
     """Component in which a system moves most: the one that alone is driven, else x."""
     drive = system.drive
     if drive.stiffness_z > 0.0 and not (drive.stiffness_x or drive.stiffness_y):
         return "z"
     return "y" if drive.stiffness_y > 0.0 and drive.stiffness_x == 0.0 else "x"
+
+
+def component_of(run: Trajectory) -> str:
+    """Component in which the system of a run moves most, see :func:`usual_component`."""
+    return (run.recorded and run.recorded.component) or usual_component(run.system)
 
 
 def is_relative(point: Point, basis: ModalBasis) -> bool:

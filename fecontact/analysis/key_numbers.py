@@ -103,7 +103,7 @@ def key_numbers(
         For a point that does not exist, or fewer than two output times after ``t_start``.
     """
     require_kind("key_numbers", Trajectory, trajectory=trajectory)
-    t, basis = trajectory.time, trajectory.system.basis
+    t, basis = trajectory.time, trajectory.basis
     begin = 0.5 * float(t[0] + t[-1]) if t_start is None else t_start
     late = trajectory if len(t) < 4 and t_start is None else trajectory.between(begin)
     values: dict[str, float] = {}
@@ -125,7 +125,7 @@ def key_numbers(
 
     found = steadiness(trajectory)
     require_kind("key_numbers", Sequence, points=points)
-    chosen = tuple(points) or (usual_point(trajectory.system.basis),)
+    chosen = tuple(points) or (usual_point(trajectory.basis),)
     for point in chosen:
         # Outputs too far apart show frequencies that the motion does not have.
         if found.kind != "at rest" and not alias_message(late):

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from numbers import Integral, Real
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -14,7 +14,9 @@ from fecontact.core.errors import InputError, require_positive
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.system.contact_system import ContactSystem
+
+if TYPE_CHECKING:
+    from fecontact.system.contact_system import ContactSystem
 
 _LEAST_CHECKS = 8  # returns that must agree before a motion is called periodic
 _SLOW = 0.05  # of the range of the velocity: slower reversals are no maxima of the motion
@@ -24,7 +26,7 @@ _MOST_GRID, _MOST_CHECKS = 2**15, 2000  # times of the search for a lag, and of 
 _TRIED, _MOST_LINES = 8, 33  # candidates of a lag, and multiples of the period of a spectral line
 
 
-def drive_period(system: ContactSystem) -> float:
+def drive_period(system: "ContactSystem") -> float:
     """Period of the drive at B [s]; InputError if it has none."""
     frequency = system.drive.fundamental_hz
     if not frequency > 0.0:
@@ -188,7 +190,7 @@ def section_states(
     """
     require_kind("section_states", Trajectory, trajectory=trajectory)
     begin = _start(trajectory, t_start)
-    basis, m = trajectory.system.basis, trajectory.system.basis.modes
+    basis, m = trajectory.basis, trajectory.basis.modes
     if point is None:
         points: list[str | int] = ["B", *range(basis.contact_nodes)]
         axes = basis.components[: basis.dimension]
@@ -219,7 +221,7 @@ def section_states(
 
 def _crossing(run: Trajectory, k: int, row: Array) -> float:
     """Time within interval k at which a velocity, interpolated in cubics, falls through zero."""
-    m = run.system.basis.modes
+    m = run.basis.modes
     t0, t1 = float(run.time[k]), float(run.time[k + 1])
     low, high = t0, t1
     for _ in range(40):
@@ -332,7 +334,7 @@ def periodicity(
         As in :func:`strobed_states` and :func:`count_periods`, and for too few outputs per period.
     """
     require_kind("periodicity", Trajectory, trajectory=trajectory)
-    basis = trajectory.system.basis
+    basis = trajectory.basis
     found = strobed_states(trajectory, period=period, t_start=t_start)
     late = trajectory.time >= _start(trajectory, t_start)
     if np.count_nonzero(late) < 8 * (len(found.time) - 1):
@@ -437,7 +439,7 @@ def steadiness(trajectory: Trajectory, *, tolerance: float = 1e-2) -> Steadiness
 
 def _observed_motion(trajectory: Trajectory) -> tuple[Array, Array]:
     """Displacements and velocities (N, m) with the norm of those of B and the contact nodes."""
-    basis, m = trajectory.system.basis, trajectory.system.basis.modes
+    basis, m = trajectory.basis, trajectory.basis.modes
     points = [0, *range(2, 2 + basis.contact_nodes)]
     rows = basis.T[points, : basis.dimension].reshape(-1, m)
     if not rows.any():

@@ -3,7 +3,6 @@
 Sparse outputs may miss an impact or distort a closed curve.
 """
 
-from dataclasses import replace
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
@@ -131,7 +130,7 @@ def _bent(time: Array, values: Array, error: float) -> Flags:
 
 def _motion(run: Trajectory) -> tuple[Array, Array]:
     """Displacements and velocities (N, k) of the named points and selected contact nodes."""
-    basis = run.system.basis
+    basis = run.basis
     n = basis.contact_nodes
     nodes = 2 + np.unique(np.linspace(0, n - 1, min(n, _NODES)).astype(int))
     points = np.concatenate([[0, 1], nodes, np.arange(2 + n, len(basis.T))])
@@ -150,7 +149,7 @@ def _joined(run: Trajectory, kept: KeptSteps) -> Trajectory:
     """Insert the rows of what was kept into the run."""
     time = np.concatenate([run.time, kept.time])
     order = np.argsort(time, kind="stable")
-    m = run.system.basis.modes
+    m = run.basis.modes
     states, counted = kept.states, ("node_friction_work", "node_creep_work")
     added = {"modal_coordinates": states[:, :m], "modal_velocities": states[:, m : 2 * m],
              "memory": states[:, 2 * m :], "work": kept.work,
@@ -162,4 +161,5 @@ def _joined(run: Trajectory, kept: KeptSteps) -> Trajectory:
         if (values := getattr(run, name)) is not None:
             columns[name] = np.array([np.interp(time[order], run.time, column)
                                       for column in values.T]).reshape(-1, len(time)).T
-    return replace(run, time=time[order], kept=None, **columns)
+    recorded = None if run.recorded is None else run.recorded.merged(kept, order)
+    return run.with_rows(time=time[order], kept=None, recorded=recorded, **columns)

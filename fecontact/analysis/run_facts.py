@@ -3,7 +3,7 @@
 import numpy as np
 
 from fecontact.core.units import quantity
-from fecontact.integrate.events import Events
+from fecontact.integrate.event_table import Events
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.reduction.assembly.contact_faces import contact_faces, several_bodies
 from fecontact.system.contact_quantities import ContactState
@@ -29,7 +29,7 @@ def run_facts(trajectory: Trajectory) -> list[tuple[str, str]]:
 
 def _contact_rows(trajectory: Trajectory) -> list[tuple[str, str]]:
     """Bodies, if there are several, and shares of the contact states, for each interface."""
-    basis = trajectory.system.basis
+    basis = trajectory.basis
     if not several_bodies(basis):
         shares = contact_shares(trajectory) if basis.contact_nodes else {}
         return [(f"contact {name}", f"{100.0 * share:.1f} %") for name, share in shares.items()]
@@ -53,7 +53,7 @@ def _events(events: Events) -> str:
 
 def largest_displacement(trajectory: Trajectory) -> tuple[float, str]:
     """Largest displacement [m] of the bodies at all output times, and where it occurs."""
-    basis, q = trajectory.system.basis, trajectory.modal_coordinates
+    basis, q = trajectory.basis, trajectory.modal_coordinates
     if basis.mode_shapes is not None:
         shapes, places = basis.mode_shapes.shapes, basis.mode_shapes.nodes
     else:
@@ -78,7 +78,7 @@ def contact_shares(trajectory: Trajectory, nodes: slice = slice(None)) -> dict[s
 
     Without friction forces they are open or closed.
     """
-    weight = trajectory.system.basis.tributary[nodes]
+    weight = trajectory.basis.tributary[nodes]
     states = trajectory.contact_state[:, nodes]
     found = {state.name.lower(): float(((states == state) @ (weight / weight.sum())).mean())
              for state in ContactState}
@@ -96,7 +96,7 @@ def notes(trajectory: Trajectory) -> list[str]:
     ground = trajectory.system.ground
     slope = ground.steepest_slope
     if slope > ROUGH_SLOPE:
-        along = "x" if trajectory.system.basis.dimension == 2 else "the level ground"
+        along = "x" if trajectory.basis.dimension == 2 else "the level ground"
         what = (f"friction acts along {along}" if ground.normal == "surface" else
                 f"the contact force is vertical and friction acts along {along}")
         found.append(f"The ground's slope reaches {slope:.2f}; above {ROUGH_SLOPE} it is a rough "

@@ -17,8 +17,8 @@ from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.assembly.contact_faces import contact_faces
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.columns import POWERS
 from fecontact.system.contact_quantities import ContactState
-from fecontact.system.powers import POWERS
 
 Point = str | int
 
@@ -53,7 +53,7 @@ def _mean(trajectory: Trajectory, values: NDArray[Any]) -> float:
 
 
 def _part(trajectory: Trajectory, state: ContactState) -> float:
-    basis = trajectory.system.basis
+    basis = trajectory.basis
     lengths = np.where(basis.spring_nodes, 0.0, basis.tributary)
     if not lengths.any():
         return float("nan")
@@ -62,7 +62,7 @@ def _part(trajectory: Trajectory, state: ContactState) -> float:
 
 def largest_displacement(trajectory: Trajectory) -> float:
     """Largest displacement of B, C, the contact nodes and other named points at any time."""
-    basis = trajectory.system.basis
+    basis = trajectory.basis
     rows = basis.T[basis.moving_points, : basis.dimension]
     moved = np.einsum("pkm,tm->tpk", rows, trajectory.modal_coordinates)
     if basis.dimension == 3:
@@ -82,7 +82,7 @@ def amplitude_y(trajectory: Trajectory, point: Point | None = None) -> float:
 
 def amplitude_z(trajectory: Trajectory, point: Point | None = None) -> float:
     """Half the range of the displacement z of a point of a solid."""
-    if trajectory.system.basis.dimension == 2:
+    if trajectory.basis.dimension == 2:
         raise InputError("plane bodies do not move along z; take amplitude_x or amplitude_y.")
     return 0.5 * float(np.ptp(_of_point(trajectory, point)[:, 2]))
 
@@ -94,12 +94,12 @@ def rms_velocity(trajectory: Trajectory, point: Point | None = None) -> float:
 
 def _velocity(trajectory: Trajectory, point: Point | None) -> Array:
     """Velocity (N, d) of a point [m/s]."""
-    found = trajectory.velocity(usual_point(trajectory.system.basis) if point is None else point)
-    return found[:, : trajectory.system.basis.dimension]
+    found = trajectory.velocity(usual_point(trajectory.basis) if point is None else point)
+    return found[:, : trajectory.basis.dimension]
 
 
 def _of_point(trajectory: Trajectory, point: Point | None) -> Array:
-    return trajectory.displacement(usual_point(trajectory.system.basis) if point is None else point)
+    return trajectory.displacement(usual_point(trajectory.basis) if point is None else point)
 
 
 def stick_fraction(trajectory: Trajectory) -> float:
@@ -120,7 +120,7 @@ def open_fraction(trajectory: Trajectory) -> float:
 def mean_normal_force(trajectory: Trajectory, face: str | None = None) -> float:
     """Mean over time of the sum of the normal forces, without those of nonlinear springs."""
     nodes = _nodes(trajectory, face)
-    touching = ~trajectory.system.basis.spring_nodes[nodes]
+    touching = ~trajectory.basis.spring_nodes[nodes]
     return _mean(trajectory, trajectory.normal_force[:, nodes][:, touching].sum(axis=1))
 
 
@@ -145,7 +145,7 @@ def _nodes(trajectory: Trajectory, face: str | None) -> slice:
     """Contact nodes of an interface by its name; by default all of them."""
     if face is None:
         return slice(None)
-    faces = {one.name: one.nodes for one in contact_faces(trajectory.system.basis) if one.name}
+    faces = {one.name: one.nodes for one in contact_faces(trajectory.basis) if one.name}
     if face not in faces:
         raise InputError(f"There is no interface '{face}'; " + (
             f"choose from {choices(faces)}." if faces else "the run has only one."))

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from fecontact.bifurcation.fields.contact_field import ContactField
     from fecontact.integrate.trajectory import Trajectory
     from fecontact.output.files.stored_system import StoredModel
-    from fecontact.study.sections import RenderSettings
+    from fecontact.study.render_section import RenderSettings
 
 DIAGRAMS = ("branches", "response", "mode")  # plots of whole files
 _OUTPUTS = 1001  # of an orbit
@@ -163,7 +163,7 @@ def _point(
 def _settings(model: "StoredModel") -> "RenderSettings":
     """The section [render] of the study of a file, without times, which belong to its run."""
     from fecontact.core.tables import from_table
-    from fecontact.study.sections import RenderSettings
+    from fecontact.study.render_section import RenderSettings
 
     try:
         found = from_table(RenderSettings, tomllib.loads(model.study or "").get("render", {}),

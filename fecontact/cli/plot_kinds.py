@@ -2,15 +2,14 @@
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecontact.analysis.histories import Point, usual_component
-from fecontact.analysis.receptance import Place, receptance
+from fecontact.analysis.histories import Point, component_of
 from fecontact.cli.orbit_files import DIAGRAMS, OrbitChoice, holds_branches
 from fecontact.core.checks import whole_number
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest, require_positive
@@ -61,24 +60,25 @@ class PlotRequest:
         """The first point, or B."""
         return self.points[0] if self.points else "B"
 
-    @property
-    def shown_component(self) -> str:
-        """The component, x where none is chosen."""
-        return self.component or "x"
+    def shown_component(self, run: Trajectory) -> str:
+        """The component; that in which the system moves most where none is chosen."""
+        return self.component or component_of(run)
 
 
 Draw = Callable[[Trajectory, PlotRequest, Path | None], "Figure"]
 
 
 def _receptance(run: Trajectory, c: PlotRequest, path: Path | None) -> "Figure":
-    basis = run.system.basis
+    basis = run.basis
     whole, usable = 1.2 * float(basis.frequencies_hz[-1] or 100.0), usable_hz(basis)
     end = c.highest_hz or (whole if c.beyond else min(whole, usable))
     f = np.linspace(end / 2000.0, end, 2000)
     if not isinstance(c.point, str | int):
         raise InputError(f"The receptance is one of named points and contact nodes, not of "
                          f"{c.point!r}.")
-    place: list[Place] = [(c.point, c.shown_component)]
+    from fecontact.analysis.receptance import Place, receptance
+
+    place: list[Place] = [(c.point, c.shown_component(run))]
     found = [receptance(run.system, f, place)]
     labels = ["apart from the ground"]
     # Without steady sliding, as on waves, there is no equilibrium for the linearisation.
@@ -90,19 +90,19 @@ def _receptance(run: Trajectory, c: PlotRequest, path: Path | None) -> "Figure":
 
 KINDS: dict[str, Draw] = {
     "history": lambda run, c, path: plots.plot_history(run, c.points, path=path),
-    "phase": lambda run, c, path: plots.plot_phase(run, c.point, c.shown_component, path=path),
+    "phase": lambda run, c, path: plots.plot_phase(run, c.point, c.shown_component(run), path=path),
     "contact_map": lambda run, c, path: plot_contact_map(run, path=path),
     "energies": lambda run, c, path: plots.plot_energies(run, path=path),
-    "modes": lambda run, c, path: plot_modes(run.system.basis, path=path),
+    "modes": lambda run, c, path: plot_modes(run.basis, path=path),
     "spectrum": lambda run, c, path: analysis.plot_spectrum(
-        run, c.quantity, c.point, c.shown_component, highest_hz=c.highest_hz, path=path),
+        run, c.quantity, c.point, c.shown_component(run), highest_hz=c.highest_hz, path=path),
     "density": lambda run, c, path: analysis.plot_spectrum(
-        run, c.quantity, c.point, c.shown_component, density=True, highest_hz=c.highest_hz,
+        run, c.quantity, c.point, c.shown_component(run), density=True, highest_hz=c.highest_hz,
         path=path),
     "spectrogram": lambda run, c, path: analysis.plot_spectrogram(
-        run, c.quantity, c.point, c.shown_component, highest_hz=c.highest_hz, path=path),
+        run, c.quantity, c.point, c.shown_component(run), highest_hz=c.highest_hz, path=path),
     "poincare": lambda run, c, path: analysis.plot_poincare(
-        run, c.point, c.shown_component, period=c.period, path=path),
+        run, c.point, c.shown_component(run), period=c.period, path=path),
     "friction_work": lambda run, c, path: analysis.plot_friction_work(run, path=path),
     "receptance": _receptance,
 }
@@ -174,9 +174,7 @@ def redraw(
     whole = t_start is None and t_end is None
     part = trajectory if whole else trajectory.between(t_start, t_end)
     chosen = choice or PlotRequest()
-    if chosen.component is None:
-        chosen = replace(chosen, component=usual_component(part.system))
-    elif chosen.component not in (known := part.system.basis.components):
+    if chosen.component is not None and chosen.component not in (known := part.basis.components):
         raise InputError(f"component = {chosen.component!r} is not one of this run; choose from "
                          f"{choices(known)}.")
     return KINDS[kind](part, chosen, path)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from fecontact.integrate.trajectory import Trajectory
     from fecontact.laws.wear import WearLaw
     from fecontact.reduction.assembly.interface_compliance import InterfaceCompliance
-    from fecontact.study.sections import RenderSettings
+    from fecontact.study.render_section import RenderSettings
     from fecontact.study.study import Study
     from fecontact.system.quasistatic.history import LoadHistory
 
@@ -106,7 +106,7 @@ def write_results_of_run(
 
 def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Path]:
     """Plot histories, phase plane, contact and energies of a run into a folder; the files."""
-    from fecontact.analysis.histories import usual_component
+    from fecontact.analysis.histories import component_of
     from fecontact.analysis.summaries import usual_point
     from fecontact.output.plots import run as plots
     from fecontact.output.plots.contact_map import plot_contact_map
@@ -118,7 +118,7 @@ def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[
     history, phase, energies, *contact_map = files = [
         folder / f"{study.name}-{kind}.png" for kind in kinds]
     plots.plot_history(trajectory, points, path=history)
-    plots.plot_phase(trajectory, point, usual_component(system), path=phase)
+    plots.plot_phase(trajectory, point, component_of(trajectory), path=phase)
     plots.plot_energies(trajectory, path=energies)
     for file in contact_map:
         plot_contact_map(trajectory, path=file)
@@ -253,30 +253,30 @@ def stored_run(
     """
     with loading():
         from fecontact.core.tables import from_table
-        from fecontact.laws.registry import law_files
-        from fecontact.output.files.case import read_case
-        from fecontact.study.sections import RenderSettings
-        from fecontact.system.model_limits import warn_of_limits
+        from fecontact.laws.own_files import law_files
+        from fecontact.output.files.case import stored_case
+        from fecontact.study.render_section import RenderSettings
 
     path = has_run(file, changes)
-    if file.suffix.lower() == ".toml":
-        study = read_study(file, changes)
-        known = law_files(study.tables())
-        case = read_case(path, trust=trust or known)
-        warn_of_limits(case.trajectory.limits_exceeded, "In this run")
-        if current := _same_values(study, case.study, trust):
-            warn_of_changed_files(path)
-        return StoredRun(path, case.trajectory, study.render, current, case.study, case.versions)
-    case = read_case(path, trust=trust)
-    try:
-        settings = from_table(RenderSettings, tomllib.loads(case.study or "").get("render", {}),
-                              "[render]")
-    except FecontactError:
-        # The run can be drawn even if this version cannot read its study.
-        settings = RenderSettings()
-    warn_of_limits(case.trajectory.limits_exceeded, "In this run")
-    warn_of_changed_files(path)
-    return StoredRun(path, case.trajectory, settings, True, case.study, case.versions)
+    study = read_study(file, changes) if file.suffix.lower() == ".toml" else None
+    case = stored_case(path, trust=trust or (study is not None and law_files(study.tables())))
+    if exceeded := case.trajectory.limits_exceeded:
+        from fecontact.system.model_limits import warn_of_limits
+
+        warn_of_limits(exceeded, "In this run")
+    current = study is None or _same_values(study, case.study, trust)
+    if current:
+        warn_of_changed_files(path)
+    if study is not None:
+        settings = study.render
+    else:
+        try:
+            settings = from_table(RenderSettings, tomllib.loads(case.study or "").get("render", {}),
+                                  "[render]")
+        except FecontactError:
+            # The run can be drawn even if this version cannot read its study.
+            settings = RenderSettings()
+    return StoredRun(path, case.trajectory, settings, current, case.study, case.versions)
 
 
 def stored_or_computed_run(
@@ -292,7 +292,7 @@ def stored_or_computed_run(
     if file.suffix.lower() != ".toml":
         return stored_run(file, trust, changes)
     study = read_study(file, changes)
-    from fecontact.laws.registry import law_files
+    from fecontact.laws.own_files import law_files
     from fecontact.output.files.case import read_case
 
     found = run_of(study)
@@ -314,7 +314,7 @@ def _same_values(
     The named sections, those that affect no numbers, and the keys ``free`` of [response] may
     differ.
     """
-    from fecontact.laws.registry import law_files
+    from fecontact.laws.own_files import law_files
     from fecontact.study.measurement_section import masses_of_sensors
     from fecontact.study.study import NOT_OF_THE_RUN, stored_study
 
@@ -332,7 +332,7 @@ def _same_values(
 
 def _changed_since(study: "Study", stored: str | None) -> list[str]:
     """Names of files whose content differs between a study and a stored one."""
-    from fecontact.study.study import stored_hashes
+    from fecontact.study.comments import stored_hashes
 
     return [name for name, mark in stored_hashes(stored).items()
             if study.content_hashes.get(name, mark) != mark]
@@ -342,7 +342,7 @@ def warn_of_changed_files(file: Path) -> None:
     """Print one line if files that the study of stored results names have changed since."""
     from fecontact.core.files.named_files import changed_files
     from fecontact.output.files.stored_system import read_study_text
-    from fecontact.study.study import stored_hashes
+    from fecontact.study.comments import stored_hashes
 
     try:
         text, folder = read_study_text(file)
@@ -359,7 +359,7 @@ def wear_of(stored: StoredRun) -> "WearLaw | None":
     from fecontact.core.tables import from_table
     from fecontact.study.sections import WearSettings
 
-    if stored.trajectory.system.basis.dimension == 2:
+    if stored.trajectory.basis.dimension == 2:
         return None
     try:
         return from_table(WearSettings, tomllib.loads(stored.study or "").get("wear", {}),

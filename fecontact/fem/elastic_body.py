@@ -20,7 +20,6 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, listed, span
-from fecontact.fem.assembly import assembled, subtract
 from fecontact.fem.attachments import (
     Attachment,
     PointMass,
@@ -312,6 +311,8 @@ class ElasticBody(Summarised):
 
         InputError if modes would not fit into memory.
         """
+        from fecontact.fem.assembly import assembled, subtract
+
         plain, count = "triangles" if self.dimension == 2 else "tetrahedra", len(self.mesh.cells)
         needed = sum(len(block.nodes) * block.kind.unknowns(int(self.degree), self.serendipity)
                      * _BYTES[self.dimension, block.kind.corners] for block in self.mesh.blocks)

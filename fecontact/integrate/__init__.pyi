@@ -1,8 +1,10 @@
 from .ensembles import Ensemble, strobe
-from .events import ContactEvents, Crossing, Events
+from .event_table import Events
+from .events import ContactEvents, Crossing
 from .field_runs.field_run import FieldRun
 from .initial_state import PointStart, initial_state
 from .kept_steps import KeptSteps
+from .recorded import RecordedContact
 from .sensitivities import Sensitivity
 from .smoothing_cost import SmoothingCost, smoothing_cost
 from .solvers import (
@@ -35,6 +37,7 @@ __all__ = [
     "PointStart",
     "PowerSeries",
     "Radau",
+    "RecordedContact",
     "Rodas5P",
     "Scipy",
     "Sensitivity",

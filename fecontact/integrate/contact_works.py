@@ -3,13 +3,15 @@
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
+from fecontact.integrate.recorded import RecordedContact
 from fecontact.laws.wear import WearLaw
-from fecontact.system import kernels
+from fecontact.system import columns
 from fecontact.system.contact_quantities import ContactQuantities, ContactState
 
 
@@ -22,6 +24,7 @@ class ContactWorks(ContactQuantities):
     node_creep_work: Array | None
     held_normal_force: Array | None
     held_friction_force: Array | None
+    recorded: RecordedContact | None
 
     @property
     def states(self) -> Array:
@@ -32,12 +35,27 @@ class ContactWorks(ContactQuantities):
     def _contact(self) -> Array:
         history = self.system.contact_history(self.time, self.states)
         if self.held_normal_force is not None:
-            history[:, :, kernels.NORMAL_FORCE] = self.held_normal_force
+            history[:, :, columns.NORMAL_FORCE] = self.held_normal_force
         if self.held_friction_force is not None:
-            columns = self._columns(kernels.FRICTION_FORCE, kernels.FRICTION_ACROSS)
+            both = self._columns(columns.FRICTION_FORCE, columns.FRICTION_ACROSS)
             held = self.held_friction_force
-            history[:, :, columns] = held.reshape(*held.shape[:2], len(columns))
+            history[:, :, both] = held.reshape(*held.shape[:2], len(both))
         return history
+
+    def _column(self, column: int) -> Array:
+        if self.recorded is not None and column in self.recorded.contact:
+            return self.recorded.contact[column]
+        return super()._column(column)
+
+    @cached_property
+    def contact_state(self) -> NDArray[np.int8]:
+        """State (N, n) of the contact nodes, values of :class:`ContactState`.
+
+        Open without normal force; sticking below the slip velocity of largest friction.
+        """
+        if self.recorded is not None and self.recorded.contact_state is not None:
+            return self.recorded.contact_state
+        return super().contact_state
 
     @cached_property
     def modal_accelerations(self) -> Array:
@@ -50,7 +68,7 @@ class ContactWorks(ContactQuantities):
                              "its forces and impulses do not follow from the state; take the "
                              "velocity, or a normal and a friction law.")
         rates = [self.system.rhs(t, y) for t, y in zip(self.time, self.states, strict=True)]
-        m = self.system.basis.modes
+        m = self.basis.modes
         return np.stack(rates)[:, m : 2 * m]
 
     @property
@@ -102,7 +120,7 @@ class ContactWorks(ContactQuantities):
         zero.
         """
         require_kind("wear_depth", WearLaw, law=law)
-        if self.system.basis.dimension == 3:
+        if self.basis.dimension == 3:
             if thickness is not None:
                 raise InputError(f"wear_depth: thickness = {thickness!r} is for plane bodies; "
                                  f"leave it out for a solid.")
@@ -115,4 +133,4 @@ class ContactWorks(ContactQuantities):
         pressed = np.abs(self.normal_force) * np.linalg.norm(self.slip_velocities, axis=-1)
         volume = law.volume(self.slip_work, np.where(slips, power, 0.0),
                             np.where(slips, pressed, 0.0))
-        return volume / (self.system.basis.tributary * thickness)
+        return volume / (self.basis.tributary * thickness)

@@ -25,7 +25,8 @@ from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.core.units import Summarised, listed, span
-from fecontact.integrate.events import AnyEvent, Events, as_events
+from fecontact.integrate.event_table import Events
+from fecontact.integrate.events import AnyEvent, as_events
 from fecontact.integrate.field_runs.start import start_any, start_state
 from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.rodas5p.driver import again

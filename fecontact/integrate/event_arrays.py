@@ -7,13 +7,8 @@ import numpy as np
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
-from fecontact.integrate.events import (
-    CONTACT_EVENTS,
-    AnyEvent,
-    ContactEvents,
-    Crossing,
-    direction_sign,
-)
+from fecontact.integrate.event_table import CONTACT_EVENTS
+from fecontact.integrate.events import AnyEvent, ContactEvents, Crossing, direction_sign
 from fecontact.integrate.rodas5p.event_kernels import (
     FIRST_OWN,
     FOUND,

@@ -1,24 +1,22 @@
-"""Events to be located during a run, and the table of located events."""
+"""Events to be located during a run."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.checks import require_flags
 from fecontact.core.compiled import CompiledLaw, compile_law
 from fecontact.core.errors import InputError, choices, nearest, require_choice, require_finite
-from fecontact.core.read_only import read_only_arrays
-from fecontact.core.types import Array, Integers
-from fecontact.integrate.rodas5p.event_kernels import EVENT, FIRST_OWN
+from fecontact.core.types import Array
+from fecontact.integrate.event_table import CONTACT_EVENTS
+from fecontact.integrate.rodas5p.event_kernels import EVENT
 from fecontact.reduction.modal_basis import COMPONENTS, Component
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import state_size
 from fecontact.system.fields.vector_field import VectorField
 
-CONTACT_EVENTS = ("touch-down", "lift-off", "stick", "slip")
 _SENSES = {"both": 0, "rising": 1, "falling": -1}
 
 
@@ -210,70 +208,6 @@ def quantity_row(
     first = 0 if of == "displacement" else system.basis.modes
     row[first : first + system.basis.modes] = system.basis.point_row(point, component)
     return row
-
-
-@read_only_arrays
-@dataclass(frozen=True, eq=False)
-class Events:
-    """Events of a run in chronological order.
-
-    Attributes
-    ----------
-    time : (K,) array
-        [s], located to round-off on the dense output of the steps.
-    kind : tuple of str
-        'touch-down', 'lift-off', 'stick', 'slip', or 'event k' for the k-th user-defined one
-        from 0.
-    node : (K,) array
-        Number of the contact node from 0; -1 for user-defined events.
-    states : (K, size) array
-        y = [q, q', z].
-    """
-
-    time: Array
-    kind: tuple[str, ...]
-    node: Integers
-    states: Array
-
-    @classmethod
-    def of_rows(cls, found: Array, states: Array) -> "Events":
-        """Make events of rows of time, index of the kind, and node."""
-        order = np.argsort(found[:, 0], kind="stable")
-        kinds = [int(kind) for kind in found[order, 1]]
-        return cls(found[order, 0],
-                   tuple(CONTACT_EVENTS[kind] if kind < FIRST_OWN else f"event {kind - FIRST_OWN}"
-                         for kind in kinds),
-                   found[order, 2].astype(np.int64), states[order])
-
-    @classmethod
-    def none(cls, size: int) -> "Events":
-        """An empty table for states of ``size`` values."""
-        return cls.of_rows(np.zeros((0, 3)), np.zeros((0, size)))
-
-    def __len__(self) -> int:
-        return len(self.time)
-
-    def between(self, first: float, last: float) -> "Events":
-        """Events from the time ``first`` to ``last`` [s], both included."""
-        return self._kept((self.time >= first) & (self.time <= last))
-
-    def only(self, kind: str | None = None, node: int | None = None) -> "Events":
-        """Events of one kind, of one node, or both; InputError for an unknown kind."""
-        own = isinstance(kind, str) and kind.startswith("event ") and kind[6:].isdecimal()
-        if kind is not None and kind not in CONTACT_EVENTS and not own:
-            raise InputError(f"kind = {kind!r} must be one of {choices(CONTACT_EVENTS)}, or "
-                             f"'event k' for the k-th user-defined one.")
-        keep = np.ones(len(self), dtype=bool)
-        if kind is not None:
-            keep &= np.array([one == kind for one in self.kind], dtype=bool)
-        if node is not None:
-            keep &= self.node == node
-        return self._kept(keep)
-
-    def _kept(self, keep: NDArray[np.bool_]) -> "Events":
-        return Events(self.time[keep],
-                      tuple(one for one, stays in zip(self.kind, keep, strict=True) if stays),
-                      self.node[keep], self.states[keep])
 
 
 AnyEvent = ContactEvents | Event | Crossing

@@ -25,7 +25,7 @@ from fecontact.integrate.simulate import output_times, require_max_step
 from fecontact.integrate.solvers import AUTO, CompiledSolver, Solver, require_solver
 from fecontact.integrate.step_runs import ENDS, finish
 from fecontact.integrate.trajectory import Status
-from fecontact.system import kernels
+from fecontact.system import columns
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import slider_counts
 
@@ -330,7 +330,7 @@ def _open_sides(
     if getattr(solver, "restitution", None) is None:
         return True, True
     deep = system.contact_history(np.full(3, time), state + np.array([[0.0], [1.0], [-1.0]]) * (
-        change))[:, :, kernels.PENETRATION]
+        change))[:, :, columns.PENETRATION]
     margin = 1e-3 * np.abs(deep[1:] - deep[0]).max(initial=0.0)
     deeper = (np.maximum(deep[1:], 0.0) > np.maximum(deep[0], 0.0) + margin).any(axis=1)
     return not deeper[0], not deeper[1]
@@ -436,7 +436,7 @@ def _deeper(above: ContactSystem, below: ContactSystem, times: Array, state: Arr
     """Largest difference of penetrations at a state [m], at times from the first to the last."""
     sometimes = np.linspace(times[0], times[-1], _SOMETIMES)
     states = np.tile(state, (_SOMETIMES, 1))
-    one, other = (of.contact_history(sometimes, states)[:, :, kernels.PENETRATION]
+    one, other = (of.contact_history(sometimes, states)[:, :, columns.PENETRATION]
                   for of in (above, below))
     return float(np.abs(one - other).max(initial=0.0))
 

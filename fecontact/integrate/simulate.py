@@ -23,11 +23,11 @@ from fecontact.integrate.solvers import AUTO, CompiledSolver, Solver, require_so
 from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Solution, Status, Trajectory
 from fecontact.laws.normal.linear import PrescribedForce
+from fecontact.system.columns import POWERS
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import in_time
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.model_limits import Planned, implausible_values, warn_of_limits
-from fecontact.system.powers import POWERS
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 

@@ -9,8 +9,8 @@ import numpy as np
 from fecontact.core.types import Array
 from fecontact.integrate import step_loop
 from fecontact.integrate.event_arrays import take_events
-from fecontact.integrate.events import Events
-from fecontact.integrate.kept_steps import halve
+from fecontact.integrate.event_table import Events
+from fecontact.integrate.kept_rows import halve
 from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.integrate.trajectory import Status
 

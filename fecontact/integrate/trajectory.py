@@ -1,10 +1,11 @@
 """Results of a run: modal histories and quantities derived from them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from functools import cached_property
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -13,12 +14,14 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, quantity
 from fecontact.integrate.contact_works import ContactWorks
-from fecontact.integrate.events import Events
+from fecontact.integrate.event_table import Events
 from fecontact.integrate.kept_steps import KeptSteps
-from fecontact.system.contact_system import ContactSystem
-from fecontact.system.loads import load_rows
-from fecontact.system.polynomial_forces import polynomial_energy
-from fecontact.system.powers import POWERS
+from fecontact.integrate.recorded import RecordedContact
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.columns import POWERS
+
+if TYPE_CHECKING:
+    from fecontact.system.contact_system import ContactSystem
 
 
 class Status(Enum):
@@ -169,7 +172,7 @@ class Solution:
     states : (N, 2 m + n s) array
         y = [q, q', z].
     work : (N, p) array
-        Integrals of the powers :data:`fecontact.system.powers.POWERS` from the first time
+        Integrals of the powers :data:`fecontact.system.columns.POWERS` from the first time
         [J]. Energy lost in impacts on rigid stops is part of ``contact_damping``.
     status : Status
         How the run ended.
@@ -200,7 +203,40 @@ class Solution:
     kept: KeptSteps | None = None
 
 
+_Run = TypeVar("_Run")
+
+
+@dataclass(frozen=True, eq=False)
+class StoredSystem:
+    """The system of a run in a file: its basis, and a function that makes it."""
+
+    basis: ModalBasis
+    make: "Callable[[], ContactSystem]"
+
+
+class _System:
+    """The attribute ``system`` of a run; a stored one is made where it is first read."""
+
+    def __get__(self, run: Any, owner: Any) -> Any:
+        if run is None:
+            return self
+        given = vars(run)["system"]
+        if isinstance(given, StoredSystem):
+            given = vars(run)["system"] = given.make()
+        return given
+
+    def __set__(self, run: Any, given: Any) -> None:
+        vars(run)["system"] = given
+
+
+def _makes_stored_systems(run: type[_Run]) -> type[_Run]:
+    """Let runs be made of a :class:`StoredSystem` too."""
+    run.system = _System()  # type: ignore[attr-defined]
+    return run
+
+
 @read_only_arrays
+@_makes_stored_systems
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(ContactWorks, Summarised):
     """Motion of a contact system at N output times.
@@ -213,7 +249,7 @@ class Trajectory(ContactWorks, Summarised):
     modal_coordinates, modal_velocities : (N, m) arrays
         q and q'.
     work : (N, p) array
-        Integrals of the powers :data:`fecontact.system.powers.POWERS` from the first time
+        Integrals of the powers :data:`fecontact.system.columns.POWERS` from the first time
         [J].
     status : Status
         How the run ended.
@@ -233,9 +269,11 @@ class Trajectory(ContactWorks, Summarised):
         Motion between the outputs, from which plots are drawn where these are far apart: one to
         twelve states of each step, as the method needs, of long runs at most 20,000 or 16 MB,
         evenly spread.
+    recorded : RecordedContact or None
+        Contact quantities that were read from a file in place of the laws.
     """
 
-    system: ContactSystem
+    system: "ContactSystem"
     time: Array
     modal_coordinates: Array
     modal_velocities: Array
@@ -249,6 +287,17 @@ class Trajectory(ContactWorks, Summarised):
     held_friction_force: Array | None = None
     events: Events | None = None
     kept: KeptSteps | None = None
+    recorded: RecordedContact | None = None
+
+    @property
+    def basis(self) -> ModalBasis:
+        """Modal basis of the system."""
+        basis: ModalBasis = vars(self)["system"].basis
+        return basis
+
+    def with_rows(self, **changes: Any) -> "Trajectory":
+        """The run with other values of these fields, which makes no stored system."""
+        return replace(self, system=vars(self)["system"], **changes)
 
     def summary(self) -> list[tuple[str, str]]:
         """Status, time span and system; nothing that is costly to compute."""
@@ -298,11 +347,12 @@ class Trajectory(ContactWorks, Summarised):
             if (values := getattr(self, name)) is not None}
         time = kept["time"]
         events = None if self.events is None else self.events.between(time[0], time[-1])
+        recorded = None if self.recorded is None else self.recorded.rows(chosen)
         steps = self.kept
         if steps is not None:
             rows = (steps.time > time[0]) & (steps.time < time[-1])
             steps = steps.part(rows, self.work[chosen.start])
-        return replace(self, **kept, **counted, events=events, kept=steps)
+        return self.with_rows(**kept, **counted, events=events, kept=steps, recorded=recorded)
 
     @cached_property
     def limits_exceeded(self) -> tuple[str, ...]:
@@ -311,6 +361,8 @@ class Trajectory(ContactWorks, Summarised):
         Displacements beyond the body's size, penetrations beyond a hundred times the roughness
         height; :func:`fecontact.simulate` issues a ModelWarning for each.
         """
+        if self.recorded is not None and self.recorded.limits is not None:
+            return self.recorded.limits
         from fecontact.system.model_limits import limits_exceeded
 
         return limits_exceeded(self.system, self.time, self.states)
@@ -331,6 +383,8 @@ class Trajectory(ContactWorks, Summarised):
             spring += 0.5 * c * (q @ row - motion.history(t)[:, 0]) ** 2
         elastic = 0.5 * ((q @ basis.stiffness_matrix) * q).sum(axis=1)
         if basis.large_deflections:
+            from fecontact.system.polynomial_forces import polynomial_energy
+
             elastic += polynomial_energy(q, system.arrays)
         bristles = self._bristles[0].sum(axis=1)
         put = dict(zip(POWERS, self.work.T, strict=True))
@@ -338,7 +392,7 @@ class Trajectory(ContactWorks, Summarised):
             kinetic=0.5 * (rate**2).sum(axis=1),
             elastic=elastic,
             drive_spring=spring,
-            contact=system.stored_energy(self.penetration),
+            contact=self._contact_energy(),
             bristles=bristles,
             bristle_work=bristles - bristles[0] - put["bristles"],
             **{f"{name}_work": put[name] for name in ("drive", "belt_normal", "belt_friction",
@@ -348,6 +402,11 @@ class Trajectory(ContactWorks, Summarised):
             rounding=self._rounding(),
         )
 
+    def _contact_energy(self) -> Array:
+        if self.recorded is not None and self.recorded.energy is not None:
+            return self.recorded.energy
+        return self.system.stored_energy(self.penetration)
+
     def _rounding(self) -> float:
         """Energy that rounding of the largest modal forces p leaves undetermined [J].
 
@@ -355,7 +414,9 @@ class Trajectory(ContactWorks, Summarised):
         move in the time T of the run, a = p min(T^2 / 2, 2 / w^2), and the energy of the contact at
         the rounding of places.
         """
-        system, basis, drive = self.system, self.system.basis, self.system.drive
+        from fecontact.system.loads import load_rows
+
+        system, basis, drive = self.system, self.basis, self.system.drive
         constant, shapes = load_rows(basis, system.load)
         force = np.abs(basis.centrifugal_load + constant)
         shown = basis.T[0, : basis.dimension]

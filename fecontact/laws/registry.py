@@ -2,9 +2,7 @@
 
 import os
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Mapping
 from dataclasses import fields
 from functools import cache
 from pathlib import Path
@@ -18,6 +16,7 @@ from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.motion import GroundMotion
 from fecontact.laws.ground.profile import Profile
+from fecontact.laws.own_files import UntrustedError, trusted_files
 from fecontact.laws.signals.base import Signal
 from fecontact.laws.synonyms import laws_called
 
@@ -170,7 +169,7 @@ def own_law(kind: Any, name: str, where: str) -> type:
     """
     path, _, title = name.rpartition(":")
     file = str(Path(path).resolve())
-    trusted = _trusted.get()
+    trusted = trusted_files()
     if trusted is not None and file not in trusted:
         if (loaded := _loaded(file, title)) is not None and issubclass(loaded, kind):
             return loaded
@@ -186,41 +185,6 @@ def own_law(kind: Any, name: str, where: str) -> type:
         raise InputError(f"{where}: {path} has no {what} of that name"
                          f"{nearest(title, laws)}; it has {choices(laws)}.")
     return laws[title]
-
-
-class UntrustedError(InputError):
-    """A file names code that may not be run."""
-
-
-_trusted: ContextVar[frozenset[str] | None] = ContextVar("trusted", default=None)
-
-
-@contextmanager
-def trusting(files: bool | Iterable[Path]) -> Iterator[None]:
-    """Allow laws from all Python files, from none, or from the named ones only.
-
-    Others raise :class:`UntrustedError`, unless their module is already loaded.
-    """
-    allowed = None if files is True else frozenset(
-        str(file.resolve()) for file in files or ())
-    token = _trusted.set(allowed)
-    try:
-        yield
-    finally:
-        _trusted.reset(token)
-
-
-def law_files(table: Any) -> set[Path]:
-    """Python files of the laws in a table."""
-    if isinstance(table, list | tuple):
-        return {file for item in table for file in law_files(item)}
-    if not isinstance(table, Mapping):
-        return set()
-    found = {file for item in table.values() for file in law_files(item)}
-    name = table.get("law")
-    if isinstance(name, str) and ".py:" in name:
-        found.add(Path(name.rpartition(":")[0]))
-    return found
 
 
 def _loaded(file: str, title: str) -> type | None:
@@ -248,42 +212,6 @@ def name_of(law: Any) -> str | None:
                                  f"level of a Python file.")
             return f"{file}:{cls.__name__}"
     return None
-
-
-def with_folder(table: Any, folder: Path) -> Any:
-    """A table with files of laws and data named relative to the current folder."""
-    if isinstance(table, list):
-        return [with_folder(item, folder) for item in table]
-    if not isinstance(table, Mapping):
-        return table
-    return {key: _located(key, with_folder(value, folder), folder) for key, value in table.items()}
-
-
-def movable(table: Any, folder: Path, root: Path) -> Any:
-    """A table with files of laws below ``root`` named relative to a folder.
-
-    The reverse of :func:`with_folder`; ``root`` can then be moved with its contents.
-    """
-    if isinstance(table, list):
-        return [movable(item, folder, root) for item in table]
-    if not isinstance(table, Mapping):
-        return table
-    return {key: _relative(key, movable(value, folder, root), folder.resolve(), root.resolve())
-            for key, value in table.items()}
-
-
-def _relative(key: str, value: Any, folder: Path, root: Path) -> Any:
-    if key != "law" or not isinstance(value, str) or ".py:" not in value:
-        return value
-    path, _, title = value.rpartition(":")
-    if not Path(path).is_relative_to(root):
-        return value
-    return f"{Path(os.path.relpath(path, folder)).as_posix()}:{title}"
-
-
-def _located(key: str, value: Any, folder: Path) -> Any:
-    named = isinstance(value, str) and (key == "file" or (key == "law" and ".py:" in value))
-    return str(folder.resolve() / value) if named else value
 
 
 register_kinds(Kinds(is_kind, law_class, name_of, _DEFAULTS.get))

@@ -21,6 +21,7 @@ from .half_space_compliance import with_half_space
 from .large_deflections.forces import LargeDeflectionForces
 from .large_deflections.options import LargeDeflections
 from .matrix_files.nastran import grid_places
+from .modal_rotation import ModalRotation
 from .mode_shapes import BodyPart, ModeShapes, NonlinearStress, ReductionQuality
 from .point_masses import point_masses
 from .polynomial_stiffness import polynomial_stiffness
@@ -28,7 +29,6 @@ from .recovery import Recovery
 from .reduce_body import reduce_bodies
 from .report import BasisReport
 from .restriction import rows_from_dofs
-from .rotating import ModalRotation
 from .sector_modes import SectorModes, WheelShape, sector_modes
 from .sector_rotation import SectorRotation
 

@@ -21,8 +21,8 @@ from fecontact.reduction.basis_checks import (
     frozen_arrays,
 )
 from fecontact.reduction.large_deflections.forces import LargeDeflectionForces
+from fecontact.reduction.modal_rotation import ModalRotation
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, ReductionQuality
-from fecontact.reduction.rotating import ModalRotation
 
 # Displacements and rotations of a point: x, y, phi in the plane, all but phi in space.
 Component = Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"]

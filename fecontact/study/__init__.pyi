@@ -6,11 +6,11 @@ from .links_section import FaceWeldSettings, ShakerSettings
 from .materials_section import MaterialSettings
 from .measurement_section import MeasurementSettings
 from .preload_section import PreloadSettings
+from .render_section import RenderSettings
 from .sections import (
     BasisSettings,
     BodySettings,
     OutputSettings,
-    RenderSettings,
     SimulationSettings,
     WearSettings,
 )

@@ -41,7 +41,8 @@ from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.excitation import Drive, Load
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.height_map import HeightMap
-from fecontact.laws.registry import PART_CLASSES, foreign_keys, trusting, with_folder
+from fecontact.laws.own_files import trusting, with_folder
+from fecontact.laws.registry import PART_CLASSES, foreign_keys
 from fecontact.measured.measurement import Measurement
 from fecontact.study.assembly import LAWS, contact_system
 from fecontact.study.bodies_section import (
@@ -51,6 +52,7 @@ from fecontact.study.bodies_section import (
     bodies_from_tables,
     check_bodies,
 )
+from fecontact.study.comments import FILES, KEYS_GIVEN, comment
 from fecontact.study.fit_section import FitSettings, flat_parameters
 from fecontact.study.geometry_section import (
     Geometry,
@@ -67,11 +69,11 @@ from fecontact.study.links_section import (
 from fecontact.study.measurement_section import MeasurementSettings
 from fecontact.study.models import StudyModels
 from fecontact.study.preload_section import PreloadSettings
+from fecontact.study.render_section import RenderSettings
 from fecontact.study.sections import (
     BasisSettings,
     BodySettings,
     OutputSettings,
-    RenderSettings,
     SimulationSettings,
     WearSettings,
 )
@@ -81,10 +83,6 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.gap import Crown
 from fecontact.system.model_limits import PlannedBodies, implausible_bodies, warn_of_limits
 from fecontact.system.quasistatic.history import LoadHistory
-
-# Comments at the end of a study with every key, each followed by JSON: hashes of the files that it
-# names, by names relative to its folder, and the keys that its file gives.
-_FILES, _KEYS_GIVEN = "# Content of files: ", "# Keys given: "
 
 NOT_OF_THE_RUN = ("output", "render", "sweep", "fit", "mistuning")
 
@@ -240,8 +238,8 @@ class Study(Summarised, StudyModels):
         path = None if path is None else as_path(path, "a study")
         require_kind(_title(path), str, text=text)
         study = cls.from_tables(parsed(text, _title(path)), path)
-        return replace(study, _keys=_comment(text, _KEYS_GIVEN, study._keys),
-                       content_hashes=_comment(text, _FILES, study.content_hashes))
+        return replace(study, _keys=comment(text, KEYS_GIVEN, study._keys),
+                       content_hashes=comment(text, FILES, study.content_hashes))
 
     @classmethod
     def from_tables(cls, tables: Mapping[str, Any], path: Path | None = None) -> "Study":
@@ -356,9 +354,9 @@ class Study(Summarised, StudyModels):
         if not defaults:
             return tomli_w.dumps(given)
         keys = json.dumps(key_tree(given), sort_keys=True)
-        files = (f"{_FILES}{json.dumps(self.content_hashes, sort_keys=True)}\n"
+        files = (f"{FILES}{json.dumps(self.content_hashes, sort_keys=True)}\n"
                  if self.content_hashes else "")
-        return f"{tomli_w.dumps(self.tables())}\n{files}{_KEYS_GIVEN}{keys}\n"
+        return f"{tomli_w.dumps(self.tables())}\n{files}{KEYS_GIVEN}{keys}\n"
 
     def with_(self, changes: Mapping[str, Any] | None = None, /, **by_name: Any) -> "Study":
         """Copy of the study with other values, given by dotted keys of the file.
@@ -531,28 +529,13 @@ def _gap(value: Any, title: str) -> Gap:
     return gap
 
 
-def _comment(text: str, begin: str, default: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Content of one of the comments at the end of a study; the default without a sound one."""
-    found = [line for line in text.rstrip().rsplit("\n", 2)[1:] if line.startswith(begin)]
-    try:
-        content = json.loads(found[-1].removeprefix(begin)) if found else default
-    except (ValueError, RecursionError):  # a comment that somebody edited
-        return default
-    return content if isinstance(content, Mapping) else default
-
-
-def stored_hashes(text: str | None) -> Mapping[str, str]:
-    """Hashes of the files that a stored study names, by names relative to its folder."""
-    return _comment(text or "", _FILES, {})
-
-
 def stored_study(
     text: str | None, trust: bool | Iterable[Path] = False, path: Path | None = None
 ) -> Study:
     """Study in a file of results, from its TOML text; ``path`` is the study file it stands for.
 
     Code of laws that the text names is executed only as far as ``trust`` allows, see
-    :func:`~fecontact.laws.registry.trusting`.
+    :func:`~fecontact.laws.own_files.trusting`.
     """
     with trusting(trust):
         return Study.from_toml(text or "", path)

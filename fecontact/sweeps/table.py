@@ -24,7 +24,7 @@ from fecontact.core.files.csv_text import csv_text, read_cell
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, html_table, listed, span
-from fecontact.laws.registry import trusting
+from fecontact.laws.own_files import trusting
 from fecontact.study.study import Study
 from fecontact.sweeps.store import write_whole
 from fecontact.system.parameter_labels import parameter_label

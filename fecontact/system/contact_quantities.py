@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from fecontact.core.errors import InputError
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
-from fecontact.system import kernels
+from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system import columns
 
 
 class ContactState(IntEnum):
@@ -31,6 +32,11 @@ class ContactQuantities:
     system: Any  # a ContactSystem, whose own module uses this one
     modal_coordinates: Array
     modal_velocities: Array
+
+    @property
+    def basis(self) -> ModalBasis:
+        """Modal basis of the system."""
+        return self.system.basis
 
     def displacement(self, point: str | int | tuple[float, ...]) -> Array:
         """Displacement x, y [m] and rotation phi [rad] (..., 3) of a point.
@@ -64,7 +70,7 @@ class ContactQuantities:
         raise NotImplementedError
 
     def _rows(self, point: str | int | tuple[float, ...]) -> Array:
-        basis = self.system.basis
+        basis = self.basis
         if isinstance(point, str | int | np.integer):
             return basis.T[basis.point_index(point if isinstance(point, str) else int(point))]
         if basis.mode_shapes is None:
@@ -90,22 +96,22 @@ class ContactQuantities:
     @property
     def normal_force(self) -> Array:
         """Normal forces F (..., n) on the body, zero or above [N]."""
-        return self._contact[..., kernels.NORMAL_FORCE]
+        return self._column(columns.NORMAL_FORCE)
 
     @property
     def friction_force(self) -> Array:
         """Friction forces R (..., n) along the first tangent; on the body they act in -x [N]."""
-        return self._contact[..., kernels.FRICTION_FORCE]
+        return self._column(columns.FRICTION_FORCE)
 
     @property
     def friction_forces(self) -> Array:
         """Friction forces (..., n, 1), in space (..., n, 2), against the tangents [N]."""
-        return self._contact[..., self._columns(kernels.FRICTION_FORCE, kernels.FRICTION_ACROSS)]
+        return self._along_tangents(columns.FRICTION_FORCE, columns.FRICTION_ACROSS)
 
     @property
     def penetration(self) -> Array:
         """Penetrations u (..., n), negative where open [m]."""
-        return self._contact[..., kernels.PENETRATION]
+        return self._column(columns.PENETRATION)
 
     @property
     def gap(self) -> Array:
@@ -115,20 +121,28 @@ class ContactQuantities:
     @property
     def penetration_rate(self) -> Array:
         """Rates u' (..., n) of the penetrations, positive towards the ground [m/s]."""
-        return self._contact[..., kernels.PENETRATION_RATE]
+        return self._column(columns.PENETRATION_RATE)
 
     @property
     def slip_velocity(self) -> Array:
         """Slip velocities (..., n) relative to the ground, along the first tangent [m/s]."""
-        return self._contact[..., kernels.SLIP_VELOCITY]
+        return self._column(columns.SLIP_VELOCITY)
 
     @property
     def slip_velocities(self) -> Array:
         """Slip velocities (..., n, 1), in space (..., n, 2), along the tangents [m/s]."""
-        return self._contact[..., self._columns(kernels.SLIP_VELOCITY, kernels.SLIP_ACROSS)]
+        return self._along_tangents(columns.SLIP_VELOCITY, columns.SLIP_ACROSS)
 
     def _columns(self, along: int, across: int) -> list[int]:
-        return [along] if self.system.basis.dimension == 2 else [along, across]
+        return [along] if self.basis.dimension == 2 else [along, across]
+
+    def _column(self, column: int) -> Array:
+        """One of the columns (..., n) of :attr:`_contact`."""
+        return self._contact[..., column]
+
+    def _along_tangents(self, along: int, across: int) -> Array:
+        """Columns (..., n, 1), in space (..., n, 2), along the tangents."""
+        return np.stack([self._column(one) for one in self._columns(along, across)], axis=-1)
 
     @property
     def slip_power(self) -> Array:
@@ -138,7 +152,7 @@ class ContactQuantities:
     @property
     def line_load(self) -> Array:
         """Normal force per length of a plane body's face (..., n) [N/m]; InputError for solids."""
-        basis = self.system.basis
+        basis = self.basis
         if basis.dimension == 3:
             raise InputError("Line loads are those of plane bodies; take the pressure of a solid.")
         return self.normal_force / basis.tributary
@@ -146,7 +160,7 @@ class ContactQuantities:
     @property
     def pressure(self) -> Array:
         """Normal force per area (..., n) [Pa]; InputError if the basis has no thickness."""
-        return self.normal_force / self.system.basis.contact_areas
+        return self.normal_force / self.basis.contact_areas
 
     @cached_property
     def contact_state(self) -> NDArray[np.int8]:
@@ -155,7 +169,7 @@ class ContactQuantities:
         Open without normal force; sticking below the slip velocity of largest friction.
         """
         slip, friction = self.slip_velocity, self.friction_force
-        if self.system.basis.dimension == 3:
+        if self.basis.dimension == 3:
             slip, friction = (np.linalg.norm(both, axis=-1)
                               for both in (self.slip_velocities, self.friction_forces))
         stick = self.system.sticks(slip, self.normal_force, friction)

@@ -25,14 +25,21 @@ import numpy as np
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Block, Matrix, Vector
 from fecontact.laws.signatures import signal_at
+from fecontact.system.columns import (
+    FRICTION_ACROSS,
+    FRICTION_FORCE,
+    GROUND_RATE,
+    NORMAL_FORCE,
+    PENETRATION,
+    PENETRATION_RATE,
+    SLIP_ACROSS,
+    SLIP_VELOCITY,
+    SPACE_STATE_COLUMNS,
+    STATE_COLUMNS,
+)
 from fecontact.system.node_forces import axis_force, force_workspace, friction_entry, node_forces
 from fecontact.system.nodes import SystemArrays, ground_motion, memory_of, node_motion
 from fecontact.system.polynomial_forces import add_polynomial_forces, has_polynomial
-
-# Columns of the per-node results of `contact_state`; the last two in space only.
-(NORMAL_FORCE, FRICTION_FORCE, PENETRATION, PENETRATION_RATE, SLIP_VELOCITY, GROUND_RATE,
- FRICTION_ACROSS, SLIP_ACROSS) = range(8)
-STATE_COLUMNS, SPACE_STATE_COLUMNS = 6, 8
 
 
 def state_columns(arrays: SystemArrays) -> int:

@@ -24,8 +24,8 @@ from fecontact.laws.excitation import AXES
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.normal.linear import PrescribedForce
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.system.columns import PENETRATION
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.kernels import PENETRATION
 from fecontact.system.loads import mean_load
 
 # Penetration of a rough surface, in roughness heights, beyond which a wrong unit or stiffness is

@@ -3,6 +3,7 @@
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Vector
 from fecontact.laws.signatures import signal_at
+from fecontact.system.columns import POWERS
 from fecontact.system.node_forces import force_workspace, friction_entry, node_forces, normal_force
 from fecontact.system.nodes import (
     NODES,
@@ -14,10 +15,6 @@ from fecontact.system.nodes import (
     size_of,
 )
 
-# Columns of `powers`: five that are put in, by stiffness that is not symmetric too, four that are
-# lost, and what is stored in bristles at constant normal force.
-POWERS = ("drive", "belt_normal", "belt_friction", "load", "circulatory", "modal_damping",
-          "dashpots", "contact_damping", "friction", "bristles")
 POWER_COUNT = len(POWERS)
 (DRIVE, BELT_NORMAL, BELT_FRICTION, LOAD, CIRCULATORY, MODAL_DAMPING, DASHPOTS, CONTACT_DAMPING,
  FRICTION, BRISTLES) = range(POWER_COUNT)

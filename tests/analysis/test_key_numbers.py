@@ -8,7 +8,7 @@ import fecontact as fc
 from fecontact import ContactSystem, Ground
 from fecontact.analysis import key_numbers, steadiness
 from fecontact.laws import ConstantFriction, LinearContact
-from fecontact.system.powers import POWERS
+from fecontact.system.columns import POWERS
 
 TURN = 2.0 * np.pi
 

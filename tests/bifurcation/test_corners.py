@@ -23,7 +23,7 @@ from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.nonlinear_modes.linear_start import XI, unforced, with_mass_damping
 from fecontact.laws import JenkinsFriction, LinearContact, PrescribedForce
-from fecontact.system.kernels import NORMAL_FORCE
+from fecontact.system.columns import NORMAL_FORCE
 
 
 class Polyline(Problem):

@@ -8,7 +8,8 @@ import pytest
 from fecontact import InputError
 from fecontact.core.user_code import user_function, user_module
 from fecontact.laws import FrictionLaw
-from fecontact.laws.registry import own_law, trusting
+from fecontact.laws.own_files import trusting
+from fecontact.laws.registry import own_law
 
 LAW = '''
 from dataclasses import dataclass

@@ -31,7 +31,8 @@ from fecontact.laws import (
     Pulse,
     RoughSurface,
 )
-from fecontact.system.powers import FRICTION, POWERS
+from fecontact.system.columns import POWERS
+from fecontact.system.powers import FRICTION
 
 
 def run_of(system, state, times, rtol=1e-7, work=True):

@@ -31,8 +31,8 @@ from fecontact.laws import (
     normal_law,
 )
 from fecontact.reduction import PointPairing, point_masses
+from fecontact.system.columns import POWERS
 from fecontact.system.model_limits import limits_exceeded
-from fecontact.system.powers import POWERS
 
 
 def test_cvode_agrees():

@@ -7,7 +7,7 @@ import fecontact as fc
 from fecontact import Status
 from fecontact.integrate import SetValued
 from fecontact.laws import ConstantFriction, LinearContact
-from fecontact.system import kernels
+from fecontact.system import columns
 
 DAMPING, END = 0.2, 0.5
 
@@ -109,5 +109,5 @@ def test_fades_on_stops(seed, damping):
     assert np.diff(energy).max() < 1e-9 * energy[0]
     assert energy[-1] < 1e-7 * energy[0]
     assert run.energies.imbalance < 1e-6
-    penetration = system.contact_history(run.time, run.states)[:, :, kernels.PENETRATION]
+    penetration = system.contact_history(run.time, run.states)[:, :, columns.PENETRATION]
     assert penetration.max() < 1e-9 * np.abs(start).max()

@@ -17,7 +17,7 @@ from fecontact.cli import execute
 from fecontact.io import report_runs, write_branches
 from fecontact.laws import ConstantFriction, LinearContact
 from fecontact.plot import plot_runs
-from fecontact.system.powers import POWERS
+from fecontact.system.columns import POWERS
 
 TURN = 2.0 * np.pi
 STUDIES = ("[ground]\nspeed = 0.1\n[output]\nframes = 3\n",

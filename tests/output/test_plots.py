@@ -25,8 +25,7 @@ from fecontact.plot import (
     plot_stress,
     styled,
 )
-from fecontact.system import kernels as kernels
-from fecontact.system import powers
+from fecontact.system import columns, powers
 
 
 def labels(figure):
@@ -279,7 +278,7 @@ def test_contact_map_goes_by_numbers_where_nodes_share_a_place():
 def test_contact_map_without_friction_shows_contact():
     trajectory = run(times=41)
     contact = trajectory._contact.copy()
-    contact[:, :, kernels.FRICTION_FORCE] = 0.0
+    contact[:, :, columns.FRICTION_FORCE] = 0.0
     smooth = replace(trajectory)
     smooth.__dict__["_contact"] = contact
     assert (smooth.contact_state == 2).any()

@@ -136,8 +136,10 @@ def test_files_read_back_are_drawn_alike(tmp_path, capsys):
     run = hit(7)
     case = write_case(tmp_path / "hit.vtkhdf", run)
     again = read_case(case).trajectory
-    np.testing.assert_array_equal(resolved(again).trajectory.normal_force,
-                                  resolved(run).trajectory.normal_force)
+    # The file holds forces between the outputs to 7 digits.
+    highest = resolved(run).trajectory.normal_force.max()
+    assert resolved(again).trajectory.normal_force == pytest.approx(
+        resolved(run).trajectory.normal_force, abs=1e-7 * highest)
     assert execute(["plot", str(case), "history", "-o", str(tmp_path / "history.svg")]) == 0
     assert b"straight lines" not in (tmp_path / "history.svg").read_bytes()
     assert execute(["plot", str(case), "phase", "--component", "y", "--t-start", "0.01"]) == 0

@@ -14,6 +14,7 @@ from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 import fecontact as fc
 from fecontact.fem import pair_faces
+from fecontact.integrate import RecordedContact
 from fecontact.io import export_csv, export_fields, export_pvd, to_xarray
 from fecontact.laws import (
     BoucWenFriction,
@@ -30,7 +31,7 @@ from fecontact.output.files.contact_facets import contact_facets, facet_vectors
 from fecontact.output.files.frames import contact_forces
 from fecontact.output.files.recorded_laws import recorded_system
 from fecontact.reduction import reduce_bodies
-from fecontact.system.powers import POWERS
+from fecontact.system.columns import POWERS
 from fecontact.system.tables import system_tables
 
 SIZE = (0.2, 0.1, 0.05)
@@ -321,12 +322,13 @@ def test_two_solids_come_back_to_the_last_bit(tmp_path):
 def test_recorded_laws_give_what_the_laws_gave():
     """Laws whose code is not run: contact in two directions, to the last bit."""
     run = moved(system(solid()))
-    state = {"time": run.time, "modal_coordinates": run.modal_coordinates,
-             "modal_velocities": run.modal_velocities}
-    safe = replace(run, system=recorded_system(
-        run.system.basis, system_tables(run.system), "a file", state,
-        run.system.contact_history(run.time, run.states), run.contact_state,
-        run.energies.contact, "needs code"))
+    history = run.system.contact_history(run.time, run.states)
+    recorded = RecordedContact(dict(enumerate(np.moveaxis(history, -1, 0))), run.contact_state,
+                               run.energies.contact)
+    safe = replace(run, recorded=recorded, system=recorded_system(
+        run.system.basis, system_tables(run.system), "a file", 0, "needs code"))
+    with pytest.raises(fc.InputError, match="needs code"):
+        _ = safe.modal_accelerations
     for quantity in ("normal_force", "friction_forces", "slip_velocities", "contact_state",
                      "penetration_rate"):
         assert np.array_equal(getattr(safe, quantity), getattr(run, quantity)), quantity

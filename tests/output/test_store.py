@@ -17,7 +17,7 @@ from fecontact.output.files import case as store
 from fecontact.output.files import pvd
 from fecontact.output.files.frames import frame_indices, von_mises
 from fecontact.reduction import ModeShapes
-from fecontact.system.powers import POWERS
+from fecontact.system.columns import POWERS
 
 OLD_VTK = (vtkVersion.GetVTKMajorVersion(), vtkVersion.GetVTKMinorVersion()) < (9, 6)
 

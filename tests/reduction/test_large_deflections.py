@@ -37,7 +37,7 @@ from fecontact.bifurcation import (
 from fecontact.output.files.hdf5 import read_basis, write_basis
 from fecontact.reduction import LargeDeflections
 from fecontact.reduction.large_deflections.fit import CondensedBody
-from fecontact.reduction.large_deflections.forces import (
+from fecontact.reduction.large_deflections.modal_forces import (
     large_deflection_forces,
     static_response,
 )

@@ -9,14 +9,14 @@ from fecontact.bifurcation.diagram_options import BranchSettings
 from fecontact.bifurcation.response_options import ResponseSettings
 from fecontact.core.errors import FecontactError, InputError
 from fecontact.integrate import ContactEvents
-from fecontact.study import sections
+from fecontact.study import RenderSettings, sections
 from fecontact.study.bodies_section import BodyBasisSettings, Placement
 from fecontact.study.geometry_section import MeshFile
 from fecontact.study.sweep_section import SweepSettings
 
 SECTIONS = (
     sections.BodySettings, sections.BasisSettings, sections.SimulationSettings,
-    sections.WearSettings, sections.OutputSettings, sections.RenderSettings, Placement,
+    sections.WearSettings, sections.OutputSettings, RenderSettings, Placement,
     BodyBasisSettings, SweepSettings, ResponseSettings, BranchSettings, MeshFile, ContactEvents,
 )
 WRONG = (None, "x", object(), 1j, ["a", "b"], [[1], [2, 3]], [None], (1,), {}, math.nan, -1, 0, 1.5,
@@ -39,8 +39,8 @@ def test_values_of_all_kinds_are_taken_or_refused_by_name(section):
 
 
 def test_values_become_what_a_file_would_give():
-    found = sections.RenderSettings(size=[640, 360], fps=25)
+    found = RenderSettings(size=[640, 360], fps=25)
     assert found.size == (640, 360)
-    assert found == sections.RenderSettings(size=(640, 360), fps=25.0)
+    assert found == RenderSettings(size=(640, 360), fps=25.0)
     with pytest.raises(InputError, match=r'RenderSettings: frames = "many" must be a whole number'):
-        sections.RenderSettings(frames="many")
+        RenderSettings(frames="many")

@@ -14,7 +14,8 @@ from fecontact import ContactSystem, Ground, InputError, RigidStart, Study, Traj
 from fecontact.cli.templates import template
 from fecontact.laws import ConstantFriction, EnergyWear, RoughSurface
 from fecontact.sweeps.summaries import SUMMARIES, functions_for, summarise, unit_of
-from fecontact.system.powers import FRICTION, POWERS
+from fecontact.system.columns import POWERS
+from fecontact.system.powers import FRICTION
 
 V, STIFFNESS, DEPTH, MU, THICKNESS = 0.02, 3e5, 4e-5, 0.3, 0.05
 TURNS = 8  # of the oscillation in the run of 0.02 s

@@ -21,8 +21,9 @@ from fecontact import (
 )
 from fecontact.integrate import initial_state
 from fecontact.laws import ExponentialFriction, RoughSurface
-from fecontact.system import kernels as kernels
-from fecontact.system.powers import POWERS, powers
+from fecontact.system import columns
+from fecontact.system.columns import POWERS
+from fecontact.system.powers import powers
 
 R = 10e-6
 
@@ -119,11 +120,11 @@ def test_right_hand_side_jacobian_and_powers(case, parts):
 
     # The state is the one that was meant.
     history = system.contact_history(np.array([t]), y[None])[0]
-    assert history[:, kernels.PENETRATION] == pytest.approx(s * height, abs=1e-9 * R)
-    assert history[:, kernels.PENETRATION_RATE] == pytest.approx(rate, abs=1e-12)
-    assert history[:, kernels.SLIP_VELOCITY] == pytest.approx(slip, abs=1e-14)
+    assert history[:, columns.PENETRATION] == pytest.approx(s * height, abs=1e-9 * R)
+    assert history[:, columns.PENETRATION_RATE] == pytest.approx(rate, abs=1e-12)
+    assert history[:, columns.SLIP_VELOCITY] == pytest.approx(slip, abs=1e-14)
     # Friction of slope 1e6 F turns the rounding of the slip velocity into a force.
-    slope = 1e6 * history[:, kernels.NORMAL_FORCE].max() if case == "at rest" else 0.0
+    slope = 1e6 * history[:, columns.NORMAL_FORCE].max() if case == "at rest" else 0.0
     rounding = 1e-10 + 1e-16 * slope
     for j in range(3):
         expected = model.node(j, t, y)
@@ -131,7 +132,7 @@ def test_right_hand_side_jacobian_and_powers(case, parts):
         assert history[j] == pytest.approx([*expected, incline * expected[4]], rel=1e-8,
                                            abs=rounding)
     if case in ("open", "clipped by damping"):
-        assert (history[:, kernels.NORMAL_FORCE] == 0.0).all() or parts == "per node"
+        assert (history[:, columns.NORMAL_FORCE] == 0.0).all() or parts == "per node"
 
     size = scale_of(model, t, y)
     assert np.abs(system.rhs(t, y) - model.rhs(t, y)).max() < 1e-9 * size
@@ -272,8 +273,8 @@ def test_node_places_enter_the_phase():
                            ground=Ground(amplitude=1e-4, wavelength=0.05),
                            friction=ExponentialFriction(0.8, 0.55, 1e3))
     history = system.contact_history(np.zeros(1), np.zeros((1, 4)))[0]
-    assert history[:, kernels.PENETRATION] == pytest.approx([1e-4, -1e-4], rel=1e-12)
-    assert history[:, kernels.NORMAL_FORCE] == pytest.approx([1e6 * 95e-6, 0.0], rel=1e-12)
+    assert history[:, columns.PENETRATION] == pytest.approx([1e-4, -1e-4], rel=1e-12)
+    assert history[:, columns.NORMAL_FORCE] == pytest.approx([1e6 * 95e-6, 0.0], rel=1e-12)
 
 
 def test_ground_lifting_follows_the_chain_rule():
@@ -288,8 +289,8 @@ def test_ground_lifting_follows_the_chain_rule():
 
     lifting = (height(step) - height(-step)) / (2.0 * step)
     history = system.contact_history(np.zeros(1), y[None])[0, 0]
-    assert history[kernels.GROUND_RATE] == pytest.approx(lifting, rel=1e-7)
-    assert history[kernels.PENETRATION_RATE] == pytest.approx(lifting - 0.05, rel=1e-9)
+    assert history[columns.GROUND_RATE] == pytest.approx(lifting, rel=1e-7)
+    assert history[columns.PENETRATION_RATE] == pytest.approx(lifting - 0.05, rel=1e-9)
 
 
 # Finite-element bodies ---------------------------------------------------------------------------

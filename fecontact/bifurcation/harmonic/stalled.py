@@ -6,8 +6,8 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.problem import BranchStatus
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.engine_order import WaveField
+from fecontact.system.columns import NORMAL_FORCE
 from fecontact.system.fields.vector_field import VectorField
-from fecontact.system.kernels import NORMAL_FORCE
 
 # Samples that a contact phase should have, and truncation error above which harmonics lack.
 _ENOUGH, _LARGE = 16, 1e-2

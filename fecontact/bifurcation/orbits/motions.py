@@ -16,9 +16,10 @@ from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.solvers import AUTO, SetValued, Solver, solver_by_name
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.system.columns import POWERS
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
-from fecontact.system.powers import BRISTLES, FRICTION, NODE_POWERS, POWERS, powers
+from fecontact.system.powers import BRISTLES, FRICTION, NODE_POWERS, powers
 
 # Distance of samples that coincide, in periods.
 _COINCIDE = 1e-9

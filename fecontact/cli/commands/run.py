@@ -80,7 +80,7 @@ def open(
     from fecontact.cli import viewers
     from fecontact.cli.orbit_files import holds_branches, write_orbit_page
     from fecontact.cli.run_files import has_run, own_page, stored_run, write_report
-    from fecontact.laws.registry import trusting
+    from fecontact.laws.own_files import trusting
 
     shown, study = file, file.suffix.lower() == ".toml"
     with trusting(trust):

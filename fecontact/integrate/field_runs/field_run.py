@@ -13,7 +13,8 @@ from fecontact.core.errors import InputError, choices, nearest, shown
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised
-from fecontact.integrate.events import AnyEvent, Events
+from fecontact.integrate.event_table import Events
+from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.step_loop import RUNNING
 from fecontact.integrate.step_runs import ENDS, finish
 from fecontact.integrate.trajectory import Status, output_part

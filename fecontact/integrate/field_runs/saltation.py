@@ -19,7 +19,7 @@ from fecontact.integrate.rodas5p.driver import start
 from fecontact.integrate.run_limits import largest_motions
 from fecontact.integrate.step_runs import finish
 from fecontact.laws.base import NormalLaw
-from fecontact.system import kernels
+from fecontact.system import columns, kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import slider_counts
 from fecontact.system.node_forces import normal_values
@@ -115,11 +115,11 @@ def _passage(
     """Jump of the derivatives as a node passes a level; None for a level that it does not reach."""
     def penetrations(states: Array, of: ContactSystem = system) -> Array:
         return of.contact_history(np.full(len(states), time), states)[
-            :, node, kernels.PENETRATION]
+            :, node, columns.PENETRATION]
 
     depth = system.penetration_scale
     contact = system.contact_history(np.array([time]), y[None])[0, node]
-    u, rate = float(contact[kernels.PENETRATION]), float(contact[kernels.PENETRATION_RATE])
+    u, rate = float(contact[columns.PENETRATION]), float(contact[columns.PENETRATION_RATE])
     level = float(levels[np.argmin(np.abs(levels - u))])
     if not abs(u - level) < _AT_LEVEL * depth or rate == 0.0:
         return None
@@ -143,7 +143,7 @@ def _passage(
     # Both sides up to the level.
     way = np.sign(rate) * near
     if slider_counts(system)[node] and not system.contact_history(
-            np.array([time]), (middle - way)[None])[0, node, kernels.NORMAL_FORCE]:
+            np.array([time]), (middle - way)[None])[0, node, columns.NORMAL_FORCE]:
         # Elastic elements begin without deflection; in the open they have followed the slip.
         middle[2 * m :].reshape(len(alone), -1)[node] = 0.0
     after, further = rates(middle + way), rates(middle + 2.0 * way)
@@ -194,5 +194,5 @@ def touch_down_on_jumps(system: ContactSystem, times: Array, states: Array) -> b
     jumping = jumping_nodes(system)
     if not jumping.any():
         return False
-    closed = system.contact_history(times, states)[:, jumping, kernels.NORMAL_FORCE] != 0.0
+    closed = system.contact_history(times, states)[:, jumping, columns.NORMAL_FORCE] != 0.0
     return bool((np.roll(closed, 1, axis=0) != closed).any())

@@ -4,7 +4,7 @@ import time as clock
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,8 @@ from fecontact.core.types import Array, Integers
 from fecontact.integrate.coefficients import Coefficient, node_values
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
-from fecontact.integrate.kept_steps import KeptSteps, workspace_for_rows
+from fecontact.integrate.kept_rows import workspace_for_rows
+from fecontact.integrate.kept_steps import KeptSteps
 from fecontact.integrate.nonsmooth import problem as kinds
 from fecontact.integrate.nonsmooth.equations import compiled_derivative
 from fecontact.integrate.nonsmooth.event_log import note_events
@@ -150,7 +151,7 @@ def integrate_set_valued(
                 "normal_force": normal, "friction_force": friction}
 
     between = [values[: run.kept_rows] for values in run.kept]
-    kept = KeptSteps(between[0], **columns(*between[1:])).before(time[-1])
+    kept = KeptSteps(between[0], **cast("dict[str, Any]", columns(*between[1:]))).before(time[-1])
     return Solution(time, status=ended, statistics=statistics,
                     node_friction_work=states[:, end:].copy(), events=run.events,
                     kept=kept if keep_steps else None,

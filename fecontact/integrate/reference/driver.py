@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecontact.core.types import Array, Integers
-from fecontact.integrate.kept_steps import GrowingRows, KeptSteps, workspace_for_rows
+from fecontact.integrate.kept_rows import GrowingRows, workspace_for_rows
+from fecontact.integrate.kept_steps import KeptSteps
 from fecontact.integrate.reference.watched import Watched
 from fecontact.integrate.run_limits import (
     breaks,
@@ -21,6 +22,7 @@ from fecontact.integrate.run_limits import (
 from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system import jacobian as contact_jacobian
+from fecontact.system.columns import POWERS
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import (
     booked,
@@ -30,7 +32,7 @@ from fecontact.system.elastic_sliders import (
     stick_again,
 )
 from fecontact.system.kernels import right_hand_side
-from fecontact.system.powers import NODE_POWERS, POWERS, powers
+from fecontact.system.powers import NODE_POWERS, powers
 
 # Rows between outputs are kept at so many places of a step.
 _PLACES = 2

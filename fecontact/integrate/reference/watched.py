@@ -7,7 +7,7 @@ import numpy as np
 from fecontact.core.compiled import kernel
 from fecontact.core.types import Array
 from fecontact.integrate.event_arrays import take_events
-from fecontact.integrate.events import Events
+from fecontact.integrate.event_table import Events
 from fecontact.integrate.rodas5p import dynamics
 from fecontact.integrate.rodas5p.event_kernels import Watch, begin, note_events_at
 from fecontact.integrate.rodas5p.state import Problem, Progress, Step, Workspace

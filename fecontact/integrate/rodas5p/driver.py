@@ -15,7 +15,8 @@ from fecontact.integrate import step_loop
 from fecontact.integrate.collocation.workspace import chosen_collocation, collocation_for
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
-from fecontact.integrate.kept_steps import KeptSteps, workspace_for_rows
+from fecontact.integrate.kept_rows import workspace_for_rows
+from fecontact.integrate.kept_steps import KeptSteps
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.blocks import blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint

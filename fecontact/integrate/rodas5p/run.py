@@ -27,7 +27,7 @@ class Run(StepRun):
         Equations to integrate, and limits of the steps.
     output : Output
         Output times and what belongs to them; rows from ``outputs`` on are not filled yet. Work
-        of the powers :data:`fecontact.system.powers.POWERS`, then friction work of each node and
+        of the powers :data:`fecontact.system.columns.POWERS`, then friction work of each node and
         its part in stick [J].
     kept : Output
         Output at times between the outputs; without rows if none are kept.

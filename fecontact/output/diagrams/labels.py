@@ -6,7 +6,6 @@ import numpy as np
 
 from fecontact.core.types import Array
 from fecontact.core.units import has_prefixes, suitable_unit
-from fecontact.system.parameter_labels import parameter_label
 
 if TYPE_CHECKING:
     from fecontact.bifurcation.continuation.branch import Branch
@@ -46,7 +45,11 @@ def branch_label(branch: "Branch", name: str | int = "parameter") -> str:
     if name == "parameter" or name in names:
         place = 0 if name == "parameter" else names.index(name)
         labels = known.get("labels", ())
-        return str(labels[place]) if place < len(labels) else parameter_label(names[place])
+        if place < len(labels):
+            return str(labels[place])
+        from fecontact.system.parameter_labels import parameter_label
+
+        return parameter_label(names[place])
     if name.startswith("observed_"):
         what = str(known.get("observed_label", "observed displacement"))
         return {"observed_maximum": f"largest {what}", "observed_minimum": f"smallest {what}",

@@ -34,7 +34,7 @@ def motion_diagrams(
 
     Without the curves of points that do not move along an axis.
     """
-    d = run.system.basis.dimension
+    d = run.basis.dimension
     motions = {what: [getattr(run, what)(point)[:, :d] for point in points]
                for what in ("displacement", "velocity")}
     names, colours = [labelled(point, run) for point in points], distinct_colours(len(points))
@@ -52,7 +52,7 @@ def motion_diagrams(
 
 def force_diagrams(run: Trajectory) -> list[Diagram]:
     """Total normal force of each face, then their total friction, along tangents or its size."""
-    faces, basis = contact_faces(run.system.basis), run.system.basis
+    faces, basis = contact_faces(run.basis), run.basis
     if not basis.contact_nodes:
         return []
     single = not faces[0].name
@@ -89,7 +89,7 @@ def forces_on_body_diagram(run: Trajectory, width: float = WIDTH) -> Diagram:
     Friction is along +x in the plane and along x and y in space. Of several bodies each interface
     has its sums along its normals and tangents, in space the size of its friction.
     """
-    basis, normal = run.system.basis, run.normal_force
+    basis, normal = run.basis, run.normal_force
     faces, space = contact_faces(basis), basis.dimension == 3
     along = (-np.einsum("fnk,nkd->fnd", run.friction_forces, basis.tangents) if space
              else -run.friction_forces)
@@ -136,7 +136,7 @@ def energy_diagrams(run: Trajectory) -> list[Diagram]:
 
 def labelled(point: Point, run: Trajectory) -> str:
     """Name of a point, and whether its motion is relative to another body."""
-    basis = run.system.basis
+    basis = run.basis
     way = ", relative (t, n)" if basis.dimension == 2 else ", relative (t, t2, n)"
     return point_name(point, basis) + way * is_relative(point, basis)
 
@@ -160,7 +160,7 @@ def phase_diagram(run: Trajectory, point: Point, axis: int, curve: Curve | None 
 
 def ground_speed(run: Trajectory, axis: int) -> float:
     """Steady speed of the ground along an axis [m/s]; zero where it has none everywhere."""
-    ground, d = run.system.ground, run.system.basis.dimension
+    ground, d = run.system.ground, run.basis.dimension
     if ground.rotation_speed or axis == d - 1:
         return 0.0
     if axis == 0:
@@ -170,7 +170,7 @@ def ground_speed(run: Trajectory, axis: int) -> float:
 
 def usual_points(run: Trajectory) -> tuple[Point, ...]:
     """Point B, unless it is fixed, and the middle contact node of each face; C without any."""
-    basis = run.system.basis
+    basis = run.basis
     middles = [(face.nodes.start + face.nodes.stop) // 2 for face in contact_faces(basis)
                if face.nodes.stop > face.nodes.start]
     found = (*(("B",) if basis.T[0].any() else ()), *middles[:_MOST_MIDDLES])

@@ -62,7 +62,7 @@ def coordinates(trajectory: Trajectory) -> dict[str, Variable]:
     Of solids ``tangent``, t and t2 (x and y on the ground), and areas of the nodes.
     """
     require_kind("A table of a run", Trajectory, trajectory=trajectory)
-    basis = trajectory.system.basis
+    basis = trajectory.basis
     found = {
         "time": Variable(("time",), trajectory.time, "s"),
         "point": Variable(("point",), np.array(_points(trajectory)), "1"),
@@ -118,7 +118,7 @@ def variables(trajectory: Trajectory) -> dict[str, Variable]:
     Of solids friction forces and slip velocities have two components, along the tangents.
     """
     require_kind("A table of a run", Trajectory, trajectory=trajectory)
-    basis, q, rate = (trajectory.system.basis, trajectory.modal_coordinates,
+    basis, q, rate = (trajectory.basis, trajectory.modal_coordinates,
                       trajectory.modal_velocities)
     points = [basis.point_index(name) for name in _points(trajectory)]
     nodes, several = slice(2, 2 + basis.contact_nodes), several_bodies(basis)
@@ -157,7 +157,7 @@ def columns(trajectory: Trajectory) -> dict[str, NDArray[Any]]:
     Modal coordinates are omitted: they have no meaning without the modes.
     """
     require_kind("A table of a run", Trajectory, trajectory=trajectory)
-    several = several_bodies(trajectory.system.basis)
+    several = several_bodies(trajectory.basis)
     names = {key: [str(value) for value in variable.values]
              for key, variable in coordinates(trajectory).items()}
     titles = _titles(trajectory)
@@ -240,12 +240,12 @@ def to_pandas(trajectory: Trajectory) -> "pandas.DataFrame":
 
 
 def _titles(trajectory: Trajectory) -> dict[str, str]:
-    if trajectory.system.basis.dimension == 3:
+    if trajectory.basis.dimension == 3:
         return _TITLES_IN_SPACE
-    return _TITLES_OF_SEVERAL if several_bodies(trajectory.system.basis) else _TITLES
+    return _TITLES_OF_SEVERAL if several_bodies(trajectory.basis) else _TITLES
 
 
 def _points(trajectory: Trajectory) -> list[str]:
     """Names of the points that the body has."""
-    basis = trajectory.system.basis
+    basis = trajectory.basis
     return [name for name in ("B", "C", *basis.extra) if basis.T[basis.point_index(name)].any()]

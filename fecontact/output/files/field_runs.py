@@ -6,7 +6,7 @@ from typing import Any
 
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.files.stored import array, member, require_lengths, text, texts
-from fecontact.integrate.events import Events
+from fecontact.integrate.event_table import Events
 from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.trajectory import Status
 from fecontact.output.files.hdf5 import new_file, open_file

@@ -103,7 +103,7 @@ class FrameFields:
     """
 
     def __init__(self, trajectory: Trajectory) -> None:
-        field, basis = require_field(trajectory), trajectory.system.basis
+        field, basis = require_field(trajectory), trajectory.basis
         self._run, self._field = trajectory, field
         self.kinds = field_kinds(basis)
         self.sizes = {"Point": len(field.nodes), "Cell": len(field.cells)}
@@ -129,9 +129,9 @@ class FrameFields:
             ("Point", "contact_force"): nodal_contact_force(run, which),
             ("Point", "contact_state"): nodal_contact_states(run, which, self._owners),
             ("Cell", "stress"): cell_stress(field, q)}
-        if run.system.basis.dimension == 2:
+        if run.basis.dimension == 2:
             return found
-        areas = run.system.basis.contact_areas
+        areas = run.basis.contact_areas
         pressure = run.normal_force[which] / areas
         traction = contact_forces(run, which) / areas[:, None]
         at_points = np.zeros((len(q), self.sizes["Point"]))

@@ -1,7 +1,7 @@
 """Fields over the body at chosen times, for files and pictures."""
 
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,13 @@ from fecontact.core.magnitude import magnitude
 from fecontact.core.types import Array
 from fecontact.fem.elements.cell_kinds import widths
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.laws.ground.ground import Ground
 from fecontact.output.files.contact_facets import contact_facets
 from fecontact.reduction.assembly.contact_faces import contact_directions
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
+
+if TYPE_CHECKING:
+    from fecontact.laws.ground.ground import Ground
 
 LARGEST_DRAWN = 1e100  # of states and contact forces in pictures and pages
 
@@ -63,7 +65,7 @@ def frame_indices(
 def require_field(trajectory: Trajectory) -> ModeShapes:
     """The modes over the body; InputError if the modal basis holds none."""
     require_kind("A picture", Trajectory, trajectory=trajectory)
-    field = trajectory.system.basis.mode_shapes
+    field = trajectory.basis.mode_shapes
     if field is None:
         raise InputError("This run cannot be drawn: its modal basis holds no shapes over the "
                          "body; make the basis with modal_basis(body, ...).")
@@ -149,9 +151,9 @@ def contact_forces(trajectory: Trajectory, which: Any = slice(None)) -> Array:
     F] on the ground, where y_R' is the slope of the ground below a node, or zero for contact forces
     that stay vertical.
     """
-    tangents, normals = contact_directions(trajectory.system.basis)
+    tangents, normals = contact_directions(trajectory.basis)
     forces = _local_forces(trajectory, which)
-    if trajectory.system.basis.dimension == 2:
+    if trajectory.basis.dimension == 2:
         return np.asarray(forces[..., :1] * tangents + forces[..., 1:] * normals)
     axes = np.concatenate([tangents, normals[:, None]], axis=1)
     return np.einsum("fnk,nkd->fnd", forces, axes)
@@ -160,7 +162,7 @@ def contact_forces(trajectory: Trajectory, which: Any = slice(None)) -> Array:
 def _local_forces(trajectory: Trajectory, which: Any) -> Array:
     """Forces (F, n, d) on the contact nodes along tangents and normals [N]."""
     normal, along = trajectory.normal_force[which], -trajectory.friction_force[which]
-    ground, basis = trajectory.system.ground, trajectory.system.basis
+    ground, basis = trajectory.system.ground, trajectory.basis
     follows = ground.wavy and ground.normal == "surface"
     if basis.dimension == 3:
         tangential = -trajectory.friction_forces[which]
@@ -178,7 +180,7 @@ def _local_forces(trajectory: Trajectory, which: Any) -> Array:
 
 def _slopes_below(trajectory: Trajectory, which: Any) -> Array:
     """Slopes (F, n, 2) of the ground along x and y below the contact nodes of solids."""
-    system, basis = trajectory.system, trajectory.system.basis
+    system, basis = trajectory.system, trajectory.basis
     travel = np.array([system.prescribed_motion.travel(float(time))
                        for time in trajectory.time[which]])
     moved = np.einsum("fm,nkm->fnk", trajectory.modal_coordinates[which],
@@ -187,7 +189,7 @@ def _slopes_below(trajectory: Trajectory, which: Any) -> Array:
     return ground_shape(system.ground, places[..., 0], places[..., 1])[..., 1:]
 
 
-def ground_shape(ground: Ground, x: Array, y: Array) -> Array:
+def ground_shape(ground: "Ground", x: Array, y: Array) -> Array:
     """Height [m] and slopes along x and y (..., 3) of ground at places of its own frame."""
     if ground.height_map is not None:
         return ground.height_map.shape(x, y)[..., :3]
@@ -243,7 +245,7 @@ def nodal_contact_states(
     ``owners`` are those of :func:`contact_owners`, where they are needed again and again.
     """
     field = require_field(trajectory)
-    touching, owner = owners or contact_owners(trajectory.system.basis)
+    touching, owner = owners or contact_owners(trajectory.basis)
     found = trajectory.contact_state[which]
     states = np.full((len(found), len(field.nodes)), -1, dtype=np.int8)
     states[:, touching] = found[:, owner]

@@ -28,13 +28,13 @@ from fecontact.core.types import Array
 from fecontact.fem.elements.cell_kinds import CELL_KINDS, widths
 from fecontact.reduction.large_deflections.forces import LargeDeflectionForces
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.modal_rotation import ModalRotation
 from fecontact.reduction.mode_shapes import (
     BodyPart,
     ModeShapes,
     NonlinearStress,
     ReductionQuality,
 )
-from fecontact.reduction.rotating import ModalRotation
 
 # Higher levels of deflate take longer and gain three per cent.
 COMPRESSED: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": 1}

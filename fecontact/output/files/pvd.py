@@ -60,7 +60,7 @@ def export_pvd(
     name = folder.name
     collection = path if beside else folder / f"{name}.pvd"
     _require_free(folder)
-    basis, fields = trajectory.system.basis, FrameFields(trajectory)
+    basis, fields = trajectory.basis, FrameFields(trajectory)
     body = ([VtuField("body", "Point", numbers := body_numbers(basis)),
              VtuField("body", "Cell", numbers[field.cells[:, 0]])] if basis.parts else [])
     with output_folder(folder.parent), replaced_folder(folder) as part:

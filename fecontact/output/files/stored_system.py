@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import NoneType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tomli_w
 
@@ -15,11 +15,12 @@ from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError, shown
 from fecontact.core.files.stored import DamagedError, from_json, member, text
 from fecontact.core.tables import parsed
-from fecontact.laws.registry import movable, trusting, with_folder
+from fecontact.laws.own_files import movable, trusting, with_folder
 from fecontact.output.files.hdf5 import open_file, store_basis, stored_basis
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.system.contact_system import ContactSystem
-from fecontact.system.tables import system_from_tables, system_tables
+
+if TYPE_CHECKING:
+    from fecontact.system.contact_system import ContactSystem
 
 _PACKAGES = ("fecontact", "numpy", "scipy", "numba", "scikit-fem")
 
@@ -38,18 +39,20 @@ class StoredTables:
 class StoredModel:
     """A model read from a file of results."""
 
-    system: ContactSystem
+    system: "ContactSystem"
     study: str | None
     versions: dict[str, str]
 
 
 def store_model(
-    file: Any, path: Path, system: ContactSystem, study: str | None, root: str | Path | None,
+    file: Any, path: Path, system: "ContactSystem", study: str | None, root: str | Path | None,
 ) -> None:
     """Write a model into a new HDF5 file that will be ``path``.
 
     Files of user laws below ``root``, by default the folder of the file, are named relative to it.
     """
+    from fecontact.system.tables import system_tables
+
     folder = path.parent
     root = folder if root is None else as_path(root, "the folder of laws")
     require_kind("study", (str, NoneType), study=study)
@@ -133,13 +136,15 @@ def read_model(path: str | Path, trust: bool | Iterable[Path] = False) -> Stored
     InputError
         If there is no such file, it holds no model or needs code that is not trusted.
     """
+    from fecontact.system.tables import system_from_tables
+
     stored = read_tables(path)
     with trusting(trust):
         system = system_from_tables(stored.basis, stored.tables, str(path))
     return StoredModel(system, stored.study, stored.versions)
 
 
-def read_system(path: str | Path, *, trust: bool | Iterable[Path] = False) -> ContactSystem:
+def read_system(path: str | Path, *, trust: bool | Iterable[Path] = False) -> "ContactSystem":
     """Read the system that was written with branches or a frequency response.
 
     Parameters

@@ -70,9 +70,9 @@ def write_vtkhdf(file: Any, trajectory: Trajectory, indices: NDArray[np.intp]) -
     fields = FrameFields(trajectory)
     _write_steps(group.create_group("Steps"), trajectory.time[indices], fields)
 
-    parts = trajectory.system.basis.parts
+    parts = trajectory.basis.parts
     if parts:
-        body = body_numbers(trajectory.system.basis)
+        body = body_numbers(trajectory.basis)
         for kind, numbers in (("Point", body), ("Cell", body[field.cells[:, 0]])):
             group[f"{kind}Data/body"] = numbers
             group[f"{kind}Data/body"].attrs["names"] = [part.name for part in parts]

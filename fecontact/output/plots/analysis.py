@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from fecontact.analysis.histories import Point, history, point_name
 from fecontact.analysis.periodicity import Strobe, section_states, strobed_states
-from fecontact.analysis.receptance import Receptance
 from fecontact.analysis.resolved import resolved
 from fecontact.analysis.sampling import evenly_sampled_history
 from fecontact.analysis.spectra import (
@@ -39,6 +38,8 @@ from fecontact.reduction.assembly.contact_faces import shown_faces
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from fecontact.analysis.receptance import Receptance
 
 _RETURNS = 1e-3  # of the motion, within which an orbit has returned
 _ROUND_OFF = 1e-9  # of the largest response, below which others are not drawn
@@ -205,7 +206,7 @@ def plot_poincare(
         found = section_states(trajectory, point, component, t_start=start)
     else:
         found = strobed_states(trajectory, period=period, phase=phase, t_start=start)
-    basis = trajectory.system.basis
+    basis = trajectory.basis
     drawn = resolved(trajectory)
     rows = trajectory._rows(point)[row]
     m = basis.modes
@@ -261,14 +262,14 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
         For another suffix, or a file that cannot be written.
     """
     require_kind("plot_friction_work", Trajectory, trajectory=trajectory)
-    if trajectory.system.basis.dimension == 3:
+    if trajectory.basis.dimension == 3:
         from fecontact.output.plots.solids.maps import friction_work_maps
 
         return friction_work_maps(trajectory, path)
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
-    faces = shown_faces(trajectory.system.basis, "friction work")
-    work = trajectory.friction_work[-1] / trajectory.system.basis.tributary
+    faces = shown_faces(trajectory.basis, "friction work")
+    work = trajectory.friction_work[-1] / trajectory.basis.tributary
     touching = trajectory.normal_force != 0.0
     speed = np.abs(trajectory.slip_velocity) * touching
     slip = np.trapezoid(speed, trajectory.time, axis=0)
@@ -291,7 +292,7 @@ def plot_friction_work(trajectory: Trajectory, *, path: str | Path | None = None
 
 
 def plot_receptance(
-    responses: Receptance | Sequence[Receptance], labels: Sequence[str] = (), *,
+    responses: "Receptance | Sequence[Receptance]", labels: Sequence[str] = (), *,
     usable_hz: float = np.inf, path: str | Path | None = None,
 ) -> "Figure":
     """Plot magnitude and phase of frequency responses; those of unstable states are dashed.
@@ -317,6 +318,8 @@ def plot_receptance(
     InputError
         For nothing to draw, another suffix, or a file that cannot be written.
     """
+    from fecontact.analysis.receptance import Receptance
+
     responses = as_several(responses, Receptance, "plot_receptance", "responses")
     if not responses:
         raise InputError("responses = [] holds nothing to draw; give at least one.")
@@ -373,11 +376,11 @@ class _Response(NamedTuple):
     name: str
     unit: str
     values: NDArray[np.complex128]
-    of: Receptance
+    of: "Receptance"
 
 
 def _responses(
-    responses: Sequence[Receptance], labels: Sequence[str]
+    responses: "Sequence[Receptance]", labels: Sequence[str]
 ) -> tuple[list[_Response], list[str]]:
     """The curves to draw, and the names of those that are round-off."""
     found, largest = [], dict[str, float]()

@@ -68,7 +68,7 @@ def plot_contact_map(
     """
     require_kind("plot_contact_map", Trajectory, trajectory=trajectory)
     require_kind("plot_contact_map", (WearLaw, type(None)), wear=wear)
-    if trajectory.system.basis.dimension == 3:
+    if trajectory.basis.dimension == 3:
         from fecontact.output.plots.solids.maps import contact_maps
 
         return contact_maps(trajectory, times, wear, path)
@@ -78,7 +78,7 @@ def plot_contact_map(
                              f"has plane bodies, whose maps show all times; leave it out.")
     drawn = resolved(trajectory)
     trajectory = drawn.trajectory
-    basis = trajectory.system.basis
+    basis = trajectory.basis
     faces = shown_faces(basis, "contact map")
     single = not faces[0].name
     size = (10.0, 6.2) if single else (12.0, 0.9 + 2.6 * len(faces))

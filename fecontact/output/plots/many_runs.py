@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from fecontact.analysis.comparison import require_runs
-from fecontact.analysis.histories import Point, history, usual_component
+from fecontact.analysis.histories import Point, component_of, history
 from fecontact.analysis.spectra import amplitude_spectrum
 from fecontact.analysis.summaries import usual_point
 from fecontact.core.checks import require_kind
@@ -62,7 +62,7 @@ def plot_runs(
     require_runs("plot_runs", runs)
     first = next(iter(runs.values()))
     point = usual_point(first.system.basis) if point is None else point
-    component = usual_component(first.system) if component is None else component
+    component = component_of(first) if component is None else component
     found = [history(run, quantity, point, component) for run in runs.values()]
     spectra = [amplitude_spectrum(run.time, one.values, resample=True)
                for run, one in zip(runs.values(), found, strict=True)]

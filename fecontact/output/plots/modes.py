@@ -12,17 +12,18 @@ from fecontact.core.types import Array, Integers
 from fecontact.fem.faces.surface import as_triangles
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.solids.surface import draw_surface, seen_box
-from fecontact.reduction.assembly.bodies_convergence import BodiesConvergence
 from fecontact.reduction.assembly.contact_faces import mode_names
-from fecontact.reduction.convergence import ModeConvergence
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart
-from fecontact.reduction.sector_modes import SectorModes
-from fecontact.system.statics.buckling import BucklingLoads
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from fecontact.reduction.assembly.bodies_convergence import BodiesConvergence
+    from fecontact.reduction.convergence import ModeConvergence
+    from fecontact.reduction.sector_modes import SectorModes
+    from fecontact.system.statics.buckling import BucklingLoads
 
 
 _DRAWN_DISPLACEMENT = 0.07  # largest one, relative to the body's extent
@@ -65,7 +66,7 @@ def plot_modes(
     return _shapes_figure(field, field.shapes[..., chosen], titles, path, basis.parts)
 
 
-def plot_buckling(found: BucklingLoads, *, path: str | Path | None = None) -> "Figure":
+def plot_buckling(found: "BucklingLoads", *, path: str | Path | None = None) -> "Figure":
     """Plot the shapes in which a body buckles, with their load factors.
 
     Parameters
@@ -80,6 +81,8 @@ def plot_buckling(found: BucklingLoads, *, path: str | Path | None = None) -> "F
     InputError
         Without load factors, for another suffix, or a file that cannot be written.
     """
+    from fecontact.system.statics.buckling import BucklingLoads
+
     require_kind("plot_buckling", BucklingLoads, found=found)
     if not len(found.load_factors):
         raise InputError("plot_buckling: there are no shapes, since the loads do not make the body "
@@ -89,7 +92,7 @@ def plot_buckling(found: BucklingLoads, *, path: str | Path | None = None) -> "F
 
 
 def plot_wheel(
-    found: SectorModes, shown: Sequence[tuple[int, int]], *, phase: float = 0.0,
+    found: "SectorModes", shown: Sequence[tuple[int, int]], *, phase: float = 0.0,
     path: str | Path | None = None,
 ) -> "Figure":
     """Plot modes of a sector over the whole wheel.
@@ -110,7 +113,11 @@ def plot_wheel(
     InputError
         For modes that are not there, another suffix, or a file that cannot be written.
     """
+    from fecontact.reduction.sector_modes import SectorModes
+
     require_kind("plot_wheel", SectorModes, found=found)
+    from fecontact.reduction.sector_modes import SectorModes
+
     require_kind("plot_wheel", (Sequence, np.ndarray), shown=shown)
     if not len(shown):
         raise InputError("plot_wheel: shown is empty; give a nodal diameter and a number of a mode "
@@ -170,7 +177,7 @@ def _first_modes(basis: ModalBasis, count: int) -> list[int]:
 
 
 def plot_convergence(
-    result: ModeConvergence | BodiesConvergence, *, path: str | Path | None = None
+    result: "ModeConvergence | BodiesConvergence", *, path: str | Path | None = None
 ) -> "Figure":
     """Plot the convergence of frequencies and contact compliance with mesh and modes.
 
@@ -187,6 +194,9 @@ def plot_convergence(
     InputError
         For another suffix, or a file that cannot be written.
     """
+    from fecontact.reduction.assembly.bodies_convergence import BodiesConvergence
+    from fecontact.reduction.convergence import ModeConvergence
+
     require_kind("plot_convergence", (ModeConvergence, BodiesConvergence), result=result)
     from matplotlib.ticker import NullLocator
 
@@ -215,7 +225,7 @@ def plot_convergence(
     return figure
 
 
-def _body_convergence(meshes: "Axes", modes: "Axes", result: ModeConvergence) -> Integers:
+def _body_convergence(meshes: "Axes", modes: "Axes", result: "ModeConvergence") -> Integers:
     """Draw that of a single body; returns the numbers of modes."""
     sizes = result.unknowns[:-1]
     for i, values in enumerate(_distance(result.frequencies_hz).T):
@@ -229,7 +239,7 @@ def _body_convergence(meshes: "Axes", modes: "Axes", result: ModeConvergence) ->
     return result.modes
 
 
-def _bodies_convergence(meshes: "Axes", modes: "Axes", result: BodiesConvergence) -> Integers:
+def _bodies_convergence(meshes: "Axes", modes: "Axes", result: "BodiesConvergence") -> Integers:
     """Draw that of several bodies; returns the numbers of modes of all of them."""
     sizes = np.sum(list(result.unknowns.values()), axis=0)[:-1]
     groups = dict(result.frequencies_hz)

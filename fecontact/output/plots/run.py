@@ -91,7 +91,7 @@ def plot_history(
 
 def direction_row(trajectory: Trajectory, component: str) -> int:
     """Row of a direction of motion; InputError for one that the bodies do not have."""
-    axes = AXES[: trajectory.system.basis.dimension]
+    axes = AXES[: trajectory.basis.dimension]
     if component not in axes:
         raise InputError(f"component = {component!r} is not known; choose from {choices(axes)}.")
     return axes.index(component)

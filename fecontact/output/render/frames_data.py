@@ -143,13 +143,13 @@ class Motion:
     @cached_property
     def footed(self) -> NDArray[np.intp]:
         """Contact nodes (f,) whose other side is a body, not the ground."""
-        basis = self.trajectory.system.basis
+        basis = self.trajectory.basis
         return np.flatnonzero(~basis.ground_nodes & ~basis.spring_nodes)
 
     @cached_property
     def has_ground(self) -> bool:
         """Whether there is a ground under any of the bodies."""
-        return bool(self.trajectory.system.basis.ground_nodes.any())
+        return bool(self.trajectory.basis.ground_nodes.any())
 
     @cached_property
     def sliding(self) -> tuple[str, ...]:
@@ -174,7 +174,7 @@ class Motion:
     @cached_property
     def labels(self) -> tuple[tuple[str, int], ...]:
         """Names of the bodies of several, and the nodes at which they stand."""
-        return body_labels(self.trajectory.system.basis)
+        return body_labels(self.trajectory.basis)
 
     @cached_property
     def state_names(self) -> tuple[str, ...]:
@@ -226,7 +226,7 @@ class Motion:
         """Drawn height of the flat ground: under the lowest contact node by its gap [m]."""
         if not self.has_ground:
             return float(self.bounds[0, -1])
-        basis = self.trajectory.system.basis
+        basis = self.trajectory.basis
         heights = basis.contact_places[basis.ground_nodes, -1]
         return float(heights.min() - self.scale * self.gap)
 
@@ -266,7 +266,7 @@ class Motion:
     @cached_property
     def contact_rows(self) -> tuple[Array, Array]:
         """Places (n + f, d) of contact nodes and feet, and their displacements (n + f, d, m)."""
-        basis, field = self.trajectory.system.basis, self.mode_shapes
+        basis, field = self.trajectory.basis, self.mode_shapes
         places, d = basis.contact_places, basis.dimension
         if not several_bodies(basis):
             return places, basis.contact_T[:, :d]
@@ -283,7 +283,7 @@ class Motion:
         gap = self.trajectory.system.gap
         if not isinstance(gap, tuple):
             return float(cast(float, gap))
-        below = np.asarray(gap)[self.trajectory.system.basis.ground_nodes]
+        below = np.asarray(gap)[self.trajectory.basis.ground_nodes]
         return float(below.min()) if len(below) else 0.0
 
     @property
@@ -301,7 +301,7 @@ class Motion:
 
     def _drift(self, q: Array) -> Array:
         """Mean displacement (k, d - 1) along the ground of the contact nodes on it [m]."""
-        basis = self.trajectory.system.basis
+        basis = self.trajectory.basis
         along = basis.dimension - 1
         if not self.has_ground:
             return np.zeros((len(q), along))
@@ -319,7 +319,7 @@ class Motion:
 
     @cached_property
     def _extremes(self) -> tuple[Array, Array]:
-        low, high = np.full((2, self.trajectory.system.basis.dimension), [[np.inf], [-np.inf]])
+        low, high = np.full((2, self.trajectory.basis.dimension), [[np.inf], [-np.inf]])
         for which in blocks(self.indices, len(self.mode_shapes.nodes)):
             q = self.trajectory.modal_coordinates[which]
             places = self.mode_shapes.nodes + self._scaled(displacement(self.mode_shapes, q), q)

@@ -225,7 +225,7 @@ def _motion(
     view: View, wear: WearLaw | None,
 ) -> Motion:
     require_drawable(trajectory, indices)
-    if trajectory.system.basis.dimension == 3:
+    if trajectory.basis.dimension == 3:
         return SolidMotion(trajectory, indices, colour, scale, view, wear)
     for name, given, usual in (("view", view, "above"), ("wear", wear, None)):
         if given != usual:

@@ -123,7 +123,7 @@ class Overlay(Strips):
         The scene keeps little more than it needs, and at least a third. Without contact nodes there
         is no chart.
         """
-        if not self.motion.trajectory.system.basis.contact_nodes:
+        if not self.motion.trajectory.basis.contact_nodes:
             return 0
         room = self.height - self.header_height - self.footer_height
         left = min(room - _SPARE * needed_height(self.motion) * self.width, _MOST_CHART * room)

@@ -171,7 +171,7 @@ class ContactMarks:
 
     def __init__(self, scene: Scene, motion: Motion) -> None:
         self._motion, self._unit = motion, _unit(scene)
-        basis = motion.trajectory.system.basis
+        basis = motion.trajectory.basis
         feet, line, pixel = len(motion.footed), scene.line, scene.pixel
         n = basis.contact_nodes + feet
         spacing = min(np.ptp(face.abscissa) / max(len(face.abscissa) - 1, 1) or scene.camera.height

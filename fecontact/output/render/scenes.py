@@ -26,7 +26,7 @@ def scene_of(motion: Shown, width: int, height: int, **how: Any) -> Scene:
         parts.append(partial(PlaneBodies, motion=motion))
         if isinstance(motion, Motion) and motion.has_ground:
             parts.append(partial(PlaneGround, motion=motion))
-        if isinstance(motion, Motion) and motion.trajectory.system.basis.contact_nodes:
+        if isinstance(motion, Motion) and motion.trajectory.basis.contact_nodes:
             parts.append(partial(ContactMarks, motion=motion))
         return Scene(camera, parts, width, height, **how)
     ground = np.zeros((0, 3))

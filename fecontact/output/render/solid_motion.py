@@ -49,12 +49,12 @@ class SolidMotion(Motion):
     @property
     def on_ground(self) -> bool:
         """True if any of the bodies stands on the ground."""
-        return bool(self.trajectory.system.basis.ground_nodes.any())
+        return bool(self.trajectory.basis.ground_nodes.any())
 
     @cached_property
     def plans(self) -> tuple[FacePlan, ...]:
         """The first few contact faces, laid flat."""
-        return face_plans(self.trajectory.system.basis, "contact map")[:_MOST_FACES]
+        return face_plans(self.trajectory.basis, "contact map")[:_MOST_FACES]
 
     @cached_property
     def pressures(self) -> Array:
@@ -77,7 +77,7 @@ class SolidMotion(Motion):
     def friction(self) -> Array:
         """Friction (F, n, 3) on the body of each contact node, along the axes [N]."""
         forces = -self.trajectory.friction_forces[self.indices]
-        return np.einsum("fnk,nkd->fnd", forces, self.trajectory.system.basis.tangents)
+        return np.einsum("fnk,nkd->fnd", forces, self.trajectory.basis.tangents)
 
     @cached_property
     def largest_friction(self) -> float:

@@ -35,7 +35,7 @@ def seen_nodes(motion: Shown) -> Integers:
     nodes = np.arange(len(motion.mode_shapes.nodes))
     if not isinstance(motion, SolidMotion) or motion.view != "below":
         return nodes
-    basis = motion.trajectory.system.basis
+    basis = motion.trajectory.basis
     patches = contact_facets(basis).patches.facets
     parts = [np.arange(part.nodes[0], sum(part.nodes)) for part in basis.parts]
     seen = [own for own in parts if np.isin(patches, own).any()]
@@ -57,7 +57,7 @@ def solid_camera(motion: Shown, ground: Array, aspect: float) -> Camera:
     corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(-1, 3)
     normal = np.array([0.0, 0.0, 1.0])
     if isinstance(motion, SolidMotion) and from_below(motion):
-        basis = motion.trajectory.system.basis
+        basis = motion.trajectory.basis
         mean = basis.contact_areas @ basis.normals
         if np.linalg.norm(mean) > 0.1 * basis.contact_areas.sum():
             normal = mean / np.linalg.norm(mean)
@@ -81,7 +81,7 @@ class SolidBodies:
         self._surfaces: list[tuple[Any, ShadedSurface]] = []
         self._painted, self._lines = None, []
         if isinstance(motion, SolidMotion) and from_below(motion):
-            patches = contact_facets(motion.trajectory.system.basis).patches
+            patches = contact_facets(motion.trajectory.basis).patches
             self._painted = self._surface(
                 scene, patches.facets, rgb=True,
                 cell_data={"colour": np.zeros((len(patches.facets), 3), np.uint8)},

@@ -141,7 +141,7 @@ def spectrum_tables(
     run: Trajectory, points: Sequence[Point], payload: Payload
 ) -> list[dict[str, Any]]:
     """Charts of the velocity spectra of points, one for each direction in which they move."""
-    d = run.system.basis.dimension
+    d = run.basis.dimension
     points = tuple(points) or usual_points(run)
     motions = [run.velocity(point)[:, :d] for point in points]
     largest = max((float(np.abs(one).max()) for one in motions), default=0.0)

@@ -37,7 +37,7 @@ _BESIDE = 0.6  # ground drawn on either side of the bodies, of their width
 
 def drawn_contact(run: Trajectory, motion: Motion | None) -> DrawnContact:
     """Contact nodes of a run; with a motion to draw also where they and their feet are."""
-    basis, names = run.system.basis, state_names(run)
+    basis, names = run.basis, state_names(run)
     tangents, normals = contact_directions(basis)
     solid = basis.dimension == 3
     axes = (np.concatenate([tangents, normals[:, None]], axis=1) if solid
@@ -113,7 +113,7 @@ def _alike(contact: DrawnContact) -> list[int]:
 def _touching(run: Trajectory) -> tuple[ContactFace, ...]:
     """Faces that may touch; none where nonlinear springs alone join the bodies."""
     try:
-        return touching_faces(run.system.basis, "contact map")
+        return touching_faces(run.basis, "contact map")
     except AnalysisError:
         return ()
 
@@ -140,7 +140,7 @@ def drift_rows(motion: Motion) -> Array:
     A wavy ground is drawn in its true length, so that drift of the bodies along it, ``drift @ q``,
     is not magnified either.
     """
-    basis = motion.trajectory.system.basis
+    basis = motion.trajectory.basis
     along = 0 if basis.dimension == 2 else slice(2)
     rows = basis.contact_T[:, along]
     if not (motion.has_ground and motion.trajectory.system.ground.wavy):
@@ -153,7 +153,7 @@ def drawn_ground(motion: Motion, box: Sequence[float]) -> DrawnGround | None:
     if not motion.has_ground:
         return None
     ground, run = motion.trajectory.system.ground, motion.trajectory
-    basis, direction = run.system.basis, np.array(ground.wave_direction)
+    basis, direction = run.basis, np.array(ground.wave_direction)
     way = np.array([ground.travel(float(time)) for time in run.time])
     ends, travel, along = box[:2], way, way
     if basis.dimension == 3:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.analysis.comparison import compare_runs
-from fecontact.analysis.histories import Point, history, usual_component
+from fecontact.analysis.histories import Point, component_of, history
 from fecontact.analysis.summaries import usual_point
 from fecontact.core.units import UNITS
 from fecontact.integrate.trajectory import Status, Trajectory
@@ -62,7 +62,7 @@ def report_runs(
     path = require_page(path)
     found = compare_runs(runs, points, studies=studies)
     first = next(iter(runs.values()))
-    component = usual_component(first.system) if component is None else component
+    component = component_of(first) if component is None else component
     chosen: Sequence[Point] = tuple(points) or (usual_point(first.system.basis),)
     payload, colours = Payload(), distinct_colours(len(runs))
     begin = max(float(run.time[0]) for run in runs.values())
@@ -71,7 +71,7 @@ def report_runs(
     wanted: list[tuple[str, Point, str]] = [
         (quantity, point, component) for point in chosen
         for quantity in ("displacement", "velocity")]
-    if all(run.system.basis.contact_nodes for run in runs.values()):
+    if all(run.basis.contact_nodes for run in runs.values()):
         wanted += [("total_normal_force", "B", "x"), ("total_friction_force", "B", "x")]
     charts: list[dict[str, Any]] = []
     spectra: list[dict[str, Any]] = []

@@ -23,8 +23,8 @@ from fecontact.reduction.assembly.links import Links, NonlinearSpring, linked
 from fecontact.reduction.assembly.nonlinear_springs import nonlinear_springs, spring_row
 from fecontact.reduction.assembly.point_pairing import PointPairing
 from fecontact.reduction.modal_basis import ModalBasis
+from fecontact.reduction.modal_rotation import ModalRotation
 from fecontact.reduction.mode_shapes import BodyPart, ModeShapes, NonlinearStress
-from fecontact.reduction.rotating import ModalRotation
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ import numpy as np
 
 from fecontact.core.types import Array
 from fecontact.reduction.large_deflections.fit import CondensedBody
-from fecontact.reduction.large_deflections.forces import (
+from fecontact.reduction.large_deflections.modal_forces import (
     large_deflection_forces,
     nonlinear_stress,
     static_response,

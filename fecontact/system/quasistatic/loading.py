@@ -11,7 +11,7 @@ from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.core.units import count
-from fecontact.system import kernels
+from fecontact.system import columns, kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 from fecontact.system.nodes import SystemArrays
@@ -211,4 +211,4 @@ def _penetration(arrays: SystemArrays, q: Array) -> Array:
     """Penetration (n,) of a system at rest."""
     found = np.empty((len(arrays.gap), kernels.state_columns(arrays)))
     kernels.contact_state(0.0, np.concatenate([q, np.zeros_like(q)]), arrays, found)
-    return found[:, kernels.PENETRATION].copy()
+    return found[:, columns.PENETRATION].copy()

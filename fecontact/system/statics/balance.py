@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fecontact.core.types import Array
-from fecontact.system import kernels
+from fecontact.system import columns, kernels
 from fecontact.system.friction_memory import steady_memory
 from fecontact.system.jacobian import jacobian
 from fecontact.system.node_forces import normal_values
@@ -42,14 +42,14 @@ class Balance:
         # Stiffness of the fully closed contact, and its force at zero displacement.
         far = np.full(n, max(10.0 * scale, 2.0 * self._penetration(scale)))
         values, self.face_stiffness = self.normal(far)
-        columns = kernels.state_columns(arrays)
-        undisplaced = np.empty((n, columns))
+        width = kernels.state_columns(arrays)
+        undisplaced = np.empty((n, width))
         kernels.contact_state(time, self._state, arrays, undisplaced)
         self.face_force = values + self.face_stiffness * (
-            undisplaced[:, kernels.PENETRATION] - far)
+            undisplaced[:, columns.PENETRATION] - far)
         # Of preloaded springs, which cancel within their law.
         self._initial = np.abs(arrays.rows[:, 1]).T @ np.where(
-            arrays.on_ground, 0.0, np.abs(undisplaced[:, kernels.NORMAL_FORCE]))
+            arrays.on_ground, 0.0, np.abs(undisplaced[:, columns.NORMAL_FORCE]))
         self.scale = np.abs(np.diag(arrays.stiffness)) + np.einsum(
             "jai,jai,j->i", arrays.rows, arrays.rows, np.abs(self.face_stiffness))
         # Free motion is as stiff as the stiffest one, so that rounding does not carry it away.
@@ -237,7 +237,7 @@ class Balance:
         kernels.contact_state(self._time, self._steady(q), self.arrays, state)
         elastic = (0.5 * q @ self.arrays.stiffness @ q - self.load @ q
                    + polynomial_energy(q, self.arrays))
-        return float(elastic + stored(state[:, kernels.PENETRATION]))
+        return float(elastic + stored(state[:, columns.PENETRATION]))
 
     def _upright(self, q: Array) -> Array:
         """Symmetric stiffness (m, m) at q, for ground that is level under each node."""
@@ -245,7 +245,7 @@ class Balance:
         self._state[: len(q)] = q
         state = np.empty((len(arrays.gap), kernels.state_columns(arrays)))
         kernels.contact_state(self._time, self._state, arrays, state)
-        slope = self.normal(state[:, kernels.PENETRATION].copy())[1]
+        slope = self.normal(state[:, columns.PENETRATION].copy())[1]
         normal = arrays.rows[:, 1]
         return np.asarray(arrays.stiffness + polynomial_stiffness_at(q, arrays)
                           + (normal.T * slope) @ normal)

@@ -16,7 +16,7 @@ from fecontact.laws.excitation import AXES, Load
 from fecontact.laws.friction.planar import along_slip, clear
 from fecontact.laws.signatures import friction_law, planar_friction_law, signal
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.system import kernels
+from fecontact.system import columns
 from fecontact.system.complex_modes import unstable_count
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.friction_memory import steady_memory
@@ -88,8 +88,8 @@ class ContactEquilibrium(Instant):
         found = super()._contact
         if self.kind == "rest":
             found = found.copy()
-            found[..., self._columns(kernels.FRICTION_FORCE, kernels.FRICTION_ACROSS)] = 0.0
-            found[..., self._columns(kernels.SLIP_VELOCITY, kernels.SLIP_ACROSS)] = 0.0
+            found[..., self._columns(columns.FRICTION_FORCE, columns.FRICTION_ACROSS)] = 0.0
+            found[..., self._columns(columns.SLIP_VELOCITY, columns.SLIP_ACROSS)] = 0.0
         return found
 
 

@@ -56,7 +56,7 @@ def contact_maps(
 ) -> "Figure":
     """Maps of contact at times, drawn by :func:`fecontact.plot.plot_contact_map` for solids."""
     which = _chosen(trajectory, times)
-    basis, run = trajectory.system.basis, trajectory
+    basis, run = trajectory.basis, trajectory
     plans, states = face_plans(basis, "contact map"), state_names(run)
     shades = [{"open": OPEN, **STATE_COLOURS}[name] for name in states]
     friction = -np.einsum("fnk,nkd->fnd", run.friction_forces[which], basis.tangents)
@@ -149,7 +149,7 @@ def _shares(axes: "Axes", run: Trajectory, states: Sequence[str], shades: Sequen
             marked: Array) -> None:
     """Shares of the area in each state over time, with the times of the maps."""
     unit, symbol = suitable_unit(float(np.abs(run.time).max()), "s")
-    area = run.system.basis.contact_areas
+    area = run.basis.contact_areas
     code = np.minimum(run.contact_state, len(states) - 1)
     shares = np.stack([100.0 * ((code == k) @ area) / area.sum() for k in range(len(states))])
     axes.stackplot(run.time / unit, shares, colors=shades, labels=states, step="mid",
@@ -235,7 +235,7 @@ def friction_work_maps(trajectory: Trajectory, path: str | Path | None) -> "Figu
     """Maps of friction work, drawn by :func:`fecontact.plot.plot_friction_work` for solids."""
     drawn = resolved(trajectory)
     run = drawn.trajectory
-    basis = run.system.basis
+    basis = run.basis
     plans = face_plans(basis, "friction work")
     work = run.friction_work[-1] / basis.contact_areas
     speed = np.linalg.norm(run.slip_velocities, axis=2) * (run.normal_force != 0.0)
