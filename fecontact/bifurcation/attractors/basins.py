@@ -13,8 +13,8 @@ import numpy as np
 
 from fecontact.bifurcation.attractors.attractor import Attractor, distinguished
 from fecontact.bifurcation.attractors.blocks import Found, Place, work_off
+from fecontact.bifurcation.attractors.fingerprint import fingerprint
 from fecontact.bifurcation.attractors.labels import Settled
-from fecontact.bifurcation.attractors.marks import mark_of
 from fecontact.core.checks import as_count
 from fecontact.core.errors import InputError
 from fecontact.core.errors import shown as text_of
@@ -140,7 +140,8 @@ def basins(
         As for :func:`fecontact.ensemble`.
     folder : path, optional
         Where finished blocks of runs are kept, some thousand starts each; a call that was ended
-        or killed goes on from there, with the same result.
+        or killed goes on from there, with the same result. Other numbers of the system or settings
+        are refused; for other code of laws, functions or fields of your own name another folder.
     executor : concurrent.futures.Executor, optional
         Executor that computes the blocks in place of this process: processes, or a cluster by
         :func:`fecontact.sweeps.dask_executor`. Needs a folder.
@@ -190,11 +191,11 @@ def basins(
     blocks = [_Starts(settle, part) for part
               in np.split(states, range(size_of_block, len(states), size_of_block))]
     # Without a section the tolerance counts only in labels, which are not kept.
-    mark = "" if folder is None else mark_of(
+    known = "" if folder is None else fingerprint(
         [moving], solver, rtol, keep, transient_periods, settle.transient, section,
         None if section is None else tolerance, states)
     with shown(progress, lambda: progress_bar("Running", len(states))) as tell:
-        readers = work_off(blocks, place, mark, tell)
+        readers = work_off(blocks, place, known, tell)
     parts = [partial(_settled, read) for read in readers]
     labels, attractors = distinguished(parts, _scale(moving, states, parts), tolerance)
     return Basins(a, b, labels.reshape(len(a), len(b)), attractors)

@@ -1,7 +1,7 @@
 """Many runs in blocks, on threads or other processes, each block kept in a file where asked for.
 
-A folder of blocks belongs to one computation, by the mark in ``blocks.json``. Blocks are written
-whole or not at all; those that are there are not computed again.
+A folder of blocks belongs to one computation, by the fingerprint in ``blocks.json``. Blocks are
+written whole or not at all; those that are there are not computed again.
 """
 
 import json
@@ -98,7 +98,7 @@ class Place:
 
 
 def work_off(
-    blocks: Sequence[Block], place: Place, mark: str, tell: Callable[[int], None] | None,
+    blocks: Sequence[Block], place: Place, known: str, tell: Callable[[int], None] | None,
 ) -> list[Callable[[], Found]]:
     """Compute all blocks; return for each, in their order, a function that reads its results.
 
@@ -116,7 +116,7 @@ def work_off(
             before += block.runs
         return [partial(kept.__getitem__, number) for number in range(len(blocks))]
     files = [place.folder / f"{number:06d}.npz" for number in range(len(blocks))]
-    with _owned(place.folder, mark, len(blocks)):
+    with _owned(place.folder, known, len(blocks)):
         missing = [number for number, file in enumerate(files) if not file.exists()]
         _compute(blocks, missing, place,
                  lambda number, found: _write(files[number], found), tell)
@@ -128,12 +128,12 @@ def _tell_after(tell: Callable[[int], None], before: int, runs: int) -> None:
 
 
 @contextmanager
-def _owned(folder: Path, mark: str, count: int) -> Iterator[None]:
+def _owned(folder: Path, known: str, count: int) -> Iterator[None]:
     """A folder that holds this computation, or nothing of any, and is not in use."""
     busy = (f"Another process computes blocks in {folder}; wait for it, or choose another folder.")
     with output_folder(folder), locked(folder / ".lock", busy, keep=True):
         about = folder / _ABOUT
-        stored, wanted = None, {"mark": mark, "blocks": count}
+        stored, wanted = None, {"fingerprint": known, "blocks": count}
         if about.exists():
             with reading(about, "not of fecontact"):
                 stored = from_json(about.read_text(encoding="utf-8"), dict, "it")

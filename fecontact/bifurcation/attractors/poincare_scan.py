@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fecontact.bifurcation.attractors.blocks import Found, Place, work_off
-from fecontact.bifurcation.attractors.marks import mark_of
+from fecontact.bifurcation.attractors.fingerprint import fingerprint
 from fecontact.core.checks import as_count
 from fecontact.core.errors import InputError
 from fecontact.core.errors import shown as text_of
@@ -182,9 +182,9 @@ def poincare_scan(
               for way, chains_of_way in enumerate(ways)
               for first in range(0, len(order), together)]
     blocks = [_Chains(task, points[chosen]) for _, chosen in places]
-    mark = "" if folder is None else task.mark(points, ends, length, down)
+    known = "" if folder is None else task.fingerprint(points, ends, length, down)
     with shown(progress, lambda: progress_bar("Running", sum(one.runs for one in blocks))) as tell:
-        readers = work_off(blocks, place, mark, tell)
+        readers = work_off(blocks, place, known, tell)
     states = np.empty((2, count, keep, state_size(moving)))
     for (way, chosen), read in zip(places, readers, strict=True):
         states[way, chosen.ravel()] = read()["states"]
@@ -211,16 +211,16 @@ class _Task:
                 else self.parameter(self.system, value))
         return in_time("poincare_scan", made)
 
-    def mark(self, values: Array, ends: list[Moving], *settings: Any) -> str:
-        """A mark of all that results depend on, from the systems at both ends."""
+    def fingerprint(self, values: Array, ends: list[Moving], *settings: Any) -> str:
+        """Fingerprint of all numbers that results depend on, from the systems at both ends."""
         name = self.parameter if isinstance(self.parameter, str) else None
         each = self.initial if is_many(self.initial) else [self.initial]
         starts = [start_state(made, one, 0.0) for made in ends for one in each]
         # A name tells what is between the ends, a function does not.
         between = values[1:-1] if name is None else values[:0]
         systems = chain(ends, (self.system_at(value) for value in between.tolist()))
-        return mark_of(systems, name, values, starts, self.transient_periods, self.passes,
-                       self.keep, self.solver, self.rtol, *settings)
+        return fingerprint(systems, name, values, starts, self.transient_periods, self.passes,
+                           self.keep, self.solver, self.rtol, *settings)
 
 
 @dataclass(frozen=True, eq=False)
