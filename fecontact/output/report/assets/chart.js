@@ -24,14 +24,17 @@ function themed(colour) {
   return `rgb(${parts.map((part) => round(part + 0.35 * (255 - part)))})`;
 }
 
+// Labels have the digits that tell them apart, large and small ones with a power of ten.
 function ticks(low, high, most) {
   const rough = (high - low) / most, power = 10 ** floor(Math.log10(rough));
   const step = power * ([1, 2, 5].find((digit) => digit * power >= rough) ?? 10);
   const found = [];
   for (let k = Math.ceil(low / step); k * step <= high + 1e-9 * step; k++) found.push(k * step);
-  const digits = max(0, -floor(Math.log10(step) + 1e-9));
-  return found.map((value) => [value, abs(value) < 1e5 && digits < 5
-    ? value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1") : value.toPrecision(3)]);
+  const place = floor(Math.log10(step) + 1e-9), largest = max(abs(low), abs(high));
+  const label = largest < 1e5 && place > -5 ? (value) => value.toFixed(max(0, -place))
+    : (value) => abs(value) < step / 2 ? "0"
+      : value.toExponential(clamp(floor(Math.log10(abs(value)) + 1e-9) - place, 0, 15)).replace("e+", "e");
+  return found.map((value) => [value, label(value).replace(/^-(0(\.0*)?)$/, "$1")]);
 }
 
 // On a logarithmic axis, of common logarithms: 1, 2, 5 in each decade where there is room, else powers
@@ -131,7 +134,9 @@ class Chart {
         }
       }
       for (const one of this.maps) [low, high] = [min(low, one[name].values[0]), max(high, one[name].values.at(-1))];
-      const room = this.maps.length ? 0 : 0.06 * (high - low) || 0.1 * abs(high) || 1;
+      // A curve that is constant to round-off is drawn as one.
+      const flat = !(high - low > 1e-12 * max(abs(low), abs(high)));
+      const room = this.maps.length ? 0 : flat ? 0.1 * abs(high) || 1 : 0.06 * (high - low);
       const [first, last] = this.ends[name] ?? [];
       return [first ?? low - room, last ?? high + room];
     };
@@ -139,17 +144,19 @@ class Chart {
   }
 
   draw() {
-    const { left, right, top, bottom } = this.inner, c = this.context;
-    const { x, y } = this.limits();
+    const c = this.context, { x, y } = this.limits();
+    const places = (name) => this.log.includes(name) ? decades : ticks, ys = places("y")(...y, this.height / 32);
+    letters(c, "right");
+    // Labels of many digits need a wider margin.
+    this.inner.left = max(52, 10 + max(...ys.map(([, text]) => c.measureText(text).width)));
+    const { left, right, top, bottom } = this.inner;
     this.px = (value) => left + (right - left) * (value - x[0]) / (x[1] - x[0]);
     this.py = (value) => bottom - (bottom - top) * (value - y[0]) / (y[1] - y[0]);
     this.range = { x, y };
     c.clearRect(0, 0, this.width, this.height);
-    letters(c, "right");
     c.strokeStyle = css("grid");
     c.lineWidth = 1;
-    const places = (name) => this.log.includes(name) ? decades : ticks;
-    const xs = places("x")(...x, clamp((right - left) / 70, 2, 10)), ys = places("y")(...y, this.height / 32);
+    const xs = places("x")(...x, clamp((right - left) / 70, 2, 10));
     c.beginPath();
     for (const [value] of xs) { c.moveTo(this.px(value), top); c.lineTo(this.px(value), bottom); }
     for (const [value] of ys) { c.moveTo(left, this.py(value)); c.lineTo(right, this.py(value)); }
