@@ -589,6 +589,53 @@ def test_frequencies_against_calculix(tmp_path, kind):
         (1157.650, 1544.523, 4042.065, 5385.604), rel=2e-4)
 
 
+def distribution(mesh, first=", 1, 0, 0, 0, 1, 0\n", turn=""):
+    """Every other cell has axes of its own."""
+    rows = "".join(f"{k}, 1., 2., .5, -1., 1., .7\n" for k in range(1, len(mesh.cells) + 1, 2))
+    return (f"*DISTRIBUTION, NAME=D, LOCATION=ELEMENT, TABLE=T\n{first}{rows}"
+            f"*ORIENTATION, NAME=O, SYSTEM=RECTANGULAR\nD\n{turn}")
+
+
+def test_frequencies_of_a_distribution_against_calculix(tmp_path):
+    """ccx 2.20 with *FREQUENCY for this deck, fixed at the left."""
+    mesh = block_mesh((6, 3, 2), (0.1, 0.04, 0.03), tetrahedra=True)
+    text = deck("ORTHO", distribution(mesh), ", ORIENTATION=O", mesh)
+    body = ElasticBody(read(tmp_path, text), fixed={"A_left": "xyz"})
+    assert eigenfrequencies_hz(body, 4) == pytest.approx(
+        (1855.988, 3014.366, 4007.273, 7072.389), rel=2e-4)
+
+
+def test_distributions_of_sets_of_a_turned_instance_in_millimetres(tmp_path):
+    """Each cell finds its directions, which turn with the instance and about axis 3."""
+    own = deck("ORTHO", distribution(BLOCK, turn="3, 90.\n"), ", ORIENTATION=O")
+    own, at, rest = own.partition("*MATERIAL")
+    text = (f"*PART, NAME=P\n{own}*END PART\n*ASSEMBLY, NAME=X\n*INSTANCE, NAME=I, PART=P\n"
+            f"0, 0, 1\n0, 0, 0, 0, 0, 1, 90\n*END INSTANCE\n*END ASSEMBLY\n{at}{rest}")
+    mesh = read(tmp_path, text, scale=1e-3)
+    axes = mesh.materials["ALL"].axes.at(ElasticBody(mesh).cell_centres(np.arange(len(mesh.cells))))
+    # Of the other cells: x, turned to y by the instance, and about z to -x.
+    assert axes[1::2, 0] == pytest.approx(np.tile([-1.0, 0.0, 0.0], (len(axes) // 2, 1)), abs=1e-9)
+    third = np.cross([1.0, 2.0, 0.5], [-1.0, 1.0, 0.7])
+    x, y, z = third / np.linalg.norm(third)
+    assert axes[::2, 2] == pytest.approx(np.tile([-y, x, z], (len(axes) // 2, 1)), abs=1e-9)
+    by_set = distribution(BLOCK, first="").split("1, 1., 2.", 1)[0] + (
+        "ALL, 0, 1, 0, 0, 0, 1\n*ORIENTATION, NAME=O\nD\n")
+    found = read(tmp_path, deck("ORTHO", by_set, ", ORIENTATION=O")).materials["ALL"].axes
+    assert found.at(np.zeros((1, 3)))[0] == pytest.approx(np.eye(3)[[1, 2, 0]])
+
+
+@pytest.mark.parametrize(("first", "message"), [
+    ("", r"distribution 'D' has no directions for 36 elements of 'ALL'; add a first line"),
+    (", 1, 0, 0, 0, 1\n", r"distribution 'D' has the line ', 1, 0, 0, 0, 1'; it must be an elem"),
+    ("NONE, 1, 0, 0, 0, 1, 0\n", r"refers to a set 'NONE' that it does not hold"),
+    (", 1, 0, 0, 2, 0, 0\n", r"FieldAxes: along = .* span no plane"),
+])
+def test_bad_distributions_are_refused(tmp_path, first, message):
+    with pytest.raises((MeshError, InputError), match=message) as caught:
+        read(tmp_path, deck("ORTHO", distribution(BLOCK, first), ", ORIENTATION=O"))
+    assert str(caught.value).startswith(str(tmp_path / "a.inp"))
+
+
 def test_orientation_of_a_turned_instance(tmp_path):
     own = deck("ORTHO", "*ORIENTATION, NAME=O\n1, 0, 0, 0, 1, 0\n", ", ORIENTATION=O")
     own, at, rest = own.partition("*MATERIAL")
@@ -603,7 +650,8 @@ def test_orientation_of_a_turned_instance(tmp_path):
     ("*ORIENTATION, NAME=O, SYSTEM=SPHERICAL\n0, 0, 0, 0, 0, 1\n",
      r"the orientation 'O' is given by SYSTEM=SPHERICAL, which is not read"),
     ("*ORIENTATION, NAME=O, DEFINITION=NODES\n1, 2, 3\n", r"given by DEFINITION=NODES"),
-    ("*ORIENTATION, NAME=O\nFIELD\n3, 0\n", r"has the data .*, which are not two points"),
+    ("*ORIENTATION, NAME=O\nFIELD\n3, 0\n",
+     r"has the data .*, which are not two points, nor a \*DISTRIBUTION of directions"),
 ])
 def test_orientations_that_are_not_read_are_warned_of(tmp_path, lines, message):
     with pytest.warns(ModelWarning, match=rf"{message}.*give material to the body\.$"):

@@ -50,7 +50,7 @@ from fecontact.fem.mesh_files.abaqus_materials import Given, material, orientati
 from fecontact.fem.mesh_files.abaqus_temperatures import is_temperature, temperature_of
 from fecontact.fem.mesh_files.coordinates import cartesian
 from fecontact.fem.mesh_files.distributed_loads import DistributedLoads
-from fecontact.fem.mesh_files.raw import NODES, PLANE, SOLID, RawMesh
+from fecontact.fem.mesh_files.raw import CORNERS, NODES, PLANE, SOLID, RawMesh
 
 _PLANE = re.compile(r"(?:C(?:PS|PE|PEG|GPE)|DC2D|AC2D|M3D|R3D|SFM3D|STRI|S)(\d)")
 _PLANE_KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
@@ -442,6 +442,7 @@ class _Assembly:
         self.sections: list[tuple[_Part | None, Options]] = []
         self.materials: dict[str, dict[str, Given]] = {}
         self.orientations: dict[str, Given] = {}
+        self.distributions: dict[str, list[str]] = {}
 
     def add(self, keyword: str, options: Options, lines: list[str]) -> None:
         part = self.current
@@ -489,6 +490,8 @@ class _Assembly:
                 self.materials[options["NAME"].upper()] = {}
             case "ORIENTATION":
                 self.orientations[options["NAME"].upper()] = options, lines
+            case "DISTRIBUTION":
+                self.distributions[options["NAME"].upper()] = lines
             case "ELASTIC" | "DENSITY" | "DAMPING" | "EXPANSION" if self.materials:
                 self.materials[next(reversed(self.materials))][keyword] = options, lines
             case _ if is_temperature(keyword, options):
@@ -573,19 +576,48 @@ class _Assembly:
         bodies: "list[_Instance]",
     ) -> AnisotropicMaterial | str:
         """Material of a section in its orientation, placed as its part; or what is not read."""
+        own = [one for one in bodies if part is not None and (
+            one.part is part or self.parts.get(one.source) is part)]
         if wanted:
-            axes = orientation(wanted, self.orientations)
+            axes = orientation(wanted, self.orientations,
+                               lambda word: self._directions(word, name, own))
             if isinstance(axes, str):
                 return axes
             made = replace(made, axes=axes)
-        own = [one for one in bodies if part is not None and (
-            one.part is part or self.parts.get(one.source) is part)]
         placements = {one.placement for one in own}
         if len(placements) > 1:
             return (f"the section of '{name}' has a material with axes, and its part has instances "
                     f"in different places")
         placement = next(iter(placements), None)
         return made if placement is None else made.moved(*placement.matrix)
+
+    def _directions(
+        self, word: str, name: str, bodies: "list[_Instance]"
+    ) -> tuple[Array, Array, Array] | None:
+        """Centres of the elements of a set, and two directions there by a *DISTRIBUTION.
+
+        None for other words. The first line without an element holds for all that no other names.
+        """
+        if word.upper() not in self.distributions or not bodies:
+            return None
+        one, mesh = bodies[0], bodies[0].numbered
+        given = np.full((len(mesh.elements.numbers), 6), np.nan)
+        for line in self.distributions[word.upper()]:
+            of, *words = _words(line)
+            try:
+                a, b, c, d, e, f = map(float, words)
+            except ValueError:
+                raise MeshError(f"The distribution '{word}' has the line {shown(line)}; it must be "
+                                f"an element or a set, and two directions of three numbers."
+                                ) from None
+            which = mesh.elements_of(_members(one, "elements", of)) if of else slice(None)
+            given[which] = a, b, c, d, e, f
+        held = mesh.elements_of(_members(one, "elements", name))
+        without = held[np.isnan(given[held]).any(axis=1)]
+        if len(without):
+            raise MeshError(f"The distribution '{word}' has no directions for {len(without)} "
+                            f"elements of '{name}'; add a first line without an element.")
+        return mesh.centres[held], given[held, :3], given[held, 3:]
 
     def point_elements(
         self, part: "_Part | None", name: str, owners: "list[_Instance]"
@@ -935,12 +967,22 @@ class _NumberedMesh:
                 found.append(_positions(self.nodes, member))
         return np.unique(np.concatenate(found))
 
+    @property
+    def centres(self) -> Array:
+        """Mean places (m, 3) of the corners of all elements."""
+        return np.concatenate([self.places[rows[:, : CORNERS.get(kind, 2)]].mean(axis=1)
+                               for kind, rows in self.cells.items()])
+
+    def elements_of(self, members: Members) -> Integers:
+        """Positions of the elements of a set."""
+        found = [_positions(self.elements, member) for member in members
+                 if not isinstance(member, _NodesOf)]
+        return np.unique(np.concatenate([np.empty(0, np.int64), *found]))
+
     def held(self, members: Members) -> list[tuple[str, Integers]]:
         """Elements of a set by kind, by the positions of their nodes."""
         chosen = np.zeros(len(self.elements.numbers), bool)
-        for member in members:
-            if not isinstance(member, _NodesOf):
-                chosen[_positions(self.elements, member)] = True
+        chosen[self.elements_of(members)] = True
         found = []
         for kind, rows in self.cells.items():
             mine, chosen = chosen[:len(rows)], chosen[len(rows):]

@@ -1,18 +1,14 @@
 """Materials and orientations of Abaqus and CalculiX input files."""
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from fecontact.core.errors import (
-    InputError,
-    MeshError,
-    ModelWarning,
-    shown,
-)
+from fecontact.core.errors import InputError, MeshError, ModelWarning, shown
+from fecontact.core.types import Array
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
-from fecontact.fem.material_axes import CylindricalAxes, MaterialAxes
+from fecontact.fem.material_axes import AnyAxes, CylindricalAxes, FieldAxes, MaterialAxes
 from fecontact.fem.mesh_files.abaqus_keywords import Options
 
 Given = tuple[Options, list[str]]
@@ -77,8 +73,17 @@ def _expansion(name: str, given: Mapping[str, Given], isotropic: bool) -> float:
     return 0.0
 
 
-def orientation(name: str, given: Mapping[str, Given]) -> MaterialAxes | CylindricalAxes | str:
+def orientation(
+    name: str, given: Mapping[str, Given], field: Callable[[str], tuple[Array, Array, Array] | None]
+) -> AnyAxes | str:
     """Axes that a line *ORIENTATION of the file gives; or why they are not read.
+
+    Parameters
+    ----------
+    name, given
+        Name of the orientation, and all of the file.
+    field : callable of str
+        Places and two directions at each by the name of a line *DISTRIBUTION; None for other words.
 
     Raises
     ------
@@ -91,16 +96,20 @@ def orientation(name: str, given: Mapping[str, Given]) -> MaterialAxes | Cylindr
     if system not in ("RECTANGULAR", "CYLINDRICAL") or by != "COORDINATES":
         other = f"SYSTEM={system}" if by == "COORDINATES" else f"DEFINITION={by}"
         return f"the orientation '{name}' is given by {other}, which is not read"
+    directions = field(lines[0].strip(" ,")) if lines and system == "RECTANGULAR" else None
     try:
+        points = lines if directions is None else ["0, 0, 0, 0, 0, 0", *lines[1:]]
         values, turn = ([float(word or 0) for word in line.rstrip(", ").split(",")]
-                        for line in [*lines, "1, 0"][:2])
+                        for line in [*points, "1, 0"][:2])
         (ax, ay, az, bx, by_, bz), rest = values[:6], values[6:]
         about, angle = int(turn[0]), (*turn[1:], 0.0)[0]
     except (ValueError, IndexError):
         return (f"the orientation '{name}' has the data {shown('; '.join(lines))}, which are not "
-                f"two points (a field of directions is not read)")
+                f"two points, nor a *DISTRIBUTION of directions for axes of the system RECTANGULAR")
     a, b, c = np.array((ax, ay, az)), np.array((bx, by_, bz)), np.array((*rest, 0.0, 0.0, 0.0)[:3])
     try:
+        if directions is not None:
+            return FieldAxes(*directions, about, angle)  # type: ignore[arg-type]
         if system == "CYLINDRICAL":
             return CylindricalAxes(tuple(a), tuple(b - a), about, angle)  # type: ignore[arg-type]
         return MaterialAxes(tuple(a - c), tuple(b - c), about, angle)  # type: ignore[arg-type]

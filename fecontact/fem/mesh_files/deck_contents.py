@@ -15,8 +15,8 @@ from fecontact.fem.mesh_files.distributed_loads import DistributedLoads
 # Keywords of the mesh and its materials, besides those of constraints.
 _MESH = ("", "NODE", "ELEMENT", "SYSTEM", "NSET", "ELSET", "SURFACE", "PART", "END PART",
          "INSTANCE", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY", "SOLID SECTION", "MATERIAL",
-         "ELASTIC", "DENSITY", "DAMPING", "EXPANSION", "ORIENTATION", "INCLUDE", "HEADING",
-         "PREPRINT")
+         "ELASTIC", "DENSITY", "DAMPING", "EXPANSION", "ORIENTATION", "DISTRIBUTION",
+         "DISTRIBUTION TABLE", "INCLUDE", "HEADING", "PREPRINT")
 # Loads and supports, which a study gives, of Abaqus, Nastran and Ansys.
 _LOADS = ("BOUNDARY", "CLOAD", *LOADS, "TEMPERATURE", "INITIAL CONDITIONS",
           "FORCE", "MOMENT", "PLOAD4", "GRAV", "SPC", "SPC1", "F", "D", "SFE", "ACEL", "OMEGA")
