@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import combinations
 
 import meshio
 import numpy as np
@@ -26,6 +27,7 @@ from fecontact import (
 from fecontact.fem import BodyFields, Tie, stress_of
 from fecontact.fem.body_forces import boundary_facets, boundary_forces
 from fecontact.fem.contact_face import contact_groups
+from fecontact.fem.elements.cell_geometry import sides_of
 from fecontact.fem.elements.cell_kinds import (
     CELL_KINDS,
     HEXAHEDRON,
@@ -311,6 +313,10 @@ def test_contact_nodes_on_a_face_of_both_shapes(elements, count):
     own = np.bincount(shapes.outline_nodes + 1, parts.areas)[1:]
     assert own == pytest.approx(basis.tributary, rel=1e-12)
     assert (contact_facets(basis).at_cells(shapes.cells, len(shapes.nodes)) >= 0).any()
+    # Facets of pictures and files are sides of cells, or halves of four-sided ones.
+    sides = {frozenset(three) for side in sides_of(shapes.cells, 3)[0].tolist()
+             for three in combinations(side, 3)}
+    assert {frozenset(facet) for facet in shapes.outline.tolist()} <= sides
 
 
 @ELEMENTS
@@ -406,6 +412,35 @@ def test_written_mixed_meshes_are_read_again(tmp_path, curved, bricks):
     if not curved and bricks == "full":
         fine = meshio.read(path)
         assert sum(len(block.data) for block in fine.cells if block.dim == 3) == len(mesh.cells)
+
+
+@pytest.mark.parametrize("bricks", ["full", "serendipity"])
+def test_gmsh_integrates_the_volume_of_a_written_curved_mesh(tmp_path, bricks):
+    """Nodes in the middles of edges, faces and cells stand in its order."""
+    gmsh = pytest.importorskip("gmsh")
+    mesh = mixed_mesh((1, 2, 2))
+    edges = mesh.edges[0]
+    edges = edges[(mesh.nodes[edges][:, :, 2] == 0.05).all(axis=1)]
+    middles = mesh.nodes[edges].mean(axis=1) + np.array([0.0, 0.0, 0.004])
+    mesh = Mesh(mesh.nodes, mesh.cells, {}, {}, edges, middles, bricks=bricks)
+    write_mesh(mesh, tmp_path / "a.msh")
+    volume, names = 0.0, set()
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(tmp_path / "a.msh"))
+        for kind in gmsh.model.mesh.getElementTypes(3):
+            names.add(gmsh.model.mesh.getElementProperties(kind)[0])
+            points, weights = gmsh.model.mesh.getIntegrationPoints(kind, "Gauss8")
+            determinants = gmsh.model.mesh.getJacobians(kind, points)[1]
+            assert determinants.min() > 0.0
+            volume += (determinants.reshape(-1, len(weights)) * weights).sum()
+    finally:
+        gmsh.finalize()
+    assert names == {"Tetrahedron 10", *(
+        {"Hexahedron 27", "Prism 18", "Pyramid 14"} if bricks == "full" else
+        {"Hexahedron 20", "Prism 15", "Pyramid 13"})}
+    assert volume == pytest.approx(mesh.volume, rel=1e-11)
 
 
 def test_faces_of_four_sides_do_not_meet_triangles():
