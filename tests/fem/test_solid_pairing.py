@@ -12,30 +12,31 @@ from fecontact.fem.faces.contact_patches import face_surface
 from fecontact.fem.faces.frames import tangents_of
 from fecontact.fem.faces.solid_pairing import closest_places
 
-KINDS = pytest.mark.parametrize("tetrahedra", [False, True])
 
 
 def below(counts=(4, 2, 1), size=(0.2, 0.1, 0.05), *, shift=(0.0, 0.0, 0.0), turn=0.0, **options):
     """A block whose top lies at z = 0, moved."""
     body = block_body(counts, size, **options)
     return ElasticBody(body.mesh.placed(shift=(shift[0], shift[1], shift[2] - size[2])).placed(
-        rotation=turn), degree=body.degree)
+        rotation=turn), degree=body.degree, bricks=body.bricks)
 
 
 def turned(body, angles):
-    return ElasticBody(body.mesh.placed(rotation=angles), degree=body.degree)
+    return ElasticBody(body.mesh.placed(rotation=angles), degree=body.degree, bricks=body.bricks)
 
 
 def rigid(places, about, shift, turn):
     return (shift + np.cross(turn, places - about)).ravel()
 
 
-@KINDS
+@pytest.mark.parametrize("cells", ["hexahedra", "tetrahedra", "serendipity"])
 @pytest.mark.parametrize("nodes", ["all", 8])
 @pytest.mark.parametrize("angles", [(0.0, 0.0, 0.0), (0.0, 90.0, 0.0), (30.0, 20.0, 70.0)])
-def test_common_motion_of_both_bodies_moves_no_contact_node(tetrahedra, nodes, angles):
+def test_common_motion_of_both_bodies_moves_no_contact_node(cells, nodes, angles):
     """Meshes that do not match, a gap of 1 mm, any direction of the face."""
-    upper = turned(block_body((4, 2, 1), tetrahedra=tetrahedra), angles)
+    tetrahedra = cells == "tetrahedra"
+    upper = turned(block_body((4, 2, 1), tetrahedra=tetrahedra, bricks=(
+        cells if cells == "serendipity" else "full")), angles)
     lower = turned(below((6, 3, 2), (0.3, 0.2, 0.1), shift=(-0.05, -0.05, -1e-3),
                          tetrahedra=not tetrahedra, degree=1), angles)
     pairing = pair_faces({"a": upper, "b": lower}, "a.contact", "b.top", nodes=nodes,
@@ -56,12 +57,12 @@ def test_common_motion_of_both_bodies_moves_no_contact_node(tetrahedra, nodes, a
     assert moved.reshape(-1, 6)[:, 3:] == pytest.approx(0.0, abs=1e-10)
 
 
-@KINDS
-@pytest.mark.parametrize("degree", [1, 2])
-def test_uniform_pressure_is_even_on_both_sides_of_matching_meshes(tetrahedra, degree):
+@pytest.mark.parametrize("elements", [
+    {"degree": 1}, {"degree": 2}, {"degree": 1, "tetrahedra": True},
+    {"degree": 2, "tetrahedra": True}, {"bricks": "serendipity"}])
+def test_uniform_pressure_is_even_on_both_sides_of_matching_meshes(elements):
     """The patch test: one node a facet; on both sides the consistent loads of the faces."""
-    upper = block_body((4, 2, 1), tetrahedra=tetrahedra, degree=degree)
-    lower = below(tetrahedra=tetrahedra, degree=degree)
+    upper, lower = block_body((4, 2, 1), **elements), below(**elements)
     pairing = pair_faces({"a": upper, "b": lower}, "a.contact", "b.top", nodes_on="face")
     force = np.zeros((len(pairing.tributary), 6))
     force[:, 2] = pairing.tributary
