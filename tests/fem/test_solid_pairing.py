@@ -13,7 +13,6 @@ from fecontact.fem.faces.frames import tangents_of
 from fecontact.fem.faces.solid_pairing import closest_places
 
 
-
 def below(counts=(4, 2, 1), size=(0.2, 0.1, 0.05), *, shift=(0.0, 0.0, 0.0), turn=0.0, **options):
     """A block whose top lies at z = 0, moved."""
     body = block_body(counts, size, **options)
