@@ -13,6 +13,7 @@ from solid_blocks import block_mesh, mixed_mesh
 import fecontact.fem.assembly as assembly
 import fecontact.fem.elastic_body as elastic_body
 from fecontact import (
+    BoundaryLoad,
     ElasticBody,
     Load,
     Material,
@@ -478,6 +479,21 @@ def test_frequencies_of_second_order_decks_are_those_of_calculix(
     squares = eigsh(body.stiffness, 12, M=body.mass, sigma=-1e6, return_eigenvectors=False)
     assert np.sqrt(np.sort(squares)[6:]) == pytest.approx(2.0 * np.pi * np.array(expected),
                                                           rel=tolerance)
+
+
+def test_pressure_on_bricks_of_twenty_nodes_bends_as_in_calculix(tmp_path):
+    """A bar of 8 x 2 x 1 cells C3D20, clamped, 3e4 Pa on its top; CalculiX 2.20 by *DLOAD."""
+    block = block_mesh((8, 2, 1), SIZE)
+    nodes, cells = second_order(block.nodes, block.cells, HEXAHEDRON)
+    surface = "*SURFACE, NAME=TOP\n" + "".join(f"{k}, S2\n" for k in range(1, len(cells) + 1))
+    held = "*NSET, NSET=LEFT\n" + "".join(
+        f"{k},\n" for k in np.flatnonzero(nodes[:, 0] < 1e-9) + 1)
+    mesh = read_mesh(deck(tmp_path / "a.inp", nodes, cells, extra=surface + held))
+    body = ElasticBody(mesh, fixed={"LEFT": "xyz"})
+    moved = static_solution(body, Load(boundaries=[BoundaryLoad("TOP", pressure=3e4)]))
+    tip = int(np.linalg.norm(mesh.nodes - SIZE, axis=1).argmin())
+    assert moved.displacement[tip] == pytest.approx(
+        [2.795006e-06, 4.039742e-10, -4.184652e-05], rel=1e-6, abs=1e-13)
 
 
 def test_wedges_at_two_points_bend_as_those_of_calculix(tmp_path, monkeypatch):
