@@ -13,7 +13,9 @@ from fecontact.bifurcation import (
     torus_branch,
     torus_motion,
 )
+from fecontact.bifurcation.harmonic.layout import layout_of
 from fecontact.bifurcation.tori import branches as tori
+from fecontact.bifurcation.tori.elements import elements_of
 from fecontact.core.errors import InputError
 from fecontact.laws import (
     Constant,
@@ -66,8 +68,8 @@ def in_space():
                              fc.PointLoad("P", "z", signal=Harmonic(0.2, FIRST_HZ)))))
 
 
-def steady(system, begin=60.0, time=30.0):
-    run = fc.simulate(system, begin + time, rtol=1e-9,
+def steady(system, begin=60.0, time=30.0, initial=None):
+    run = fc.simulate(system, begin + time, initial=initial, rtol=1e-9,
                       outputs=np.append(0.0, np.linspace(begin, begin + time, 3001)))
     return run.between(begin)
 
@@ -106,19 +108,44 @@ def test_samples_and_harmonics_converge_to_a_long_run(system):
 def test_an_element_that_never_slides_is_a_spring():
     force = fc.PointLoad("P", "x", signal=Constant(3.0))
     system = oscillator(JENKINS, 0.3, 1.0, 0.8, force, press=100.0)
-    run = steady(system, 120.0)
+    run = steady(system, 120.0, initial=[0.05, 0.0, 0.02])
     point = one(system, run, TorusBalance(2))
     motion = torus_motion(point)
     for k, f, size in (((1, 0), FIRST_HZ, 1.0), ((0, 1), SECOND_HZ, 0.8)):
         w = 2.0 * np.pi * f
         exact = size / abs(2.0 * STIFFNESS - w * w + 0.3j * w)
         assert abs(motion.harmonic(*k)[0]) == pytest.approx(exact, rel=1e-9)
-    # It keeps the deflection that it began with.
-    assert motion.harmonic(0, 0)[[0, 2]].real == pytest.approx(
-        [3.0 / STIFFNESS, 0.0], abs=1e-6)
+    # It keeps what it was ahead of the mass: 30 x + 30 (x - 0.03) = 3.
+    assert motion.harmonic(0, 0)[[0, 2]].real == pytest.approx([0.065, 0.035], abs=1e-6)
+    finer = torus_motion(one(system, point, TorusBalance(3)))
+    assert finer.harmonic(0, 0) == pytest.approx(motion.harmonic(0, 0), abs=1e-6)
     assert misfit(motion, run, 3) < 1e-5
     decay = np.exp(-0.15 / FIRST_HZ)
     assert point.values["multipliers"] == pytest.approx([1.0, decay, decay], rel=1e-5)
+
+
+def test_on_a_circle_the_force_lags_behind_the_velocity():
+    """An element that slides on a circle of radius R has sin(psi) = limit / R, in steady motion."""
+    field = contact_field(in_space(), [MU])
+    elements = elements_of(field, layout_of(field))
+    radius, f = 0.03, 1.3
+    X = np.zeros((9, 3))
+    X[1, 0] = X[2, 1] = radius
+    limit = elements.friction(1e3 * X, (1, 1), (f, 0.7 * f), np.arange(8) / 8, 3,
+                              field.values).deflections
+    limit = np.linalg.norm(limit[0, 0])
+    assert limit < radius
+    errors = []
+    for P in (40, 80):
+        tau = np.arange(P) / P
+        found = elements.friction(X, (1, 1), (f, 0.7 * f), tau, 3, field.values)
+        along = np.stack([-np.sin(2.0 * np.pi * tau), np.cos(2.0 * np.pi * tau)], axis=1)
+        z = found.deflections
+        assert np.linalg.norm(z, axis=2) == pytest.approx(np.full(z.shape[:2], limit), rel=1e-12)
+        angle = np.arccos((z * along).sum(axis=2) / limit)
+        errors.append(np.abs(angle - np.arcsin(limit / radius)).max())
+        assert found.forces[:, :, 0] == pytest.approx(STIFFNESS * z)
+    assert errors[1] < min(2e-3, 0.3 * errors[0])
 
 
 def test_a_second_tone_of_nothing_leaves_the_orbit():
