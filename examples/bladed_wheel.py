@@ -25,23 +25,18 @@ from fecontact.reduction import PointPairing, cyclic_basis_from_bases, sector_mo
 sectors, order, speed = 12, 4, 900.0  # engine order; rad/s
 
 # %%
-# The sector: a grid over radius and angle, of which the outer part is the blade alone.
+# The sector: a grid over angle and radius, of which the outer part is the blade alone.
 radii = np.concatenate([np.linspace(0.175, 0.2, 4), np.linspace(0.2, 0.32, 9)[1:]])
-flat = fc.Mesh.grid(np.linspace(0.0, 2.0 * np.pi / sectors, 9), radii)
-angle, radius = flat.nodes.T
-middle = np.abs(angle - np.pi / sectors) < 1.1 * np.pi / 4.0 / sectors
-cells = flat.cells[(middle | (radius < 0.201))[flat.cells].all(axis=1)]
-used, numbers = np.unique(cells, return_inverse=True)
-places = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
-new = dict(zip(used.tolist(), range(len(used)), strict=True))
-sides = {name: [[new[k] for k in edge] for edge in flat.boundary(side).tolist()
-                if new.keys() >= set(edge)] for name, side in (("low", "left"), ("high", "right"))}
-mesh = fc.Mesh(places[used], numbers.reshape(cells.shape)[:, ::-1], sides)
+grid = fc.Mesh.grid(np.linspace(0.0, 2.0 * np.pi / sectors, 9), radii)
+angle, radius = grid.nodes.T
+inside = (radius < 0.201) | (np.abs(angle - np.pi / sectors) < 1.1 * np.pi / 4.0 / sectors)
+mesh = grid.part(inside[grid.cells].all(axis=1)).mapped(
+    lambda at: at[:, 1:] * np.column_stack([np.cos(at[:, 0]), np.sin(at[:, 0])]))
 body = fc.ElasticBody(mesh, thickness=0.02)
 
 # %%
 # Frequencies over the nodal diameter, at rest and at speed.
-symmetry = CyclicSymmetry("low", "high", sectors)
+symmetry = CyclicSymmetry("left", "right", sectors)
 wheel = sector_modes(body, symmetry, 3)
 turning = sector_modes(body, symmetry, 16, rotation=Rotation(speed)).rotation
 forward, backward = turning.frequencies_hz(speed)

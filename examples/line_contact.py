@@ -27,8 +27,7 @@ deep = np.concatenate([[0.0], np.cumsum(np.append(b / 16.0, growing))])
 mesh = fc.Mesh.grid(np.concatenate([-half[:0:-1], half]), deep)
 low = mesh.boundary("bottom")
 mesh = fc.Mesh(mesh.nodes, mesh.cells, {
-    "top": mesh.boundary("top"),
-    "contact": low[np.abs(mesh.nodes[low, 0].mean(axis=1)) < 1.6 * b]})
+    **mesh.boundaries, "contact": low[np.abs(mesh.nodes[low, 0].mean(axis=1)) < 1.6 * b]})
 # The tool that pushes the block on its top keeps it from tipping.
 tool = Coupling("top", "tool", place=(0.0, deep[-1]), kind="distributing")
 body = fc.ElasticBody(mesh, steel, plane="strain", constraints=[tool], fixed={"tool": "phi"})

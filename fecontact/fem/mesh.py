@@ -1,9 +1,9 @@
 """Meshes of plane bodies and of solids, with named boundaries and points."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -524,6 +524,94 @@ class Mesh(Summarised):
                     self.bricks, [one.turned(turn * signs, by) for one in self.attachments],
                     self.temperature, self.node_numbers)
 
+    def part(self, cells: Any) -> "Mesh":
+        """Mesh of some of the cells, with what is left of boundaries, points and groups of cells.
+
+        Parameters
+        ----------
+        cells : (M,) array of bool, or (k,) integer array
+            Whether each cell is taken, or numbers of cells.
+
+        Raises
+        ------
+        InputError
+            For no cells, for numbers that do not exist, and for meshes with curved edges,
+            constraints, attachments or temperatures.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from fecontact import Mesh
+        >>> plate = Mesh.grid(np.linspace(0.0, 0.2, 5), np.linspace(0.0, 0.1, 3))
+        >>> corner = plate.part([0, 1])
+        >>> len(corner.cells), sorted(corner.boundaries)
+        (2, ['bottom', 'left'])
+        """
+        if len(self.curved_edges) or self.constraints or self.attachments or (
+                self.temperature is not None):
+            raise InputError("Mesh.part: a mesh with curved edges, constraints, attachments or "
+                             "temperatures cannot be cut; leave out cells before these are added.")
+        count, chosen = len(self.cells), np.asarray(cells)
+        try:
+            kept = np.arange(count)[chosen.astype(int) if not chosen.size else chosen]
+        except IndexError:
+            raise InputError(f"Mesh.part: cells must be numbers from 0 to {count - 1}, or {count} "
+                             f"flags.") from None
+        if not kept.size:
+            raise InputError("Mesh.part: give at least one cell.")
+        used, corners = np.unique(self.cells[kept], return_inverse=True)
+        number = np.full(len(self.nodes), -1)
+        number[used] = np.arange(len(used))
+        made = Mesh(self.nodes[used], corners.reshape(len(kept), -1))
+        on_outline = {name: number[sides] for name, sides in self.boundaries.items()}
+        place = np.full(len(self.cells), -1)
+        place[kept] = np.arange(len(kept))
+        groups = {name: place[members] for name, members in self.cell_groups.items()}
+        points = {name: number[np.atleast_1d(nodes)] for name, nodes in self.points.items()}
+        return replace(
+            made, bricks=self.bricks, materials=self.materials,
+            boundaries=_left(on_outline, lambda sides: (sides >= 0).all(axis=1) & (
+                row_numbers(unordered(made.outline), unordered(sides)) >= 0)),
+            points=_left(points, lambda nodes: nodes >= 0),
+            cell_groups=_left(groups, lambda members: members >= 0),
+            node_numbers=None if self.node_numbers is None else self.node_numbers[used])
+
+    def mapped(self, place: Callable[[Array], ArrayLike]) -> "Mesh":
+        """The mesh with its nodes at other places, such as a grid bent to a ring.
+
+        Parameters
+        ----------
+        place : function
+            Gives the new places of nodes (N, 2) or (N, 3) from their places [m]. Where it turns
+            the orientation over, cells are turned too.
+
+        Raises
+        ------
+        InputError
+            For places of another shape, and for meshes with constraints or attachments.
+        MeshError
+            For cells that are folded or overlap there.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from fecontact import Mesh
+        >>> strip = Mesh.grid(np.linspace(0.0, np.pi / 2.0, 9), np.linspace(1.0, 2.0, 3))
+        >>> ring = strip.mapped(lambda x: x[:, 1:] * np.column_stack([np.cos(x[:, 0]),
+        ...                                                           np.sin(x[:, 0])]))
+        >>> round(ring.area, 2)  # 3/4 pi without the chords
+        2.34
+        """
+        if self.constraints or self.attachments:
+            raise InputError("Mesh.mapped: a mesh with constraints or attachments, whose places "
+                             "are given too, cannot be mapped; add these afterwards.")
+        nodes, middles = (as_floats(place(one), "Mesh.mapped: places") if len(one) else one
+                          for one in (self.nodes, np.asarray(self.curved_middles)))
+        if nodes.shape != self.nodes.shape:
+            raise InputError(f"Mesh.mapped: the places must have the shape {self.nodes.shape}, not "
+                             f"{nodes.shape}.")
+        return replace(self, nodes=nodes, curved_middles=middles)
+
     def summary(self) -> list[tuple[str, str]]:
         """Counts, size and named groups."""
         solid = self.dimension == 3
@@ -577,6 +665,14 @@ class Mesh(Summarised):
                 f"its boundaries are: {choices(self.boundaries)}."
             )
         return self.boundaries[name]
+
+
+def _left(
+    named: Mapping[str, Integers], stays: Callable[[Integers], Any]
+) -> dict[str, Integers]:
+    """Named groups without the rows that are gone; none that would be empty."""
+    found = {name: rows[stays(rows)] for name, rows in named.items()}
+    return {name: rows for name, rows in found.items() if len(rows)}
 
 
 def _turn(degrees: float) -> Array:

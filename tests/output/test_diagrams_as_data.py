@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
+from report_reading import stored_array, unpacked
 
 from fecontact.output.diagrams.diagram import Band, Curve, Diagram, Level, Mark
 from fecontact.output.diagrams.labels import in_unit
@@ -11,7 +12,7 @@ from fecontact.output.diagrams.maps import Map, Scale, borders
 from fecontact.output.plots.drawing import colour_bar, draw, legend_entries
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.report.charts import diagram_table
-from fecontact.output.report.payload import Payload, stored_array, unpacked
+from fecontact.output.report.payload import Payload
 
 X = np.geomspace(1e-6, 4e-4, 41)
 STABLE = np.arange(40) < 25

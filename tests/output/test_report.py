@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from joined_bodies import stack_run
-from report_reading import Shown
+from report_reading import Shown, stored_array, unpacked
 from synthetic import basis, run
 from tiny_study import TINY
 
@@ -16,7 +16,8 @@ from fecontact.cli import execute
 from fecontact.cli.templates import template
 from fecontact.io import report
 from fecontact.output.files.frames import contact_forces
-from fecontact.output.report import page, payload
+from fecontact.output.report import page
+from fecontact.output.report.payload import Payload
 
 EVIL = "</script><img src=x onerror=\"document.title='broken'\"><script>alert(1)</script>"
 
@@ -166,11 +167,11 @@ def test_each_face_of_several_bodies_has_its_map_and_its_curve(tmp_path):
 ])
 @pytest.mark.parametrize("later", [False, True])
 def test_arrays_come_back_to_within_half_a_step(values, step, later):
-    block = payload.Payload()
+    block = Payload()
     block.add(np.arange(3), 1.0, later)
     described = block.add(values, step, later)
-    header, content = payload.unpacked(block.block({"found": described}))
-    found = payload.stored_array(header["found"], content)
+    header, content = unpacked(block.block({"found": described}))
+    found = stored_array(header["found"], content)
     assert found.shape == values.shape
     error = np.abs(found - values).reshape(len(values), int(np.prod(values.shape[1:])))
     assert (error <= 0.5000001 * np.broadcast_to(step, error.shape)).all()
