@@ -35,13 +35,13 @@ _SAME = 1e-9
 
 @dataclass(frozen=True)
 class CyclicSymmetry:
-    """Faces of a sector that meet its neighbours, and the wheel that N sectors make.
+    """Cyclic symmetry: both faces of a sector to its neighbours, and the number of sectors.
 
     Parameters
     ----------
     low, high : str
-        Boundaries of the mesh; ``high`` is ``low`` turned by 360 / N degrees, counter-clockwise
-        seen against the axis. Their nodes must match unless they are tied.
+        Boundaries of the mesh; ``high`` is ``low`` turned by 360 / N degrees about the axis by the
+        right-hand rule. Their nodes must match unless they are tied.
     sectors : int
         N, two or more.
     centre : (x, y) or (x, y, z)
@@ -139,10 +139,11 @@ class CyclicSymmetry:
 @read_only_arrays
 @dataclass(frozen=True, eq=False)
 class SectorNodes:
-    """Nodes of a sector with neighbours: ``low``, ``high`` and ``on_axis``, without each other.
+    """Nodes of a sector on its faces ``low`` and ``high``, and ``on_axis``; no node is in two.
 
-    Low and high ones are pairs (p,). Where faces are tied, they are no pairs, and displacements of
-    ``high`` are those of all nodes by ``weights``, sparse (d h, d N), turned.
+    ``low[i]`` and ``high[i]`` are the two places of one node of the wheel. Tied faces have no such
+    pairs: displacements of ``high`` are then ``weights``, sparse (d h, d N), times those of all
+    nodes, turned by one sector.
     """
 
     low: Integers

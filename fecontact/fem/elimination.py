@@ -32,17 +32,17 @@ _UNSEEN = 1e-12
 @read_only_arrays
 @dataclass(frozen=True, eq=False)
 class Elimination:
-    """All unknowns from those that are left where equations are substituted into each other.
+    """Independent unknowns p of a body with constraints: all unknowns are ``G p``.
 
     Attributes
     ----------
     matrix : sparse (n, p) array
-        G: displacements, angles of hinges and motions of reference points from the p left.
+        G: displacements, angles of hinges and motions of reference points from p.
     numbers : (p,) integers
-        Number of each of these among all n.
+        Number of each independent unknown among all n.
     rest : sparse (m, p) array
-        Rows R of the equations ``R p = 0`` between them, each with a largest coefficient of one:
-        those that substitution does not solve, mostly of many unknowns.
+        Equations ``R p = 0`` that remain, mostly of many unknowns, since they were not solved for
+        one of these. The largest coefficient of each row is one.
     displacements : int
         Number of displacements, the first of the n unknowns.
     """

@@ -54,7 +54,7 @@ class BodyFields(Summarised):
         In x, y (, z) [m].
     stress : (N, 4) array, of a solid (N, 6)
         Stresses xx, yy, zz, xy (, yz, xz), means over the adjacent elements [Pa]. After large
-        deflections these are the second ones of Piola and Kirchhoff, in axes that turn with the
+        deflections these are second Piola-Kirchhoff stresses, in axes that turn with the
         material; see :attr:`cauchy_stress`.
     temperature : (N,) array or None
         Change of temperature at the nodes, whose expansion makes no stress [K].
@@ -182,8 +182,8 @@ def stress_of(
     axes : 'global' or 'material'
         Axes of the components.
     finite : bool
-        True for Green and Lagrange's strain, whose stress is the second one of Piola and Kirchhoff:
-        its components belong to axes that turn with the material.
+        True for Green-Lagrange strains and second Piola-Kirchhoff stresses, whose components belong
+        to axes that turn with the material.
     factors : (9 M, m) array, optional
         Factors of incompatible modes of bricks, by cell, mode and axis; by default those without
         force in linear elasticity.

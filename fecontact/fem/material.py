@@ -113,7 +113,8 @@ class AnisotropicMaterial:
     """Linear elastic material with a stiffness in its own axes.
 
     ``stress = stiffness @ strain`` in axes 1, 2, 3 of the material, with the components 11, 22,
-    33, 12, 23, 13 and engineering strains of shear (twice the tensor's components).
+    33, 12, 23, 13 and engineering strains of shear (twice the tensor's components). Abaqus lists
+    13 before 23; readers of its decks change the order.
     :meth:`orthotropic` and :meth:`transversely_isotropic` take engineering constants.
 
     Parameters

@@ -39,7 +39,7 @@ class PretensionSection:
     Raises
     ------
     InputError
-        For a place or direction that is none.
+        For a place that is not finite, or a direction that is not finite or zero.
     """
 
     at: Annotated[Coordinates, Unit("m")]
@@ -54,7 +54,7 @@ class PretensionSection:
 
 
 def with_pretension(mesh: Mesh, name: str, section: PretensionSection) -> Mesh:
-    """The mesh cut by a section, with a tie of both faces and the control point ``name``.
+    """The mesh cut by a pretension section: both faces tied, with the control point ``name``.
 
     The faces become the boundaries ``NAME-below`` and ``NAME-above``, of the parts behind and ahead
     along the direction. A :class:`~fecontact.PointLoad` on the control point with component x is

@@ -32,7 +32,8 @@ class Rotation:
     Parameters
     ----------
     speed : float
-        Omega, positive counter-clockwise, seen against the axis [rad/s].
+        Omega, positive about the axis by the right-hand rule; in the plane counter-clockwise
+        [rad/s].
     centre : (x, y) or (x, y, z)
         c, a point that does not move; two numbers in a solid have z = 0 [m].
     coriolis : bool

@@ -18,7 +18,7 @@ _ROUND = 1e-3  # normals of a round face along its axis, mean square
 class HingeSupport(NamedTuple):
     """Nodes (k,) that rotate rigidly about an axis through a centre (d,) [m].
 
-    The axis (3,) is a unit vector, in the plane that out of it; motion along it is held too.
+    The axis (3,) is a unit vector; of plane bodies it is z. Motion along the axis is held too.
     """
 
     nodes: Integers

@@ -157,8 +157,8 @@ class BasisReport:
         gravity, *boundaries = self.load_error
         whole = self.basis.quality.load_compliance[1:]
         return [f"missing static response to gravity: {_along_axes(gravity)}",
-                *(f"missing static response to any loads on '{name}': pressure {pressure:.2%}, shear "
-                  f"{' and '.join(f'{shear:.2%}' for shear in shears)}"
+                *(f"missing static response to any loads on '{name}': pressure {pressure:.2%}, "
+                  f"shear {' and '.join(f'{shear:.2%}' for shear in shears)}"
                   for name, (pressure, *shears), work in zip(
                       self.basis.boundaries, boundaries, whole, strict=True) if work.any())]
 

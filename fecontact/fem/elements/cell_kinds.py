@@ -24,7 +24,7 @@ class CellKind:
     Attributes
     ----------
     name : str
-        Plural, for people.
+        Plural name of the cells, for messages.
     dimension, corners : int
     facets : tuple of tuples
         Corners of each side: edges with the cell on their left; faces counter-clockwise, seen from

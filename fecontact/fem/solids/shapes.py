@@ -212,7 +212,7 @@ class SphereSegment:
     base_radius : float
         Radius of the body seen from above, at most 0.9 times that of the sphere [m].
     height : float
-        On the axis, above the sphere's rise to the outer face [m].
+        Height of the body on its axis, more than the sphere rises to the outer face [m].
     contact_radius : float or None
         [m]; None for the whole bottom.
     contact_element_size : float or None
