@@ -1,9 +1,9 @@
 """Fits of synthetic truths: how often intervals of 95 % cover them, and Bouc-Wen from a swept sine.
 
-1. Loops of an Iwan element and of the four-parameter one, and the force of a rough surface that is
-   pressed and relieved, with noise of 1, 3 and 10 % of the largest force.
-2. The motion of a mass with LuGre friction on which a drive pulls, with the same noise.
-3. Ring-downs of a mass with Bouc-Wen friction with noise of 1 % of the first amplitude.
+1. Loops of Iwan and four-parameter Iwan elements, and the force of a rough surface that is pressed
+   and relieved, with noise of 1, 3 and 10 % of the largest force.
+2. The motion of a mass with LuGre or Bouc-Wen friction on which a drive pulls, with the same noise.
+3. Ring-downs of a mass with Bouc-Wen friction with noise of 1 and 3 % of the first amplitude.
 4. The hysteretic system of Noel and Schoukens, m y'' + c y' + k y + z = u with z' = alpha y' - beta
    (gamma |y'| z + delta y' |z|), from a swept sine with noise of 1 %. Its hysteresis has no limit
    (gamma + delta < 0), which BoucWenFriction cannot say: a law of our own does.
@@ -125,25 +125,43 @@ def rough(noise: float, trials: int) -> None:
         press, noise, trials, along="motion_y")
 
 
-def bristles(noise: float, trials: int) -> None:
-    """The motion of a mass with LuGre friction that a drive pulls to and fro."""
-    def model(coefficient: float, stiffness: float) -> fc.ContactSystem:
+def motion(
+    title: str, truth: FrictionLaw, first: FrictionLaw, ranges: dict[str, FitParameter],
+    noise: float, trials: int,
+) -> None:
+    """Coverage of fits to the motion of a mass with friction that a drive pulls to and fro."""
+    def model(law: FrictionLaw) -> fc.ContactSystem:
         return fc.ContactSystem(
-            body(2.0, 1e4, 20.0), normal=PrescribedForce(50.0),
-            friction=LuGreFriction(0.5, coefficient, 1e-2, 2.0, stiffness, 10.0),
+            body(2.0, 1e4, 20.0), normal=PrescribedForce(50.0), friction=law,
             drive=fc.Drive(stiffness_x=5e4, amplitude_x=1e-3, frequency_hz=10.0))
 
-    truth, times = model(0.4, 1e4), np.linspace(0.0, 0.2, 201)
-    clean = HistoryData(times, np.zeros(len(times)), 1.0, initial=np.zeros(3)).predicted(truth)
+    times, rest = np.linspace(0.0, 0.2, 201), np.zeros(2 + truth.memory)
+    how = {"initial": rest, "rtol": 1e-6}
+    clean = HistoryData(times, np.zeros(len(times)), 1.0, **how).predicted(model(truth))
     deviation = noise * float(np.abs(clean).max())
-    coverage(f"LuGre, noise {100.0 * noise:g} %", truth, model(0.3, 2e4), {
+    coverage(f"{title}, noise {100.0 * noise:g} %", model(truth), model(first), ranges,
+             lambda rng: HistoryData(times, clean + deviation * rng.standard_normal(len(times)),
+                                     deviation, **how), trials)
+
+
+def bristles(noise: float, trials: int) -> None:
+    """Motion with LuGre friction: kinetic coefficient and stiffness of the bristles."""
+    def law(coefficient: float, stiffness: float) -> FrictionLaw:
+        return LuGreFriction(0.5, coefficient, 1e-2, 2.0, stiffness, 10.0)
+
+    motion("LuGre", law(0.4, 1e4), law(0.3, 2e4), {
         "friction.kinetic_coefficient": FitParameter(0.05, 0.48, scale="log"),
-        "friction.bristle_stiffness": FitParameter(1e3, 1e6, scale="log")},
-        lambda rng: HistoryData(times, clean + deviation * rng.standard_normal(len(times)),
-                                deviation, initial=np.zeros(3)), trials)
+        "friction.bristle_stiffness": FitParameter(1e3, 1e6, scale="log")}, noise, trials)
 
 
-def decays(trials: int) -> None:
+def hysteresis(noise: float, trials: int) -> None:
+    """Motion with Bouc-Wen friction: coefficient of friction and yield displacement."""
+    motion("Bouc-Wen", BoucWenFriction(0.4, 2e-4, 0.6, 1.2), BoucWenFriction(0.3, 1e-4, 0.6, 1.2), {
+        "friction.friction_coefficient": FitParameter(0.05, 2.0, scale="log"),
+        "friction.yield_displacement": FitParameter(1e-5, 2e-3, scale="log")}, noise, trials)
+
+
+def decays(noise: float, trials: int) -> None:
     """Ring-downs of a mass with Bouc-Wen friction."""
     def model(coefficient: float, deflection: float) -> fc.ContactSystem:
         return fc.ContactSystem(body(2.0, 5e4, 4.0), normal=PrescribedForce(50.0),
@@ -154,11 +172,13 @@ def decays(trials: int) -> None:
     run = fc.simulate(truth, 0.8, initial=state, outputs=4001)
     x = run.displacement("B")[:, 0]
     options = {"window": 6.0, "frequency_hz": 33.0}
-    coverage("ring-downs, noise 1 %", truth, model(0.25, 5e-4), {
+    deviation = noise * float(np.abs(x).max())
+    coverage(f"Bouc-Wen, ring-downs, noise {100.0 * noise:g} %", truth, model(0.25, 5e-4), {
         "friction.friction_coefficient": FitParameter(0.05, 1.0, 0.25, "log"),
         "friction.yield_displacement": FitParameter(5e-5, 5e-3, 5e-4, "log"),
-    }, lambda rng: DecayData(ring_down(run.time, x + 3e-5 * rng.standard_normal(len(x)), **options),
-                             state, 0.8, options=options), trials)
+    }, lambda rng: DecayData(
+        ring_down(run.time, x + deviation * rng.standard_normal(len(x)), **options), state, 0.8,
+        options=options), trials)
 
 
 @memory_friction_law
@@ -264,9 +284,10 @@ def main() -> None:
     trials = int(sys.argv[sys.argv.index("--trials") + 1]) if "--trials" in sys.argv else (
         4 if quick else 1000)
     for noise in ((0.03,) if quick else (0.01, 0.03, 0.1)):
-        for case in (loops, four_parameters, rough, bristles):
+        for case in (loops, four_parameters, rough, bristles, hysteresis):
             case(noise, trials)
-    decays(2 if quick else max(trials // 5, 1))
+    for noise in (0.01,) if quick else (0.01, 0.03):
+        decays(noise, 2 if quick else max(trials // 5, 1))
     swept(1.0 if quick else 3.0)
 
 

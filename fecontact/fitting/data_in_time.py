@@ -131,11 +131,9 @@ class CurveData(FitData):
 
     @property
     def deviations(self) -> Array | None:
-        """Standard deviations of both; None without any."""
-        curve = self._curve
-        if curve.frequency_deviation_hz is None or curve.damping_deviation is None:
-            return None
-        return np.concatenate([curve.frequency_deviation_hz, curve.damping_deviation])
+        """Standard deviations of both at the measured amplitudes; None without any."""
+        found = self._curve.deviations_at_amplitude()
+        return None if found is None else np.concatenate(found)
 
     @property
     def deviation_freedom(self) -> float:

@@ -81,14 +81,16 @@ def fit(
     with shown(progress, lambda: counting_bar("Fitting")) as tell:
         if executor is None and workers == 1:
             found = []
-            for start, file in zip(begins, files, strict=True):
-                found.append(search(problem, start, options, file))
+            known = [Evaluator(problem, file) for file in files]
+            for start, evaluator in zip(begins, known, strict=True):
+                found.append(search(problem, start, options, evaluator=evaluator))
                 if tell is not None:
                     tell(len(found), starts)
         else:
             require_picklable(problem)
             found = _on_workers(problem, begins, options, files, executor, workers, tell)
-    return _result(problem, options, found, files)
+            known = [Evaluator(problem, file) for file in files]
+    return _result(problem, options, found, known)
 
 
 def _problem(model: Any, parameters: Any, data: Any, exact: bool) -> Problem:
@@ -183,7 +185,7 @@ def _on_workers(
 
 
 def _result(
-    problem: Problem, options: SearchOptions, found: list[Found], files: list[Path | None]
+    problem: Problem, options: SearchOptions, found: list[Found], evaluators: list[Evaluator]
 ) -> Fit:
     order = sorted(range(len(found)), key=lambda k: found[k].cost)
     best = found[order[0]]
@@ -191,7 +193,7 @@ def _result(
         raise AnalysisError(f"fit: the model fails at all {len(found)} starts: {best.message}"
                             if len(found) > 1 else
                             f"fit: the model fails at the start: {best.message}")
-    known = Evaluator(problem, files[order[0]])
+    known = evaluators[order[0]]
     jacobian = known.jacobian(best.places)
     residual = known.residual(best.places)
     starts = tuple(FitStart(

@@ -190,9 +190,12 @@ def posterior(
 ) -> Posterior:
     r"""Sample the posterior distribution of the parameters of a fit.
 
-    The density over the places u in the ranges is :math:`\exp(-\chi^2(u) / 2)` for independent
-    normal errors with the stated deviations. Without deviations one unknown deviation of all data
-    is integrated out, with density 1 / s: :math:`(\chi^2)^{-n/2}`. The prior density is constant
+    The density over the p places u in the ranges is :math:`\exp(-\chi^2(u) / 2)` for independent
+    normal errors with the stated deviations. Deviations that were estimated with nu degrees of
+    freedom, from noise or as :math:`s^2 = \chi_0^2 / \nu` from the n residuals (nu = n - p), have
+    an unknown factor that is integrated out, of the distribution of their estimate: :math:`(1 +
+    (\chi^2 - \chi_0^2) / (\nu s^2))^{-(\nu + p)/2}`. Of linear models this is the distribution of
+    Student, as of the intervals of the fit. The prior density is constant
     over u, thus over the logarithm of parameters with ``scale="log"``, and zero outside of the
     ranges and where the model fails. Walkers begin about the best values with the covariance of
     the fit; five autocorrelation times are discarded.
@@ -234,7 +237,8 @@ def posterior(
         raise InputError(f"posterior: the fit has loss = {fit.options.loss!r}, which is no "
                          f"likelihood; fit with loss = 'linear'.")
     emcee = optional("emcee", "A posterior distribution")
-    density: Callable[[Array], float] = _Density(fit.problem)
+    density: Callable[[Array], float] = _Density(
+        fit.problem, fit.chi_square, fit.deviation_scale, fit.deviation_freedom)
     several = executor is not None or workers != 1
     if several:
         require_picklable(fit.problem)
@@ -258,9 +262,21 @@ def posterior(
 
 @dataclass(frozen=True, eq=False)
 class _Density:
-    """Logarithm of the posterior density over the places u (p,)."""
+    """Logarithm of the posterior density over the places u (p,).
+
+    Attributes
+    ----------
+    problem : Problem
+    least : float
+        Sum of squares of the weighted residuals at the best values.
+    scale, freedom : float
+        Factor of the deviations, and degrees of freedom with which they were estimated.
+    """
 
     problem: Problem
+    least: float
+    scale: float
+    freedom: float
 
     def __call__(self, u: Array) -> float:
         if (u < 0.0).any() or (u > 1.0).any():
@@ -269,9 +285,10 @@ class _Density:
             off = (self.problem.predicted(u) - self.problem.measured) / self.problem.deviations
         except FecontactError:
             return -np.inf
-        square = float(off @ off)
-        return -0.5 * (square if self.problem.weighted else
-                       len(off) * float(np.log(max(square, 1e-300))))
+        rise = (float(off @ off) - self.least) / self.scale / self.scale
+        if not np.isfinite(self.freedom) or rise < 0.0:
+            return -0.5 * rise * (1.0 + len(u) / self.freedom)
+        return -0.5 * (self.freedom + len(u)) * float(np.log1p(rise / self.freedom))
 
 
 @dataclass(frozen=True)

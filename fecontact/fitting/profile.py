@@ -15,7 +15,7 @@ from fecontact.fitting.problem import Evaluator
 from fecontact.fitting.result import Fit
 from fecontact.fitting.search import search
 
-_WIDE = 1.5  # reach of the profile, in half widths of the interval of 95 %
+_WIDE = 1.5  # reach of the profile, in half widths of the linear interval
 
 
 @read_only_arrays
@@ -114,7 +114,7 @@ def profile_likelihood(
         raise InputError(f"profile_likelihood: level = {level!r} must be above 0 and below 1.")
     k = fit.names.index(name)
     deviation = float(np.sqrt(fit.place_covariance[k, k]))
-    reach = _WIDE * 2.0 * deviation if np.isfinite(deviation) else 1.0
+    reach = _WIDE * fit.reach(level) * deviation if np.isfinite(deviation) else 1.0
     here = float(fit.places[k])
     places = np.unique(np.append(np.linspace(max(here - reach, 0.0), min(here + reach, 1.0),
                                              points), here))
@@ -122,8 +122,7 @@ def profile_likelihood(
     free[k] = False
     evaluator = Evaluator(fit.problem, None if folder is None else
                           as_path(folder, "a profile") / f"profile-{name}.jsonl")
-    weighted = fit.problem.weighted or fit.freedom < 1
-    scale = 1.0 if weighted else fit.chi_square / fit.freedom
+    scale = fit.deviation_scale
     found = np.full(len(places), np.nan)
     middle = int(np.argmin(np.abs(places - here)))
     # From the best value outwards, each from the end of the search before it.
@@ -135,7 +134,7 @@ def profile_likelihood(
             if done.failed:
                 continue
             u = np.array(done.places)
-            found[j] = 2.0 * done.cost / scale
+            found[j] = 2.0 * done.cost / scale / scale
     one = fit.problem.parameters[k]
     return ProfileLikelihood(name, np.array([one.value(float(u)) for u in places]), found,
                    float(np.nanmin(found)), fit.reach(level) ** 2, float(level))

@@ -153,10 +153,10 @@ class Fit(Summarised):
         J = self.jacobian * weight[:, None]
         _, s, directions = np.linalg.svd(J, full_matrices=len(J) < J.shape[1])
         s = np.concatenate([s, np.zeros(len(directions) - len(s))])
-        return s / self._scale, directions
+        return s / self.deviation_scale, directions
 
     @property
-    def _scale(self) -> float:
+    def deviation_scale(self) -> float:
         """Factor of the standard deviations: one where those of the data are known."""
         if self.problem.weighted or self.freedom < 1:
             return 1.0
@@ -234,12 +234,12 @@ class Fit(Summarised):
 
         if not (isinstance(level, int | float) and 0.0 < level < 1.0):
             raise InputError(f"intervals: level = {level!r} must be above 0 and below 1.")
-        known = self._spread_freedom
+        known = self.deviation_freedom
         return float(np.sqrt(size * f.ppf(level, size, known) if np.isfinite(known)
                              else chi2.ppf(level, size)))
 
     @property
-    def _spread_freedom(self) -> float:
+    def deviation_freedom(self) -> float:
         """Degrees of freedom of the deviations of the data; infinite if they are known."""
         if self.problem.weighted:
             return self.problem.deviation_freedom
@@ -308,7 +308,7 @@ class Fit(Summarised):
         if self.problem.weighted and self.freedom > 0:
             from scipy.stats import chi2, f
 
-            ratio, known = self.chi_square / self.freedom, self._spread_freedom
+            ratio, known = self.chi_square / self.freedom, self.deviation_freedom
             if (f.sf(ratio, self.freedom, known) if np.isfinite(known)
                     else chi2.sf(self.chi_square, self.freedom)) < 1e-3:
                 found.append(f"The residuals are {np.sqrt(ratio):.2g} times the stated deviations: "

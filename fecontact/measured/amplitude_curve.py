@@ -13,7 +13,9 @@ from fecontact.core.types import Array, ArrayLike
 from fecontact.core.units import Summarised, span
 from fecontact.reduction.modal_basis import ModalBasis
 
-_COLUMNS = ("frequency_hz", "damping_ratio", "frequency_deviation_hz", "damping_deviation", "time")
+_COLUMNS = ("frequency_hz", "damping_ratio", "frequency_deviation_hz", "damping_deviation",
+            "amplitude_deviation", "time")
+_DEGREE = 3  # of the polynomials in log amplitude whose slopes are taken
 
 
 @read_only_arrays
@@ -50,6 +52,8 @@ class AmplitudeCurve(Summarised):
     deviation_freedom : float
         Degrees of freedom with which the deviations were estimated, at least; infinite if they are
         known.
+    amplitude_deviation : (N,) array or None
+        Standard deviations of the amplitudes; None if the amplitudes are exact.
 
     Raises
     ------
@@ -68,6 +72,7 @@ class AmplitudeCurve(Summarised):
     observed: str = ""
     note: str = ""
     deviation_freedom: float = float("inf")
+    amplitude_deviation: Array | None = None
 
     def __post_init__(self) -> None:
         amplitude = as_floats(self.amplitude, "AmplitudeCurve: amplitude")
@@ -110,6 +115,39 @@ class AmplitudeCurve(Summarised):
         found = PchipInterpolator(np.log(known), np.stack(
             [self.frequency_hz[order], self.damping_ratio[order]], axis=1))(np.log(wanted))
         return np.asarray(found[..., 0]), np.asarray(found[..., 1])
+
+    def deviations_at_amplitude(self) -> tuple[Array, Array] | None:
+        r"""Standard deviations of frequency and damping ratio at the stated amplitudes.
+
+        To first order an error of the amplitude moves both along their slopes:
+        :math:`\sigma^2 = \sigma_f^2 + (A\,f'(A))^2 (\sigma_A / A)^2`. The slopes are those of
+        polynomials in log A, cubic ones for four points or more; of their squares the part that
+        the deviations alone would give is left out.
+
+        Returns
+        -------
+        (N,) array, (N,) array or None
+            In Hz and without unit; None if the deviations of frequency or damping are not known.
+        """
+        if self.frequency_deviation_hz is None or self.damping_deviation is None:
+            return None
+        both = self.frequency_deviation_hz, self.damping_deviation
+        if self.amplitude_deviation is None or len(self) < 2:
+            return both
+        level = np.log(self.amplitude)
+        level -= level.mean()
+        degree = min(_DEGREE, len(self) - 1)
+        powers = np.vander(level, degree + 1, increasing=True)
+        rates = np.zeros(powers.shape)
+        rates[:, 1:] = powers[:, :-1] * np.arange(1.0, degree + 1.0)
+        moved = self.amplitude_deviation / self.amplitude
+        found = []
+        for values, deviation in zip((self.frequency_hz, self.damping_ratio), both, strict=True):
+            # Slopes are the weighted values times these rows.
+            slopes = rates @ np.linalg.pinv(powers / deviation[:, None])
+            squares = (slopes @ (values / deviation)) ** 2 - (slopes**2).sum(axis=1)
+            found.append(np.sqrt(deviation**2 + np.maximum(squares, 0.0) * moved**2))
+        return found[0], found[1]
 
     def summary(self) -> list[tuple[str, str]]:
         """Amplitudes, frequencies, damping ratios, and the note."""

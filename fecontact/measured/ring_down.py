@@ -109,7 +109,8 @@ def ring_down(
         error / (2.0 * np.pi), error * np.sqrt(np.maximum(1.0 - ratio**2, 0.0)) / size,
         t[middles[kept]], _displacement(series.unit, order), series.title,
         _note(half * step, int(np.count_nonzero(~kept)), len(kept)),
-        _noise_freedom(half, step, f, apart, len(middles)))
+        _noise_freedom(half, step, f, apart, len(middles)),
+        scale * amplitude[kept] / size**order * deviation[0][kept])
 
 
 def _displacement(unit: str, order: int) -> str:

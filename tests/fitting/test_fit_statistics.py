@@ -247,8 +247,9 @@ def test_deviations_that_were_estimated_widen_intervals_as_student_says():
     widths = [np.ptp(one.intervals(0.9)[SLOPE]) for one in (known, estimated)]
     assert widths[1] / widths[0] == pytest.approx(t.ppf(0.95, 8.0) / norm.ppf(0.95))
     assert estimated.reach(0.9, 2) ** 2 == pytest.approx(2.0 * f.ppf(0.9, 2, 8.0))
-    assert profile_likelihood(estimated, SLOPE, points=5).limit == pytest.approx(
-        t.ppf(0.975, 8.0) ** 2)
+    profile = profile_likelihood(estimated, SLOPE, points=5)
+    assert profile.limit == pytest.approx(t.ppf(0.975, 8.0) ** 2)
+    assert np.ptp(profile.values) == pytest.approx(1.5 * np.ptp(estimated.intervals()[SLOPE]))
     assert np.ptp(estimated.bands()[0], axis=0) == pytest.approx(
         np.ptp(known.bands()[0], axis=0) * t.ppf(0.975, 8.0) / norm.ppf(0.975))
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import t, truncnorm, uniform
+from scipy.stats import f, t, truncnorm, uniform
 from test_fit_statistics import OFFSET, PLACES, RANGES, SLOPE, curve, failing, line, system
 
 import fecontact as fc
@@ -86,6 +86,29 @@ def test_without_deviations_it_is_a_student_distribution():
     far = np.abs(found.samples[:, 0] - fitted[SLOPE]) > 2.0 * fitted.deviations[SLOPE]
     part = 2.0 * t.sf(2.0, 4)
     assert abs(far.mean() - part) < REACH * np.sqrt(part / found.effective) < part - 0.0455
+
+
+class Estimated(FunctionData):
+    """Numbers whose deviations were estimated from noise with four degrees of freedom."""
+
+    deviation_freedom = 4.0
+
+
+def test_deviations_that_were_estimated_from_noise_give_a_student_distribution():
+    """Multivariate one of Student, whose squares of distances over p have the distribution F."""
+    y = 0.3 + 1.2 * PLACES + 0.1 * np.random.default_rng(5).standard_normal(40)
+    fitted = fc.fit(system(), {OFFSET: (-20.0, 20.0), SLOPE: (-40.0, 40.0)},
+                    Estimated(line, y, 0.1))
+    found = posterior(fitted, steps=5000)
+    for column, name in enumerate(fitted.names):
+        require_quantiles(found, t(4, fitted[name], fitted.deviations[name]), column)
+    off = found.samples - fitted.estimates
+    ratio = 0.5 * np.einsum("ki,ij,kj->k", off, np.linalg.inv(fitted.covariance), off)
+    for part in (0.5, 0.9):
+        below = (ratio < f.ppf(part, 2, 4)).mean()
+        assert abs(below - part) < REACH * np.sqrt(part * (1.0 - part) / found.effective)
+    # With known deviations a part of exp(-F) would lie beyond, 1.3 % of it in place of a tenth.
+    assert REACH * np.sqrt(0.09 / found.effective) < 0.1 - np.exp(-f.ppf(0.9, 2, 4))
 
 
 @pytest.mark.parametrize("best", [0.4, 0.35])

@@ -59,6 +59,24 @@ def test_deviations_are_those_of_white_noise():
     assert np.abs(off.mean(axis=(0, 2))).max() < 0.1
 
 
+def test_errors_of_the_amplitude_count_where_the_frequency_depends_on_it():
+    """A chirp with f = 40 Hz + 5 Hz log A, which local fits find exactly."""
+    t = np.arange(0.0, 1.2, 1e-3)
+    x = np.exp(-2.0 * t) * np.cos(2.0 * np.pi * (40.0 * t - 5.0 * t**2))
+    rng = np.random.default_rng(7)
+    off, alone = [], []
+    for _ in range(200):
+        found = ring_down(t, x + 0.03 * rng.standard_normal(len(t)), frequency_hz=36.0)
+        error = found.frequency_hz - np.hypot(40.0 + 5.0 * np.log(found.amplitude), 1.0 / np.pi)
+        both = found.deviations_at_amplitude()
+        off.extend(error / both[0])
+        alone.extend(error / found.frequency_deviation_hz)
+        assert both[1] == pytest.approx(found.damping_deviation, rel=0.05)
+    # Some 1400 values, between whose neighbours there is a correlation.
+    assert np.std(off) == pytest.approx(1.0, abs=0.1)
+    assert np.std(alone) > 1.3
+
+
 def test_another_mode_is_left_out():
     t, x, _ = linear()
     other = 2e-3 * np.exp(-2.0 * t) * np.cos(2.0 * np.pi * 95.0 * t)
