@@ -8,7 +8,7 @@ from fecontact.core.errors import MissingLibraryError
 
 # Extras by the modules that they bring.
 EXTRAS = {"gmsh": "mesh", "pyvista": "render", "imageio_ffmpeg": "render",
-          "pyuff": "data", "emcee": "posterior", "sdypy.EMA": "modal",
+          "pyuff": "data", "nptdms": "data", "emcee": "posterior", "sdypy.EMA": "modal",
           "ansys.mapdl.reader": "ansys", "mapdl_archive": "ansys", "pyyeti.nastran.op4": "nastran",
           "pyyeti.nastran.op2": "nastran", "SurfaceTopography": "topography", "x3pio": "topography"}
 

@@ -13,6 +13,7 @@ from .ring_down import ring_down
 from .sensors import Accelerometer, ForceGauge, Sensor, with_sensors
 from .shaker import Shaker
 from .swept_response import swept_curve
+from .time_series import from_sep005
 
 __all__ = [
     "Accelerometer",
@@ -27,6 +28,7 @@ __all__ = [
     "Shaker",
     "backbone_curve",
     "experimental_modes",
+    "from_sep005",
     "measure",
     "modal_assurance",
     "modal_mass_at",

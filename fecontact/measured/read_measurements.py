@@ -1,4 +1,4 @@
-"""Readers of measurements: CSV, MATLAB, HDF5 and universal files."""
+"""Readers of measurements: CSV, MATLAB, HDF5, TDMS and universal files."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping
@@ -13,15 +13,13 @@ from fecontact.core.files.hdf5_check import open_hdf5
 from fecontact.core.files.stored import reading
 from fecontact.core.types import Array
 from fecontact.laws.data_columns import cells, number, text_of
-from fecontact.measured.measured_units import parted, si_unit
-from fecontact.measured.measurement import Axis, Channel, Measurement
+from fecontact.measured.columns import AXES, of_columns
+from fecontact.measured.measured_units import parted
+from fecontact.measured.measurement import Axis, Measurement
+from fecontact.measured.time_series import read_tdms
 from fecontact.measured.uff_functions import read_functions
 
-# Names of the abscissa, in small letters.
-_AXES: Mapping[str, Axis] = {
-    **dict.fromkeys(("time", "t", "times"), "time"),
-    **dict.fromkeys(("frequency", "freq", "f", "frequencies", "hz", "frequency_hz"), "frequency")}
-_SUFFIXES = (".csv", ".txt", ".dat", ".mat", ".h5", ".hdf5", ".uff", ".unv")
+_SUFFIXES = (".csv", ".txt", ".dat", ".mat", ".h5", ".hdf5", ".tdms", ".uff", ".unv")
 _MOST = 10_000  # columns of a two-dimensional array of channels
 
 
@@ -36,6 +34,8 @@ def read_measurements(
     - MATLAB (.mat) and HDF5 (.h5): vectors, or columns of matrices, of the length of a vector
       called ``time``, ``t``, ``frequency`` or ``f``, at the top or in one structure or group; units
       from titles, from HDF5 attributes ``unit``, or from a structure ``units``.
+    - TDMS of LabVIEW (.tdms): channels with their increment of time, or beside a channel called
+      ``time``, those of each group together; units of their property ``unit_string``.
     - Universal files (.uff, .unv): data sets 58 with their nodes and directions, coherences beside
       frequency responses, units of their labels or of data set 164.
 
@@ -54,7 +54,7 @@ def read_measurements(
     InputError
         If the file does not exist, is damaged, of another kind, or holds no measurement.
     MissingLibraryError
-        For universal files without pyuff.
+        For universal files without pyuff, and TDMS without npTDMS.
     """
     path = as_path(path, "a measurement")
     require_kind("read_measurements", (Mapping, type(None)), units=units)
@@ -65,8 +65,8 @@ def read_measurements(
         raise InputError(f"{path}: there is no such file.")
     require_regular_file(path, "a measurement")
     reader: Callable[[Path, Mapping[str, str]], Iterable[Measurement]] = {
-        ".mat": _read_mat, ".h5": _read_hdf5, ".hdf5": _read_hdf5, ".uff": read_functions,
-        ".unv": read_functions}.get(path.suffix.lower(), _read_text)
+        ".mat": _read_mat, ".h5": _read_hdf5, ".hdf5": _read_hdf5, ".tdms": read_tdms,
+        ".uff": read_functions, ".unv": read_functions}.get(path.suffix.lower(), _read_text)
     with reading(path, "not readable as a measurement"):
         found = tuple(reader(path, units or {}))
     known = {name for one in found for name in one.names}
@@ -130,7 +130,7 @@ def _read_text(path: Path, units: Mapping[str, str]) -> list[Measurement]:
                          f"columns; write one for each, such as: time [s], x [mm]")
     if len({parted(title)[0] for title in titles}) < len(titles):
         raise InputError("its line of titles has a name twice; give each column its own")
-    return [_measurement(str(path), dict(zip(titles, table.T, strict=True)), units)]
+    return [of_columns(str(path), dict(zip(titles, table.T, strict=True)), units)]
 
 
 def _titles(line: str) -> list[str]:
@@ -199,7 +199,7 @@ def _from_tree(tree: Mapping[str, Any], source: str, units: Mapping[str, str]
     own = tree.get("units")
     named = {name: str(unit) for name, unit in own.items()} if isinstance(own, Mapping) else {}
     for title, axis in arrays.items():
-        if axis.ndim != 1 or len(axis) < 2 or parted(title)[0].lower() not in _AXES:
+        if axis.ndim != 1 or len(axis) < 2 or parted(title)[0].lower() not in AXES:
             continue
         columns: dict[str, Array] = {_with_unit(title, named): axis}
         for name, values in arrays.items():
@@ -215,7 +215,7 @@ def _from_tree(tree: Mapping[str, Any], source: str, units: Mapping[str, str]
                 label = text if matrix.shape[1] == 1 else f"{text} {k + 1}"
                 columns[label if unit is None else f"{label} [{unit}]"] = matrix[:, k]
         if len(columns) > 1:
-            found.append(_measurement(source, columns, units))
+            found.append(of_columns(source, columns, units))
     for name, branch in tree.items():
         if isinstance(branch, Mapping):
             try:
@@ -232,71 +232,3 @@ def _from_tree(tree: Mapping[str, Any], source: str, units: Mapping[str, str]
 def _with_unit(title: str, named: Mapping[str, str]) -> str:
     name, unit = parted(title)
     return f"{name} [{named[name]}]" if unit is None and name in named else title
-
-
-def _measurement(source: str, columns: Mapping[str, Array], units: Mapping[str, str]
-                 ) -> Measurement:
-    """A measurement of columns by titles, the first of which is the axis."""
-    (first, abscissa), *others = columns.items()
-    name, unit = parted(first)
-    axis = _AXES.get(name.lower())
-    found = si_unit(unit) if unit else None
-    if axis is None and found is not None:
-        axis = {"s": "time", "Hz": "frequency"}.get(found[0])  # type: ignore[assignment]
-    if axis is None:
-        raise InputError(f"its first column is called '{first}'; call it time [s] or "
-                         f"frequency [Hz]")
-    notes: list[str] = []
-    wanted = "s" if axis == "time" else "Hz"
-    if found is None or found[0] != wanted:
-        if unit:
-            raise InputError(f"'{first}' must be in {wanted}, not in '{unit}'")
-        notes.append(f"'{name}' has no unit; it is taken in {wanted}")
-        found = (wanted, 1.0)
-    values, channels, coherence = joined(
-        [(*parted(title), data) for title, data in others], units, notes)
-    return Measurement(np.asarray(abscissa, dtype=float) * found[1], values, channels, axis,
-                       coherence, source, tuple(notes))
-
-
-def joined(
-    columns: list[tuple[str, str | None, Array]], units: Mapping[str, str], notes: list[str]
-) -> tuple[Array, tuple[Channel, ...], Array | None]:
-    """Values (N, C), channels and coherence of columns by name and unit; adds to the notes."""
-    parts = {name: (unit, data) for name, unit, data in columns}
-    values: list[Array] = []
-    channels: list[Channel] = []
-    coherent: dict[str, Array] = {}
-    for name, (unit, data) in parts.items():
-        stem, _, part = name.rpartition(" ")
-        if part.lower() in ("im", "imag") and any(f"{stem} {real}" in parts
-                                                  for real in ("re", "real", "Re", "Real")):
-            continue
-        if part.lower() == "coherence" and stem:
-            coherent[stem] = np.asarray(data, dtype=float)
-            continue
-        other = next((f"{stem} {imag}" for imag in ("im", "imag", "Im", "Imag")
-                      if part.lower() in ("re", "real") and f"{stem} {imag}" in parts), None)
-        if other is not None:
-            name, data = stem, data + 1j * parts[other][1]
-        symbol = units.get(name, unit)
-        known = si_unit(symbol) if symbol is not None else None
-        if symbol is None:
-            notes.append(f"channel '{name}' has no unit; its values are as in the file")
-        elif known is None:
-            if name in units:
-                raise InputError(f"the unit '{symbol}' given for '{name}' is not known; give one "
-                                 f"like 'mm', 'm/s^2', 'g' or 'kN'")
-            notes.append(f"the unit '{symbol}' of channel '{name}' is not known; its values are as "
-                         f"in the file")
-        si, factor = known or (symbol or "", 1.0)
-        values.append(np.asarray(data) * factor)
-        channels.append(Channel(name, si))
-    if not channels:
-        raise InputError("it has no channels beside its axis")
-    table = np.stack(values, axis=1)
-    if not coherent:
-        return table, tuple(channels), None
-    nothing = np.full(len(table), np.nan)
-    return table, tuple(channels), np.stack(
-        [coherent.get(one.name, nothing) for one in channels], axis=1)

@@ -1,14 +1,16 @@
 """Files of measurements: values, units, and errors that are reported."""
 
 import h5py
+import nptdms
 import numpy as np
 import pytest
 import pyuff
+import sdypy_sep005.sep005 as sep005
 from scipy.io import savemat
 
 import fecontact as fc
 from fecontact.io import read_measurement, read_measurements, write_uff
-from fecontact.measured import Channel, Measurement, ring_down
+from fecontact.measured import Channel, Measurement, from_sep005, ring_down
 from fecontact.measured.measured_units import parted, si_unit
 
 TIME = np.linspace(0.0, 1.0, 513)
@@ -109,6 +111,58 @@ def test_matlab_and_hdf5(tmp_path):
     assert both[1].values[:, 0] == pytest.approx(RECEPTANCE)
     assert "no unit" in " ".join(both[1].notes)
     assert read_measurement(tmp_path / "a.h5", axis="frequency").names == ("H",)
+
+
+def tdms(path, channels):
+    """A file written by npTDMS: group, name, values and properties of each channel."""
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment([nptdms.ChannelObject(*one) for one in channels])
+    return path
+
+
+def test_tdms(tmp_path):
+    step = {"wf_increment": TIME[1], "wf_start_offset": 0.5}
+    path = tdms(tmp_path / "a.tdms", [
+        ("test", "tip", MOTION, {**step, "unit_string": "mm"}),
+        ("test", "force", 2.0 * MOTION, {**step, "NI_UnitDescription": "kN"}),
+        ("slow", "tip", MOTION[::4], {"wf_increment": TIME[4], "wf_start_offset": 0.0}),
+        ("table", "time", TIME, {"unit_string": "s"}), ("table", "x", MOTION, {})])
+    by_size = {one.values.size: one for one in read_measurements(path)}
+    table, test, slow = (by_size.pop(n) for n in (513, 1026, 129))
+    assert by_size == {}
+    assert test.names == ("tip", "force")
+    assert test.abscissa == pytest.approx(0.5 + TIME)
+    assert test.values == pytest.approx(np.column_stack([1e-3 * MOTION, 2e3 * MOTION]))
+    assert [one.unit for one in test.channels] == ["m", "N"]
+    assert slow.abscissa == pytest.approx(TIME[::4])
+    assert "no unit" in slow.notes[0]
+    assert table.values[:, 0] == pytest.approx(MOTION)
+    tdms(path, [("test", "tip", MOTION, {})])
+    with pytest.raises(fc.InputError, match="neither the property wf_increment nor a channel"):
+        read_measurements(path)
+    path.write_bytes(b"TDSm" + bytes(50))
+    with pytest.raises(fc.InputError, match="is not readable as a measurement"):
+        read_measurements(path)
+
+
+def test_time_series_of_sep005():
+    one = {"data": MOTION, "name": "tip", "unit_str": "mm", "fs": 512.0, "quantity": "d"}
+    other = {"data": MOTION.tolist(), "name": "force", "unit_str": "kN", "time": TIME.tolist()}
+    sep005.assert_sep005([one, other])
+    both, = from_sep005([one, other])
+    assert both.names == ("tip", "force")
+    assert both.abscissa == pytest.approx(TIME)
+    assert both.values == pytest.approx(np.column_stack([1e-3 * MOTION, 1e3 * MOTION]))
+    assert len(from_sep005([one, {**other, "group": "b"}])) == 2
+    for wrong, told in (
+            ([], "no channel"), ([3], "series must be"),
+            ({"data": MOTION, "name": "tip"}, "channel 0 has no 'unit_str'"),
+            ({**one, "fs": None}, "neither 'fs' nor 'time'"), ({**one, "fs": 0.0}, "fs = 0.0"),
+            ({**other, "time": TIME[1:]}, "512 times for 513 values"),
+            ({**one, "data": [[1.0, 2.0]]}, "two values or more"),
+            ([one, one], "are called 'tip'")):
+        with pytest.raises(fc.InputError, match=told):
+            from_sep005(wrong)
 
 
 def test_universal_files_come_back(tmp_path):
