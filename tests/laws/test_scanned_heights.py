@@ -1,6 +1,7 @@
 """Scans of profilometers as heights, written by programs that do not read them here."""
 
 import re
+import struct
 import warnings
 
 import numpy as np
@@ -40,6 +41,48 @@ def test_files_of_another_program_have_their_heights(name, how, digits, heights,
     assert np.array(found.heights) == pytest.approx(heights, abs=digits * np.abs(heights).max())
     assert (found.spacing_x, found.spacing_y) == pytest.approx((2.5e-6, 2.5e-6))
     assert (found.origin_x, found.origin_y, found.file) == (0.0, 0.0, None)
+
+
+def wyko_blocks(heights, path):
+    """An OPD file of a Wyko profilometer: a directory of blocks of 24 bytes, then the blocks.
+
+    Heights are whole numbers of a wavelength of 600 nm over 2000, the distance of points is in mm,
+    rows in y begin at the last one.
+    """
+    steps = np.rint(heights / (600e-9 / 2000.0)).astype("<i2")
+    blocks = [("RAW_DATA", 3, struct.pack("<3H", N, M, 2) + steps[:, ::-1].tobytes()),
+              ("Wavelength", 7, struct.pack("<f", 600.0)), ("Mult", 6, struct.pack("<h", 2000)),
+              ("Pixel_size", 7, struct.pack("<f", 2.5e-3)), ("Aspect", 7, struct.pack("<f", 1.0))]
+    entries = [("Directory", 1, bytes(24 * (len(blocks) + 1))), *blocks]
+    path.write_bytes(b"\1\0" + b"".join(
+        struct.pack("<16shlH", name.encode(), kind, len(body), 0) for name, kind, body in entries)
+        + b"".join(body for _, _, body in blocks))
+    return 3e-10 * steps
+
+
+def test_an_opd_file_of_a_wyko_profilometer(heights, tmp_path):
+    require_topography()
+    steps = wyko_blocks(heights, tmp_path / "a.opd")
+    other = surfalize.Surface.load(tmp_path / "a.opd")  # um, rows of y from the last one
+    found = HeightMap(file=str(tmp_path / "a.opd"))
+    assert np.array(found.heights) == pytest.approx(steps, rel=1e-5, abs=1e-12)
+    assert (found.spacing_x, found.spacing_y) == pytest.approx((2.5e-6, 2.5e-6))
+    assert np.ptp(other.data) == pytest.approx(1e6 * np.ptp(steps), rel=1e-5)
+    assert other.step_x == pytest.approx(2.5)
+
+
+def test_a_text_of_a_wyko_profilometer(heights, tmp_path):
+    """Heights in parts of a wavelength."""
+    require_topography()
+    lines = ["Wyko ASCII Data File Format 0 0 1", f"X Size\t{N}", f"Y Size\t{M}",
+             "Block Name\tType\tLength\tValue", "Wavelength\t7\t4\t600", "Aspect\t7\t4\t1",
+             "Pixel_size\t7\t4\t0.0025", "Mult\t7\t4\t2000", f"RAW_DATA\t3\t{4 * N * M}"]
+    lines += ["\t".join(f"{2000.0 * one / 600e-9:.8g}" for one in row) for row in heights]
+    (tmp_path / "a.asc").write_text("\n".join(lines) + "\n")
+    found = HeightMap(file=str(tmp_path / "a.asc"))
+    # SurfaceTopography takes the lines of the file along y.
+    assert np.array(found.heights) == pytest.approx(heights.T, abs=1e-12)
+    assert (found.spacing_x, found.spacing_y) == pytest.approx((2.5e-6, 2.5e-6))
 
 
 def require_topography():

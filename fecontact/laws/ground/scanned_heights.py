@@ -12,21 +12,22 @@ from fecontact.core.errors import InputError, ModelWarning
 from fecontact.core.extras import optional
 from fecontact.core.types import Array
 
-# Bytes that tell a file of an instrument from a table of numbers: zeros, or the heads of SDF files.
-_HEAD, _SDF = 4096, (b"aISO-", b"bISO-")
+# Bytes that tell a file of an instrument from a table of numbers: zeros, or the heads of SDF files
+# and of texts of Wyko profilometers (NT series).
+_HEAD, _TITLES = 4096, (b"aISO-", b"bISO-", b"Wyko ASCII Data File")
 _MOST_MISSING = 0.5  # of the points
 
 Grid = tuple[Array, float, float]  # heights (N, M) over x and y, NaN if missing, and distances [m]
 
 
 def is_scan(file: str | Path) -> bool:
-    """Whether a file holds binary data, or is an SDF file, rather than columns of numbers."""
+    """Whether a file holds binary data, or begins as an SDF or Wyko file, not columns of numbers."""
     try:
         with Path(file).open("rb") as stream:
             head = stream.read(_HEAD)
     except (OSError, ValueError):
         return False
-    return b"\0" in head or head.startswith(_SDF)
+    return b"\0" in head or head.startswith(_TITLES)
 
 
 def read_scan(owner: str, file: str | Path) -> Grid:
