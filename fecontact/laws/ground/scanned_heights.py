@@ -21,7 +21,7 @@ Grid = tuple[Array, float, float]  # heights (N, M) over x and y, NaN if missing
 
 
 def is_scan(file: str | Path) -> bool:
-    """Whether a file holds binary data, or begins as an SDF or Wyko file, not columns of numbers."""
+    """Whether a file holds binary data, or begins as SDF or Wyko files, not columns of numbers."""
     try:
         with Path(file).open("rb") as stream:
             head = stream.read(_HEAD)
