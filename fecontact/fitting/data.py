@@ -1,7 +1,7 @@
 """Data that a model is fitted to: values, deviations, and what the model gives in their place."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar
 
 import numpy as np
@@ -10,6 +10,7 @@ from fecontact.core.checks import as_floats
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
+from fecontact.study.study import Study
 from fecontact.system.contact_system import ContactSystem
 
 
@@ -24,9 +25,17 @@ class FitData:
     ----------
     name : str
         Name in tables and pictures; by default that of the class.
+    changes : mapping of dotted name to value
+        Parameters of the model in this measurement: its level, the preload of this assembly. The
+        fit sets them before it calls :meth:`predicted`.
+    model : ContactSystem or Study, optional
+        Model of this measurement, such as of another assembly with the same joint, in place of that
+        of the fit. It has the fitted parameters by the same names.
     """
 
     name: str = ""
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    model: ContactSystem | Study | None = None
     # Field that holds the measured numbers.
     compared: ClassVar[str] = "values"
 

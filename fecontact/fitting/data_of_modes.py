@@ -252,7 +252,8 @@ class ReceptanceData(FitData):
 class ResponseData(FitData):
     """Amplitudes over the frequency of the excitation, compared with harmonic balance.
 
-    Of several amplitudes at a frequency the one nearest to the measured one counts.
+    Of several amplitudes at a frequency the one nearest to the measured one counts. Several levels
+    are several data, with ``changes={"drive.amplitude_x": 2e-3}``.
 
     Parameters
     ----------
@@ -262,9 +263,6 @@ class ResponseData(FitData):
         Standard deviations of the amplitudes; without any, they follow from the residuals.
     point, component
         Displacement that was measured.
-    changes : mapping
-        Parameters of the model in this measurement, such as its level:
-        ``{"drive.amplitude_x": 2e-3}``.
     parameter : str
         Dotted name of the frequency of the excitation [Hz].
     method : HarmonicBalance, optional
@@ -285,7 +283,6 @@ class ResponseData(FitData):
     deviation: Any = None
     point: str | int = "B"
     component: str = "x"
-    changes: Any = None
     parameter: str = "drive.frequency_hz"
     method: HarmonicBalance | None = None
     options: ContinuationOptions | None = None
@@ -305,7 +302,7 @@ class ResponseData(FitData):
         low, high = float(wanted.min()), float(wanted.max())
         method = self.method or HarmonicBalance(stability=None)
         found = frequency_response(
-            system.with_(self.changes or {}), (low, high * (1.0 + 1e-9)), self.parameter,
+            system, (low, high * (1.0 + 1e-9)), self.parameter,
             observe=(self.point, self.component), method=method, options=self.options)
         if found.branches[0].status is BranchStatus.INTERRUPTED:
             raise KeyboardInterrupt

@@ -117,6 +117,12 @@ def _problem(model: Any, parameters: Any, data: Any, exact: bool) -> Problem:
         require_kind("fit", FitData, data=one)
     if not several:
         raise InputError("fit: data is empty; give one measurement at least.")
+    for one in several:
+        require_kind(f"fit: '{one.title}'", (ContactSystem, Study, type(None)), model=one.model)
+        require_kind(f"fit: '{one.title}'", Mapping, changes=one.changes)
+        if both := set(one.changes) & set(parameters):
+            raise InputError(f"fit: '{one.title}' changes {choices(both)}, which is fitted; leave "
+                             f"it out of one of both.")
     titles = [one.title for one in several]
     if twice := {title for title in titles if titles.count(title) > 1}:
         raise InputError(f"fit: several data are called {choices(twice)}; give each a name.")
@@ -130,7 +136,7 @@ def _problem(model: Any, parameters: Any, data: Any, exact: bool) -> Problem:
         raise InputError(f"fit: {len(ranges)} parameters cannot be found from "
                          f"{len(problem.measured)} numbers.")
     # Names that do not exist are an error of the call, not of a start.
-    _ = problem.system(np.array([one.first for one in ranges]))
+    _ = problem.systems(np.array([one.first for one in ranges]))
     return problem
 
 

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,7 @@ def study_data(study: Study) -> tuple[FitData, ...]:
     found = []
     for number, one in enumerate(settings_of(study).data):
         with located(f"{study.title}: [[fit.data]] {number}:"):
-            found.append(_KINDS[one.kind](study, one))
+            found.append(replace(_KINDS[one.kind](study, one), changes=dict(one.changes)))
     return tuple(found)
 
 
@@ -184,7 +185,7 @@ def _receptance(study: Study, one: FitDataSettings) -> FitData:
 def _response(study: Study, one: FitDataSettings) -> FitData:
     test = _measurement(study, one, "frequency")
     return ResponseData(test.abscissa, np.abs(test.values[:, test.index(one.channel)]),
-                        one.deviation, one.point, one.component, dict(one.changes),
+                        one.deviation, one.point, one.component,
                         method=HarmonicBalance(one.harmonics, stability=None), name=one.name)
 
 

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -79,31 +80,53 @@ class Problem:
         ends = np.cumsum([0, *(len(one.measured) for one in self.data)]).tolist()
         return [slice(a, b) for a, b in pairwise(ends)]
 
-    def system(self, u: Array) -> ContactSystem:
+    @cached_property
+    def _models(self) -> list[ContactSystem | Study]:
+        """Model of each data set, the same object for data with equal changes."""
+        found: list[tuple[FitData, ContactSystem | Study]] = []
+        for one in self.data:
+            model = next((known for other, known in found if other.model is one.model
+                          and other.changes == one.changes), None)
+            if model is None:
+                model = self.model if one.model is None else one.model
+                if one.changes:
+                    model = (model.with_(one.changes) if isinstance(model, ContactSystem)
+                             else changed(model, one.changes))
+            found.append((one, model))
+        return [model for _, model in found]
+
+    def system(self, u: Array, model: ContactSystem | Study | None = None) -> ContactSystem:
         """Model with the parameters at places u (p,); InputError for values that it refuses."""
+        model = self.model if model is None else model
         values = dict(zip(self.names, values_of(self.parameters, u).tolist(), strict=True))
-        if isinstance(self.model, ContactSystem):
-            return self.model.with_(values)
-        if not any(of_basis(name, prestress=self.model.basis.prestress) for name in self.names):
-            _ = self.model.reduced  # made once, for all values
-        study = changed(self.model, values)
-        study.reuse(self.model)
+        if isinstance(model, ContactSystem):
+            return model.with_(values)
+        if not any(of_basis(name, prestress=model.basis.prestress) for name in self.names):
+            _ = model.reduced  # made once, for all values
+        study = changed(model, values)
+        study.reuse(model)
         return study.system()
+
+    def systems(self, u: Array) -> list[ContactSystem]:
+        """Model of each data set with the parameters at places u (p,)."""
+        made = {id(model): model for model in self._models}
+        ready = {key: self.system(u, model) for key, model in made.items()}
+        return [ready[id(model)] for model in self._models]
 
     def predicted(self, u: Array) -> Array:
         """Numbers (n,) of the model at places u (p,); FecontactError if it has none there."""
         with quiet():
-            system = self.system(u)
-            return np.concatenate([_of(one, system) for one in self.data])
+            return np.concatenate([_of(one, system) for one, system in zip(
+                self.data, self.systems(u), strict=True)])
 
     def key(self) -> str:
         """Hash of all that the numbers depend on."""
-        model = (self.model.to_toml() if isinstance(self.model, Study)
-                 else repr(sorted(self.model.parameters().items(), key=lambda one: one[0])))
-        body = hashlib.sha256(f"{__version__} {model} {self.names} {self.parameters} "
-                              f"{self.exact}".encode())
+        body = hashlib.sha256(f"{__version__} {_written(self.model)} {self.names} "
+                              f"{self.parameters} {self.exact}".encode())
         for one in self.data:
-            body.update(repr(type(one)).encode())
+            body.update(repr((type(one), sorted(one.changes.items()))).encode())
+            if one.model is not None:
+                body.update(_written(one.model).encode())
             body.update(np.ascontiguousarray(one.measured).tobytes())
             if one.deviations is not None:
                 body.update(np.ascontiguousarray(one.deviations).tobytes())
@@ -196,17 +219,17 @@ class Evaluator:
         """
         problem = self.problem
         J = np.zeros((len(problem.measured), len(u)))
-        system: ContactSystem | None = None
+        systems: list[ContactSystem] = []
         for k, name in enumerate(problem.names):
             if free is not None and not free[k]:
                 continue
             done = []
-            for one, part in zip(problem.data, problem.parts, strict=True):
+            for i, (one, part) in enumerate(zip(problem.data, problem.parts, strict=True)):
                 found = None
                 if problem.exact and self.exact.get((one.title, name), True):
                     with quiet():
-                        system = problem.system(u) if system is None else system
-                        found = one.derivative(system, name)
+                        systems = systems or problem.systems(u)
+                        found = one.derivative(systems[i], name)
                 self.exact[one.title, name] = found is not None
                 if found is not None:
                     value = problem.parameters[k].value(float(u[k]))
@@ -246,6 +269,12 @@ class Evaluator:
     def kinked(self) -> list[str]:
         """Names of parameters whose last differences to both sides disagree."""
         return [name for name, apart in self.kinks.items() if apart > _KINK]
+
+
+def _written(model: ContactSystem | Study) -> str:
+    """Text of all values of a model."""
+    return (model.to_toml() if isinstance(model, Study)
+            else repr(sorted(model.parameters().items(), key=lambda one: one[0])))
 
 
 def _of(one: FitData, system: ContactSystem) -> Array:

@@ -161,7 +161,7 @@ class FitDataSettings:
     excitation_component : str
         Direction of this force.
     changes : mapping of dotted name to float
-        Parameters of the model in the measurement of a response, such as its level.
+        Keys of the study in this measurement: the level of a response, the preload of an assembly.
 
     Raises
     ------

@@ -116,6 +116,28 @@ def test_profiles_and_the_posterior_distribution_of_a_study(study, cli, tmp_path
     assert "exists and is no page of fecontact" in said
 
 
+def test_assemblies_with_other_preloads_are_fitted_together(study, cli, tmp_path):
+    """The normal load of the second one multiplies its limit of friction by 1.5."""
+    truth = fc.Study.read(study).with_({"friction.friction_coefficient": 0.4, "load.normal": 150.0,
+                                        "friction.stiffness": 1e6}).system()
+    force = LoopData(PULL, np.zeros(len(PULL)), 1.0).predicted(truth)
+    rows = "\n".join(f"{k}, {x:.9g}, {F:.9g}" for k, (x, F) in enumerate(
+        zip(PULL, force, strict=True)))
+    (tmp_path / "second.csv").write_text(f"time [s], pull [m], force [N]\n{rows}\n")
+    second = STUDY.partition("[[fit.data]]")[2].replace("loop.csv", "second.csv")
+    study.write_text(f"""{STUDY}name = "first"
+[[fit.data]]{second}name = "second"
+changes = {{ "load.normal" = 150.0 }}
+""")
+    found = fit_study(fc.Study.read(study))
+    assert found["friction.friction_coefficient"] == pytest.approx(0.4, rel=0.02)
+    assert found.chi_square < 1.5 * found.freedom
+    study.write_text(study.read_text().replace('"load.normal"', '"load.norml"'))
+    code, _, said = cli("fit", str(study))
+    assert code == 1
+    assert "did you mean 'normal'" in said
+
+
 @pytest.mark.long
 def test_two_processes_give_the_same(study):
     read = fc.Study.read(study)

@@ -1,5 +1,7 @@
 """Fits of mechanical models: loops, decays, modes, responses, histories, against known truths."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import binom
@@ -325,7 +327,7 @@ def test_a_response_finds_spring_and_slider():
     rng = np.random.default_rng(9)
     noisy = []
     for one in data:
-        A = one.predicted(jenkins())
+        A = one.predicted(jenkins().with_(one.changes))
         noisy.append(ResponseData(hertz, A * (1.0 + 0.01 * rng.standard_normal(25)), 0.01 * A,
                                   changes=one.changes, method=method,
                                   options=options, name=one.name))
@@ -348,6 +350,29 @@ def test_several_kinds_of_data_together():
     assert found.estimates == pytest.approx([1e6, 0.4], rel=1e-4)
     alone = fc.fit(iwan(5e5, 0.3), IWAN, LoopData(PULL, force, 1.0))
     assert found.deviations["friction.stiffness"] < 0.2 * alone.deviations["friction.stiffness"]
+
+
+def test_several_assemblies_at_once():
+    """Two normal loads, and another body with the same joint, have one coefficient of friction."""
+    force = LoopData(PULL, np.zeros(len(PULL)), 1.0)
+    heavy = iwan().with_({"normal.force": 80.0})
+    rng = np.random.default_rng(4)
+    data = [replace(force, name=name, changes=changes, model=model, deviation=0.3, force=(
+        force.predicted((model or iwan()).with_(changes)) + 0.3 * rng.standard_normal(len(PULL))))
+        for name, changes, model in (("a", {}, None), ("b", {"normal.force": 100.0}, None),
+                                     ("c", {}, heavy))]
+    found = fc.fit(iwan(5e5, 0.3), IWAN, data)
+    for name, truth in (("friction.stiffness", 1e6), ("friction.friction_coefficient", 0.4)):
+        assert abs(found[name] - truth) < 4.0 * found.deviations[name]
+    assert found.chi_square / found.freedom == pytest.approx(1.0, abs=0.3)
+    # Each limit of friction grows with its normal load, by which it weighs.
+    alone = [fc.fit(iwan(5e5, 0.3), IWAN, one) for one in data]
+    assert found.place_covariance == pytest.approx(np.linalg.inv(sum(
+        np.linalg.inv(one.place_covariance) for one in alone)), rel=0.1)
+    with pytest.raises(fc.InputError, match="'b' changes 'normal.force', which is fitted"):
+        fc.fit(iwan(), {"normal.force": (10.0, 200.0)}, data)
+    with pytest.raises(fc.InputError, match="model must be"):
+        fc.fit(iwan(), IWAN, replace(force, model=3))
 
 
 @pytest.mark.parametrize(("call", "told"), [

@@ -21,7 +21,7 @@ REACH = 5.0
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
     """Bags of the two numbers in place of contact systems, which take milliseconds to make."""
-    def bag(problem, u):
+    def bag(problem, u, model=None):
         given = {OFFSET: 0.5, SLOPE: 0.5} | {name: one.value(u[k]) for k, (name, one) in enumerate(
             zip(problem.names, problem.parameters, strict=True))}
         return SimpleNamespace(ground=SimpleNamespace(speed=given[OFFSET]),
