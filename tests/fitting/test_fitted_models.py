@@ -369,7 +369,7 @@ def test_several_assemblies_at_once():
     alone = [fc.fit(iwan(5e5, 0.3), IWAN, one) for one in data]
     assert found.place_covariance == pytest.approx(np.linalg.inv(sum(
         np.linalg.inv(one.place_covariance) for one in alone)), rel=0.1)
-    with pytest.raises(fc.InputError, match="'b' changes 'normal.force', which is fitted"):
+    with pytest.raises(fc.InputError, match=r"'b' changes 'normal\.force', which is fitted"):
         fc.fit(iwan(), {"normal.force": (10.0, 200.0)}, data)
     with pytest.raises(fc.InputError, match="model must be"):
         fc.fit(iwan(), IWAN, replace(force, model=3))
