@@ -64,6 +64,10 @@ class FitData:
         """Numbers (n,) that a model gives in place of the measured ones; FecontactError if none."""
         raise NotImplementedError
 
+    def rescaled(self, factor: float) -> "FitData | None":
+        """Copy whose given motion is a factor times as large; None for data without one."""
+        return None
+
     def derivative(self, system: ContactSystem, parameter: str) -> Array | None:
         """Exact derivative (n,) of :meth:`predicted`; None where only differences give it."""
         return None

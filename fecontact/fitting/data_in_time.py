@@ -1,6 +1,6 @@
 """Data in time and along paths: histories, ring-downs, hysteresis loops."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -275,8 +275,11 @@ class LoopData(FitData):
         freeze(self, **columns, deviation=spread(self.deviation, len(columns["force"]),
                                                  "LoopData"))
         if self.path is None:
-            freeze(self, path=LoadPath(**{self.along: tuple(columns["displacement"].tolist())},
-                                       steps=1))
+            freeze(self, path=self._plain_path())
+
+    def _plain_path(self) -> LoadPath:
+        """Path along the displacements."""
+        return LoadPath(**{self.along: tuple(self.displacement.tolist())}, steps=1)
 
     def predicted(self, system: ContactSystem) -> Array:
         """Forces (n,) of the model [N]."""
@@ -287,6 +290,12 @@ class LoopData(FitData):
             raise AnalysisError(f"The loading ends at point {len(found) - 1} of "
                                 f"{len(self.force) - 1} without an equilibrium.")
         return np.asarray(found.loop(action=self.along).force)
+
+    def rescaled(self, factor: float) -> "LoopData | None":
+        """Copy with displacements that are a factor times as large; None along a path."""
+        if self.path != self._plain_path():
+            return None
+        return replace(self, displacement=factor * self.displacement, path=None)
 
     def curves(self) -> list[Curve]:
         """Force over displacement."""

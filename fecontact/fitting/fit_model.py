@@ -2,13 +2,21 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fecontact.core.checks import as_count, as_path, require_kind
-from fecontact.core.errors import AnalysisError, InputError, choices, require_positive
+from fecontact.core.errors import (
+    AnalysisError,
+    FecontactError,
+    InputError,
+    choices,
+    require_positive,
+)
 from fecontact.core.progress import counting_bar, shown
 from fecontact.core.tables import from_table
 from fecontact.core.types import Array
@@ -21,6 +29,9 @@ from fecontact.study.study import Study
 from fecontact.sweeps.executors import opened
 from fecontact.system.contact_system import ContactSystem
 
+# Ratio of the sum of squares to its expectation from which on units are doubted, and part of it
+# that another unit must leave.
+_DOUBTFUL, _BETTER = 4.0, 0.5
 Progress = Callable[[int, int], None]
 
 
@@ -208,4 +219,34 @@ def _result(
     return Fit(problem, options, best.places, jacobian, known.predicted(best.places),
                float((residual**2).sum()), starts,
                {f"{title}: {name}": "exact" if exact else "differences"
-                for (title, name), exact in known.exact.items()}, tuple(known.kinked()))
+                for (title, name), exact in known.exact.items()}, tuple(known.kinked()),
+               _motion_questions(problem, (best.start, best.places), residual))
+
+
+def _motion_questions(problem: Problem, places: tuple[Array, ...], residual: Array
+                      ) -> tuple[str, ...]:
+    """Questions about given motions that fit better a thousand times as large, or as small.
+
+    The model is compared at the start and at the best values, which a wrong unit leads astray.
+    """
+    found = []
+    for one, part in zip(problem.data, problem.parts, strict=True):
+        own = float((residual[part] ** 2).sum())
+        if problem.weighted and own < _DOUBTFUL * len(residual[part]):
+            continue
+        for factor in (1e-3, 1e3):
+            other = one.rescaled(factor)
+            if other is not None and _least(replace(problem, data=(other,)), places) < (
+                    _BETTER * own):
+                found.append(f"The motion of '{one.title}' fits better if it is {factor:g} times "
+                             f"as large: is it in another unit? Then give units.")
+    return tuple(found)
+
+
+def _least(problem: Problem, places: tuple[Array, ...]) -> float:
+    """Least sum of squares of the weighted residuals at some places; infinite if all fail."""
+    known, squares = Evaluator(problem), [np.inf]
+    for u in places:
+        with suppress(FecontactError):
+            squares.append(float((known.residual(u) ** 2).sum()))
+    return min(squares)

@@ -12,7 +12,7 @@ from fecontact.analysis.histories import quantity_unit
 from fecontact.analysis.receptance import response_unit
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, ModelWarning
+from fecontact.core.errors import InputError, ModelWarning, choices
 from fecontact.core.tables import located
 from fecontact.fitting.data import FitData
 from fecontact.fitting.data_in_time import DecayData, HistoryData, LoopData
@@ -33,7 +33,7 @@ from fecontact.study.study import Study
 from fecontact.system.contact_system import ContactSystem
 
 # Words of problems of a measurement that a fit does not stop for.
-_DOUBTS = ("gap", "thousandth", "overloaded")
+_DOUBTS = ("gap", "thousandth", "overloaded", "ascend")
 
 
 def fit_study(
@@ -90,14 +90,26 @@ def study_data(study: Study) -> tuple[FitData, ...]:
     return tuple(found)
 
 
-def _measurement(study: Study, one: FitDataSettings, axis: Axis) -> Measurement:
+def _measurement(
+    study: Study, one: FitDataSettings, axis: Axis, *channels: str | None, even: bool = False
+) -> Measurement:
+    """Measurement of a file, without the rows in which the channels that are used lack numbers.
+
+    Rows stay if they must be evenly spaced. Warnings tell what looks wrong.
+    """
     assert one.file is not None
     found = read_measurement(study.folder / one.file, axis=axis, units=dict(one.units) or None)
     found = found.between(one.t_start, one.t_end) if axis == "time" else found
-    for problem in found.problems:
-        if any(word in problem for word in _DOUBTS):
-            warnings.warn(f"{one.file}: {problem}.", ModelWarning, stacklevel=2)
-    return found
+    used = [found.names[found.index(name)] for name in channels]
+    doubts = [problem for problem in found.problems if any(word in problem for word in _DOUBTS)]
+    doubts += [note for note in found.notes if any(f"'{name}'" in note for name in used)]
+    known = found if even else found.known(*used)
+    if lost := len(found) - len(known):
+        doubts.append(f"In {lost} of {len(found)} rows there is no number for {choices(used)}; the "
+                      f"other rows are taken")
+    for problem in doubts:
+        warnings.warn(f"{one.file}: {problem}.", ModelWarning, stacklevel=2)
+    return known
 
 
 def _channel(test: Measurement, channel: str | None, unit: str) -> int:
@@ -129,14 +141,14 @@ class _Preloaded:
 
 
 def _loop(study: Study, one: FitDataSettings) -> FitData:
-    test = _measurement(study, one, "time")
+    test = _measurement(study, one, "time", one.channel, one.against)
     x, force = (test.series(_channel(test, name, unit))[1] for name, unit in (
         (one.against, "m"), (one.channel, "N")))
     return LoopData(x, force, one.deviation, one.along, name=one.name)
 
 
 def _history(study: Study, one: FitDataSettings) -> FitData:
-    test = _measurement(study, one, "time")
+    test = _measurement(study, one, "time", one.channel)
     time, values, _, _ = test.series(_channel(test, one.channel, quantity_unit(
         one.quantity, one.component)))
     return HistoryData(time, values, one.deviation, one.quantity, one.point, one.component,
@@ -161,7 +173,7 @@ def _curve(study: Study, one: FitDataSettings) -> tuple[Any, dict[str, Any]]:
         options["frequency_hz"] = one.frequency_hz
     if one.t_start is not None:
         options["t_start"] = one.t_start
-    test = _measurement(study, one, "time")
+    test = _measurement(study, one, "time", one.channel, even=True)
     return ring_down(test, channel=test.index(one.channel), **options), options
 
 
@@ -172,7 +184,7 @@ def _frequencies(study: Study, one: FitDataSettings) -> FitData:
 
 
 def _receptance(study: Study, one: FitDataSettings) -> FitData:
-    test = _measurement(study, one, "frequency")
+    test = _measurement(study, one, "frequency", one.channel)
     k = test.index(one.channel)
     kind = response_kind(test.channels[k].unit)
     pushed, seen = (one.excitation, one.excitation_component), (one.point, one.component)
@@ -183,7 +195,7 @@ def _receptance(study: Study, one: FitDataSettings) -> FitData:
 
 
 def _response(study: Study, one: FitDataSettings) -> FitData:
-    test = _measurement(study, one, "frequency")
+    test = _measurement(study, one, "frequency", one.channel)
     return ResponseData(test.abscissa, np.abs(test.values[:, test.index(one.channel)]),
                         one.deviation, one.point, one.component,
                         method=HarmonicBalance(one.harmonics, stability=None), name=one.name)

@@ -85,6 +85,8 @@ class Fit(Summarised):
         'exact' or 'differences' for each data set and parameter, ``"history: friction.decay"``.
     kinks : tuple of str
         Parameters whose derivatives to both sides disagree at the best values.
+    questions : tuple of str
+        Questions about the unit of motions that were given.
     """
 
     problem: Problem
@@ -96,6 +98,7 @@ class Fit(Summarised):
     starts: tuple[FitStart, ...]
     derivatives: Mapping[str, str] = field(default_factory=dict)
     kinks: tuple[str, ...] = ()
+    questions: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -299,7 +302,7 @@ class Fit(Summarised):
                   for name in self.on_bounds]
         found += [f"The derivatives over {name} to both sides differ: a contact changes its state "
                   f"there, and its interval is a rough one." for name in self.kinks]
-        found += self._pairs() + self._unit_questions()
+        found += self._pairs() + self._unit_questions() + list(self.questions)
         failed = [one for one in self.starts if one.failed]
         if failed:
             found.append(f"{len(failed)} of {len(self.starts)} starts failed: {failed[0].message}")

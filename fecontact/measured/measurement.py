@@ -194,6 +194,24 @@ class Measurement(Summarised):
             raise InputError(f"{self._title}: fewer than two rows lie between {ends[0]:g} and "
                              f"{ends[1]:g}; it goes from {self.abscissa.min():g} to "
                              f"{self.abscissa.max():g}.")
+        return self._rows(kept)
+
+    def known(self, *channels: str | int | None) -> "Measurement":
+        """Rows in which some channels hold finite numbers.
+
+        Raises
+        ------
+        InputError
+            If fewer than two rows remain.
+        """
+        columns = [self.index(one) for one in channels]
+        kept = np.isfinite(self.values[:, columns]).all(axis=1)
+        if np.count_nonzero(kept) < 2:
+            raise InputError(f"{self._title}: fewer than two rows hold numbers in "
+                             f"{choices(self.names[k] for k in columns)}.")
+        return self if kept.all() else self._rows(kept)
+
+    def _rows(self, kept: Any) -> "Measurement":
         return replace(self, abscissa=self.abscissa[kept], values=self.values[kept],
                        coherence=None if self.coherence is None else self.coherence[kept])
 
@@ -245,8 +263,8 @@ class Measurement(Summarised):
         unit = "s" if self.axis == "time" else "Hz"
         return [f"Channel '{self.channels[k].name}' has {count(int(wrong.sum()), 'value')} that "
                 f"{'is' if wrong.sum() == 1 else 'are'} no number, the first at "
-                f"{self.abscissa[int(np.argmax(wrong))]:.6g} {unit}; leave that part out by "
-                f"between(), or repair the file"]
+                f"{self.abscissa[int(np.argmax(wrong))]:.6g} {unit}; leave that part out "
+                f"(between, or t_start and t_end), or repair the file"]
 
     def _of_abscissa(self) -> list[str]:
         what, unit = ("times", "s") if self.axis == "time" else ("frequencies", "Hz")
@@ -267,7 +285,7 @@ class Measurement(Summarised):
             first = int(gaps[0])
             return [f"The times have {count(len(gaps), 'gap')}, the first of {step[first]:.4g} s "
                     f"after {x[first]:.6g} s, where samples are {usual:.4g} s apart; take a part "
-                    f"without gaps by between()"]
+                    f"without gaps (between, or t_start and t_end)"]
         if (off := float(np.abs(step - usual).max())) > _UNEVEN * usual:
             return [f"The times are not even: steps are {usual:.4g} s, up to {off:.2g} s off; "
                     f"functions that need even times take resample = True"]

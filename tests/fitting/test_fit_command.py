@@ -260,6 +260,29 @@ def test_gaps_and_factors_of_a_thousand_are_told(study, cli):
     assert "are they in a unit that is 1000 times the SI unit?" in said
 
 
+def test_rows_without_numbers_are_left_out(study, cli):
+    def broken(lines):
+        return [lines[0].replace("pull [mm]", "pull"), *(
+            line.rpartition(",")[0] + ", nan" if k == 5 else line
+            for k, line in enumerate(lines[1:]))]
+
+    changed_table(study, broken)
+    code, out, said = cli("fit", str(study), "--set", 'fit.data.0.units.pull="mm"')
+    assert code == 0
+    assert "In 1 of 34 rows there is no number for 'force', 'pull'; the other rows are taken" in said
+    assert "friction.stiffness lies" not in said
+    assert "chi square" in out
+
+
+def test_displacements_in_another_unit_are_asked_about(study, cli):
+    changed_table(study, lambda lines: [lines[0].replace("[mm]", "[m]"), *lines[1:]])
+    code, _, said = cli("fit", str(study), "--set", "fit.starts=1")
+    assert code == 0
+    assert "The motion of 'loop' fits better if it is 0.001 times as large" in said
+    changed_table(study, lambda lines: [lines[0].replace("[m]", ""), *lines[1:]])
+    assert "channel 'pull' has no unit" in cli("fit", str(study), "--set", "fit.starts=1")[2]
+
+
 def test_parameters_that_are_hardly_told_apart_are_named(study, cli):
     study.write_text(STUDY.replace("[fit.parameters]", '''[fit.parameters]
 load.normal = { low = 30.0, high = 300.0, start = 100.0, scale = "log" }'''))
