@@ -26,6 +26,7 @@ from typing import ClassVar
 import numpy as np
 
 import fecontact as fc
+from fecontact.bifurcation import ContinuationOptions
 from fecontact.fitting import BackboneData, DecayData, FitData, HistoryData, LoopData
 from fecontact.laws import (
     BoucWenFriction,
@@ -294,11 +295,12 @@ def backbone() -> None:
         friction=FourParameterIwanFriction(2e7, 0.4, -0.5, 0.5),
         drive=fc.Drive(stiffness_y=1e5, damping_y=3.0))
     A = np.geomspace(1e-6, 1e-3, 20)
-    clean = BackboneData(AmplitudeCurve(A, np.ones(20), np.ones(20)), component="y").predicted(truth)
+    how = {"component": "y", "options": ContinuationOptions(step=0.1, largest_step=0.2)}
+    clean = BackboneData(AmplitudeCurve(A, np.ones(20), np.ones(20)), **how).predicted(truth)
     rng = np.random.default_rng(5)
     spread = np.concatenate([1e-4 * clean[:20], 0.01 * clean[20:]])
     y = clean + spread * rng.standard_normal(40)
-    data = BackboneData(AmplitudeCurve(A, y[:20], y[20:], spread[:20], spread[20:]), component="y")
+    data = BackboneData(AmplitudeCurve(A, y[:20], y[20:], spread[:20], spread[20:]), **how)
     begin, used = time.perf_counter(), time.process_time()
     found = fc.fit(truth, {
         "friction.stiffness": FitParameter(2e6, 2e8, 1e7, "log"),

@@ -241,7 +241,7 @@ def test_what_looks_wrong_is_told():
     assert "do not ascend after 0.388672 s, in row 200" in problems(time=late)
     assert "not even: steps are" in problems(time=TIME + 1e-4 * np.sin(40.0 * TIME))
     assert "largest value, 1 mm/s, for" in problems(np.clip(MOTION, -1.0, 1.0))
-    with pytest.raises(fc.InputError, match="leave that part out .between, or t_start"):
+    with pytest.raises(fc.InputError, match=r"leave that part out \(between, or t_start"):
         ring_down(Measurement(TIME, holes, ("x",)))
     part = Measurement(TIME, holes, ("x",)).between(0.1, 0.5)
     assert part.problems == ()
