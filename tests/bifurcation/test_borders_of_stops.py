@@ -109,7 +109,7 @@ def test_slip_that_restarts_behind_an_impact_that_stops_it():
     motion = periodic_motion(field.in_time(), solver=INELASTIC, initial=[0.0, 0.5, 0.0, 0.0],
                              rtol=1e-9)
     problem, u = orbit_from(field, field.values, 0, float(motion.times[-1]), motion.states[-1],
-                            np.pi, 1, np.ones(5), 1e-9, INELASTIC)
+                            np.pi, 1, widths=np.ones(5), rtol=1e-9, solver=INELASTIC)
     struck = next(i for i, phase in enumerate(problem.phases) if phase.strike is not None)
     assert problem.phases[struck].strike.modes == (STICK,)
     assert problem.phases[struck].cluster() is None

@@ -180,7 +180,7 @@ def phases_of(system, solver, initial, periods=1):
     motion = periodic_motion(system, solver=solver, initial=initial, rtol=1e-9)
     return orbit_from(field, field.values, 0, float(motion.times[-1]), motion.states[-1],
                       float(motion.times[-1] - motion.times[0]), motion.periods,
-                      np.append(motion.amplitudes, 1.0), 1e-9, solver)
+                      widths=np.append(motion.amplitudes, 1.0), rtol=1e-9, solver=solver)
 
 
 def test_slip_that_rebounds_in_an_impact_goes_on():

@@ -296,7 +296,7 @@ def test_derivatives_of_the_equations():
     motion = periodic_motion(system, solver=FILIPPOV, rtol=1e-10)
     problem, u = orbit_from(field, field.values, 0, motion.times[0], motion.states[0],
                             motion.times[-1] - motion.times[0], motion.periods,
-                            np.append(motion.amplitudes, 1.0), 1e-10, FILIPPOV)
+                            widths=np.append(motion.amplitudes, 1.0), rtol=1e-10, solver=FILIPPOV)
     assert problem.count >= 4
     matrix, step = problem.linearise(u).matrix, 1e-4
     for k in range(len(u)):

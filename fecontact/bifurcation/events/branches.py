@@ -39,7 +39,7 @@ _BESIDE = 1e-3
 
 def orbit_from(
     field: ContactField, values: Array, free: int, begin: float, start: Array, period: float,
-    periods: int, widths: Array, rtol: float, solver: SetValued,
+    periods: int, *, widths: Array, rtol: float, solver: SetValued,
 ) -> tuple[EventOrbit, Array]:
     """Problem and first guess from a state of a motion of this period.
 

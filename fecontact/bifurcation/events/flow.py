@@ -16,7 +16,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
-from fecontact.core.records import ANY, IntegerVector, Matrix, Size, Vector
+from fecontact.core.records import ANY, Matrix, Size, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.nonsmooth.dop853 import ERROR_3, ERROR_5, STAGES, A, B, C
 from fecontact.integrate.nonsmooth.equations import (
@@ -27,6 +27,7 @@ from fecontact.integrate.nonsmooth.equations import (
 )
 from fecontact.integrate.nonsmooth.event_search import Workspace
 from fecontact.integrate.nonsmooth.problem import (
+    CLUSTERS,
     CREEP,
     FORCE,
     GRIP,
@@ -34,11 +35,12 @@ from fecontact.integrate.nonsmooth.problem import (
     RATE,
     SLIP,
     STICK,
+    WITH_WORK,
     Evaluation,
     NonsmoothProblem,
     Progress,
 )
-from fecontact.integrate.nonsmooth.rigid_stops import change_contacts_at
+from fecontact.integrate.nonsmooth.rigid_stops import Rebound, change_contacts_at
 from fecontact.integrate.nonsmooth.transitions import decide_clusters
 from fecontact.integrate.step_loop import (
     COUNTS,
@@ -52,6 +54,7 @@ from fecontact.integrate.step_loop import (
     step_loop,
 )
 from fecontact.system.node_forces import normal_force
+from fecontact.system.nodes import MODES, NODES
 
 # Step of differences, in sizes of the states or in the longest step, and their weights: to both
 # sides from -2 to 2, to one from 0 to 4.
@@ -63,14 +66,36 @@ _SHORTEST = 1e-13
 _FIRST = 1e-100
 
 
+# Number of states, and that of the directions of derivatives: states, time and parameter.
+STATES = Size("states")
+DIRECTIONS = STATES + 2
+
+
+class ContactState(NamedTuple):
+    """Status (k,) of the clusters, and whether stops are closed, (n,)."""
+
+    status: Annotated[Integers, CLUSTERS]
+    closed: Annotated[Integers, NODES]
+
+
+class RatesWorkspace(NamedTuple):
+    """Workspace of the rates at a state: what acts there; a state with its work, and its rates."""
+
+    evaluation: Evaluation
+    full: Annotated[Array, WITH_WORK]
+    rate: Annotated[Array, WITH_WORK]
+
+
 @helper
-def _rates(t, y, p, status, closed, w, full, rate, out):
+def _rates(t, y, p, contact, workspace, out):
+    """Fill out (d,) with the rates of the states y (d,) at a time."""
     d = len(out)
     for i in range(d):
-        full[i] = y[i]
-    derivative(t, full, p, status, closed, w, rate)
+        workspace.full[i] = y[i]
+    derivative(t, workspace.full, p, contact.status, contact.closed, workspace.evaluation,
+               workspace.rate)
     for i in range(d):
-        out[i] = rate[i]
+        out[i] = workspace.rate[i]
 
 
 @helper
@@ -89,11 +114,6 @@ def _direction(i, step, p, status, w):
     return side
 
 
-# Number of states, and that of the directions of derivatives: states, time and parameter.
-STATES = Size("states")
-DIRECTIONS = STATES + 2
-
-
 class Given(NamedTuple):
     """A motion with friction and stops whose states are kept.
 
@@ -108,8 +128,8 @@ class Given(NamedTuple):
     begin, sign : float
         Time at the begin [s]; -1 for a motion backwards. Times of the run are sizes of the times
         since then.
-    status, closed : (k,), (n,) integer arrays
-        Status of the clusters, and whether stops are closed.
+    contact : ContactState
+        The state that is kept.
     sizes : (d,) array
         Sizes of the states.
     """
@@ -123,8 +143,7 @@ class Given(NamedTuple):
     longest: float
     begin: float
     sign: float
-    status: IntegerVector
-    closed: IntegerVector
+    contact: ContactState
     sizes: Annotated[Array, STATES]
 
 
@@ -144,11 +163,9 @@ class Rows(NamedTuple):
 
 
 class FlowWorkspace(NamedTuple):
-    """Workspace of a step: ``full`` and ``rate`` for a state with work; stages and derivatives."""
+    """Workspace of a step: rates, stages and derivatives."""
 
-    evaluation: Evaluation
-    full: Vector
-    rate: Vector
+    rates: RatesWorkspace
     around: Annotated[Array, STATES]
     near: Annotated[Array, STATES]
     places: Annotated[Array, STAGES + 1, STATES]
@@ -181,43 +198,37 @@ class Step(NamedTuple):
     wanted: float
 
 
-@helper
-def _rates_in(t, y, p, given, workspace, out):
-    """Rates of the states y at a time."""
-    _rates(t, y, p, given.status, given.closed, workspace.evaluation, workspace.full,
-           workspace.rate, out)
-
-
 @routine
 def _add_differences(t, y, given, workspace):
     """Fill ``workspace.J`` with the derivatives of the rates: by states, time and parameter."""
     p, near, around, out, d = given.problem, workspace.near, workspace.around, workspace.J, len(y)
+    contact, work = given.contact, workspace.rates
     out[:] = 0.0
-    _rates_in(t, y, p, given, workspace, near)
+    _rates(t, y, p, contact, work, near)
     for i in range(d):
         step = PART * given.sizes[i]
-        side = _direction(i, step, p, given.status, workspace.evaluation)
+        side = _direction(i, step, p, contact.status, work.evaluation)
         for k in range(5):
             weight = _BOTH[k] if side == 0 else _ONE[k] * side
             if weight == 0.0:
                 continue
             around[:] = y
             around[i] += step * (k - 2 if side == 0 else k * side)
-            _rates_in(t, around, p, given, workspace, near)
+            _rates(t, around, p, contact, work, near)
             for j in range(d):
                 out[j, i] += weight * near[j] / step
         # The slip velocities at y itself, for the next state.
-        _rates_in(t, y, p, given, workspace, near)
+        _rates(t, y, p, contact, work, near)
     if given.tick > 0.0:
         for k in range(5):
             if _BOTH[k] != 0.0:
-                _rates_in(t + (k - 2) * given.tick, y, p, given, workspace, near)
+                _rates(t + (k - 2) * given.tick, y, p, contact, work, near)
                 for j in range(d):
                     out[j, d] += _BOTH[k] * near[j] / given.tick
-    _rates_in(t, y, given.above, given, workspace, near)
+    _rates(t, y, given.above, contact, work, near)
     for j in range(d):
         out[j, d + 1] += near[j] / (2.0 * given.change)
-    _rates_in(t, y, given.below, given, workspace, near)
+    _rates(t, y, given.below, contact, work, near)
     for j in range(d):
         out[j, d + 1] -= near[j] / (2.0 * given.change)
 
@@ -233,7 +244,8 @@ def _set_stages(t, h, y, given, workspace):
                 total += (A[stage, k] if stage < STAGES else B[k]) * slopes[k, i]
             places[stage, i] = y[i] + h * total
         node = C[stage] if stage < STAGES else 1.0
-        _rates_in(t + node * h, places[stage], given.problem, given, workspace, slopes[stage])
+        _rates(t + node * h, places[stage], given.problem, given.contact, workspace.rates,
+               slopes[stage])
 
 
 @helper
@@ -351,9 +363,8 @@ def _pressed(j, p, w):
 
 @kernel
 def observe(
-    p: NonsmoothProblem, w: Evaluation, times: Vector, states: Matrix,
-    status: IntegerVector, closed: IntegerVector, full: Vector, rate: Vector, margins: Matrix,
-    rates: Matrix,
+    p: NonsmoothProblem, contact: ContactState, workspace: RatesWorkspace, at: Rows,
+    margins: Matrix, rates: Matrix,
 ) -> None:
     """Fill the margins of clusters and stops, (N, 2 k + n), and the rates (N, d), at states (N, d).
 
@@ -363,8 +374,9 @@ def observe(
     infinite. The force of an open node is what its law would pull.
     """
     clusters, n = len(p.rows), len(p.cluster)
-    for row in range(len(times)):
-        _rates(times[row], states[row], p, status, closed, w, full, rate, rates[row])
+    status, closed, w = contact.status, contact.closed, workspace.evaluation
+    for row in range(len(at.times)):
+        _rates(at.times[row], at.states[row], p, contact, workspace, rates[row])
         margins[row] = np.inf
         for c in range(clusters):
             if status[c] == STICK:
@@ -387,30 +399,39 @@ def observe(
                 margins[row, 2 * c + 1] = max(margins[row, 2 * c + 1], margins[row, place])
 
 
-@kernel
-def strike_rows(
-    p: NonsmoothProblem, w: Evaluation, t: float, state: Vector, status: IntegerVector,
-    closed: IntegerVector, full: Vector, rate: Vector, held: Matrix, pushing: Matrix,
-    speeds: Vector, coefficients: Vector,
-) -> None:
-    """Fill the arrays that an impact needs.
+class StrikeRows(NamedTuple):
+    """Constraints at an impact.
 
     ``held`` (n + k, m) are the rows of the constraints, ``pushing`` (n + k, m) those of unit
     impulses, ``speeds`` (n + k,) the penetration rates and slip velocities, and ``coefficients``
     (n,) those of friction at these.
     """
+
+    held: Annotated[Array, NODES + CLUSTERS, MODES]
+    pushing: Annotated[Array, NODES + CLUSTERS, MODES]
+    speeds: Annotated[Array, NODES + CLUSTERS]
+    coefficients: Annotated[Array, NODES]
+
+
+@kernel
+def set_strike_rows(
+    p: NonsmoothProblem, contact: ContactState, workspace: RatesWorkspace, t: float, state: Vector,
+    out: StrikeRows,
+) -> None:
+    """Fill the constraints at an impact in a state (d,)."""
     clusters, n, m = len(p.rows), len(p.cluster), p.rows.shape[1]
-    _rates(t, state, p, status, closed, w, full, rate, rate[: len(state)].copy())
+    w = workspace.evaluation
+    _rates(t, state, p, contact, workspace, workspace.rate[: len(state)].copy())
     w.friction[:] = 0.0
     for a in range(n + clusters):
         for i in range(m):
-            held[a, i], pushing[a, i] = held_row(a, i, p, w), pushing_row(a, i, p, w)
+            out.held[a, i], out.pushing[a, i] = held_row(a, i, p, w), pushing_row(a, i, p, w)
     for j in range(n):
         slip = w.nodes[j, SLIP]
-        speeds[j] = w.nodes[j, RATE]
-        coefficients[j] = slipping_force(j, abs(slip), 1.0, w.nodes[j, GRIP], p.system)
+        out.speeds[j] = w.nodes[j, RATE]
+        out.coefficients[j] = slipping_force(j, abs(slip), 1.0, w.nodes[j, GRIP], p.system)
     for c in range(clusters):
-        speeds[n + c] = w.slip[c]
+        out.speeds[n + c] = w.slip[c]
 
 
 @kernel
@@ -425,7 +446,7 @@ def decide(
     :func:`fecontact.integrate.nonsmooth.transitions.decide_clusters`.
     """
     if p.rigid != 0:
-        return change_contacts_at(p.change)(t, p, progress, workspace, w, slow, 0.0, 0.0,
+        return change_contacts_at(p.change)(t, p, progress, workspace, w, Rebound(slow, 0.0, 0.0),
                                             workspace.slopes[0])
     decide_clusters(t, p, progress, workspace, near, w, workspace.slopes[0])
     return 0.0

@@ -11,25 +11,35 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.events.flow import (
     PART,
     STATES,
+    ContactState,
     Data,
     FlowWorkspace,
     Given,
+    RatesWorkspace,
     Reached,
     Rows,
+    StrikeRows,
     flow,
     forces_of_touch,
     kinetic_coefficients,
     observe,
-    strike_rows,
+    set_strike_rows,
 )
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.records import allocate
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array
 from fecontact.integrate.nonsmooth.driver import nonsmooth_problem
-from fecontact.integrate.nonsmooth.problem import STICK, NonsmoothProblem, evaluation_for
+from fecontact.integrate.nonsmooth.problem import (
+    CLUSTERS,
+    STICK,
+    Evaluation,
+    NonsmoothProblem,
+    evaluation_for,
+)
 from fecontact.integrate.solvers import SetValued
 from fecontact.integrate.step_loop import FINISHED
+from fecontact.system.nodes import MODES, NODES
 from fecontact.system.powers import POWER_COUNT
 
 # In place of an event: the end of a period of the forcing.
@@ -104,9 +114,10 @@ class Phase:
         return self.status, self.closed
 
     @cached_property
-    def arrays(self) -> tuple[Integers, Integers]:
-        """Status (k,) and closed stops (n,) for kernels."""
-        return np.array(self.status, dtype=np.int64), np.array(self.closed, dtype=np.int64)
+    def contact(self) -> ContactState:
+        """The contact state for kernels."""
+        return ContactState(np.array(self.status, dtype=np.int64),
+                            np.array(self.closed, dtype=np.int64))
 
     def cluster(self, event: int | None = None) -> int | None:
         """The cluster to which an event belongs, by default its own; None for stops."""
@@ -158,9 +169,14 @@ class Motion:
         self.problem, self.rubbing = self._problem(values)
         self.clusters, self.nodes = len(self.problem.rows), len(self.problem.cluster)
         self.modes = self.problem.rows.shape[1]
-        self._evaluation = evaluation_for(self.problem)
-        full = np.zeros((2, 2 * self.modes + POWER_COUNT + self.nodes))
-        self._full, self._rate = full[0].copy(), full[1].copy()
+        size = 2 * self.modes + POWER_COUNT + self.nodes
+        self._workspace = RatesWorkspace(evaluation_for(self.problem), np.zeros(size),
+                                         np.zeros(size))
+
+    @property
+    def evaluation(self) -> Evaluation:
+        """What acts at the state that was looked at last."""
+        return self._workspace.evaluation
 
     @cached_property
     def kinetic(self) -> Array:
@@ -220,12 +236,11 @@ class Motion:
         states, slopes = np.empty((len(times), d)), np.empty((d if derivatives else 0, d + 2))
         above, below, change = self._perturbed if derivatives else (self.problem, self.problem, 1.0)
         given = Given(self.problem, above, below, change, self.tick, self.rtol, self.longest, begin,
-                      1.0 if times[-1] >= 0.0 else -1.0, *phase.arrays, self.sizes)
+                      1.0 if times[-1] >= 0.0 else -1.0, phase.contact, self.sizes)
         sizes, rows = {STATES: d}, Rows(np.abs(times), states)
         reached = allocate(Reached, sizes, state=np.array(start, dtype=float),
                            numbers=np.array([0.0, min(self.longest, rows.times[-1])]))
-        workspace = allocate(FlowWorkspace, sizes, evaluation=self._evaluation, full=self._full,
-                             rate=self._rate)
+        workspace = allocate(FlowWorkspace, sizes, rates=self._workspace)
         ended = flow(Data(given, reached, rows, slopes, workspace), _MOST_STEPS)
         if ended != FINISHED or not np.isfinite(states).all():
             raise AnalysisError("The motion between two events could not be followed.")
@@ -239,9 +254,9 @@ class Motion:
         """
         margins = np.empty((len(times), 2 * self.clusters + self.nodes))
         rates = np.empty_like(states)
-        observe(self.problem if problem is None else problem, self._evaluation,
-                np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states),
-                *phase.arrays, self._full, self._rate, margins, rates)
+        at = Rows(np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states))
+        observe(self.problem if problem is None else problem, phase.contact, self._workspace, at,
+                margins, rates)
         margins[:, 2 * self.clusters :][:, self._unwatched] = np.inf
         return margins, rates
 
@@ -282,14 +297,14 @@ class Motion:
     ) -> Array:
         """The state with closed stops at no height and without speed, to first order."""
         m = self.modes
-        held, _, speeds, _ = self._strike_rows(t, state, phase, problem)
+        found = self._strike_rows(t, state, phase, problem)
         closed = tuple(0 if j in stops else each for j, each in enumerate(phase.closed))
         heights = self.observed(np.array([t]), state[None], replace(phase, closed=closed),
                                 problem)[0][0, 2 * self.clusters :]
-        rows, each = held[list(stops)], list(stops)
+        rows, each = found.held[list(stops)], list(stops)
         after = state.copy()
         after[:m] -= rows.T @ np.linalg.solve(rows @ rows.T, heights[each])
-        after[m:] += rows.T @ np.linalg.solve(rows @ rows.T, speeds[each])
+        after[m:] += rows.T @ np.linalg.solve(rows @ rows.T, found.speeds[each])
         return after
 
     def slopes_of(
@@ -309,12 +324,12 @@ class Motion:
 
     def _strike_rows(
         self, t: float, state: Array, phase: Phase, problem: NonsmoothProblem | None
-    ) -> tuple[Array, Array, Array, Array]:
-        """See :func:`fecontact.bifurcation.events.flow.strike_rows`."""
-        k, n, m = self.clusters, self.nodes, self.modes
-        found = (np.empty((n + k, m)), np.empty((n + k, m)), np.empty(n + k), np.empty(n))
-        strike_rows(self.problem if problem is None else problem, self._evaluation, t,
-                    np.ascontiguousarray(state), *phase.arrays, self._full, self._rate, *found)
+    ) -> StrikeRows:
+        """Constraints at an impact at the end of a phase."""
+        found = allocate(StrikeRows, {NODES: self.nodes, CLUSTERS: self.clusters,
+                                      MODES: self.modes})
+        set_strike_rows(self.problem if problem is None else problem, phase.contact,
+                        self._workspace, t, np.ascontiguousarray(state), found)
         return found
 
     def strike_left(self, t: float, state: Array, phase: Phase) -> list[tuple[int, float]]:

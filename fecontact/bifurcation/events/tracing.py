@@ -180,7 +180,7 @@ def _require_decided(motion: Motion, progress: Progress, workspace: Workspace, t
     fastest = float(motion.sizes[motion.modes :].max())
     progress.largest[SLIP_SIZE] = fastest
     # Elsewhere it is the time of a flight.
-    if decide(motion.problem, motion._evaluation, progress, workspace, t, _NEAR * fastest,
+    if decide(motion.problem, motion.evaluation, progress, workspace, t, _NEAR * fastest,
               1e-12 * fastest) in (NO_ACCELERATION, NO_IMPULSES):
         raise AnalysisError("The contact state is not unique there.")
 
@@ -191,7 +191,7 @@ def _decided(
     """The state after an event, and the new contact state in ``progress``."""
     d, event, k = 2 * motion.modes, phase.event, motion.clusters
     progress.state[:d] = state
-    progress.status[:], progress.closed[:] = phase.arrays
+    progress.status[:], progress.closed[:] = phase.contact
     for flags in (workspace.released, workspace.arrived, workspace.touched, workspace.parting):
         flags[:] = False
     if event < 2 * k:

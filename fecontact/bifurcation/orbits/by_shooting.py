@@ -203,8 +203,8 @@ def _from_event_to_event(
     try:
         found = orbit_from(problem.field, values, problem.free, 0.0, problem.starts(u)[0].copy(),
                            problem.period(u), problem.periods,
-                           np.append(problem.scales[:d], problem.scales[-1]), problem.rtol,
-                           problem.solver)
+                           widths=np.append(problem.scales[:d], problem.scales[-1]),
+                           rtol=problem.rtol, solver=problem.solver)
     except AnalysisError as error:
         return None, f"The runs of the orbit were differenced: {error}"
     whole = {**replace(problem, limits=None).attributes(), "scales": found[0].scales,

@@ -54,6 +54,7 @@ from fecontact.integrate.nonsmooth.rigid_stops import (
     NO_ACCELERATION,
     NO_IMPULSES,
     RATE_ROUNDING,
+    Rebound,
     change_contacts_at,
     settle,
 )
@@ -119,12 +120,15 @@ def _place_size(j, p, limits, progress):
 
 
 @helper
-def _height(p, limits, progress):
-    """Largest distance of a stop from its ground so far, or size of its places now [m]."""
+def _rebound(slow, p, limits, progress):
+    """Rebounds after which stops close.
+
+    Their height is the largest distance of a stop from its ground so far, or size of its places.
+    """
     height = progress.largest[DEPTH_SIZE]
     for j in range(len(p.cluster)):
         height = max(height, _place_size(j, p, limits, progress))
-    return height
+    return Rebound(slow, height, 1e-9 * limits.longest)
 
 
 @helper
@@ -150,8 +154,8 @@ def _start(t, p, limits, progress, w, workspace):
             largest[RATE_SIZE] = max(largest[RATE_SIZE], abs(w.nodes[j, RATE]))
             largest[DEPTH_SIZE] = max(largest[DEPTH_SIZE], abs(depth))
         flight = change_contacts_at(p.change)(
-            t, p, progress, workspace, w, _slow(_SLOW, largest), _height(p, limits, progress),
-            1e-9 * limits.longest, workspace.rate)
+            t, p, progress, workspace, w, _rebound(_slow(_SLOW, largest), p, limits, progress),
+            workspace.rate)
         progress.counts[EVENTS] += 1 if workspace.touched.any() else 0
         return _outcome(flight)
     decide_clusters(t, p, progress, workspace, 1e-12 * largest[SLIP_SIZE], w, workspace.rate)
@@ -312,8 +316,7 @@ def _change_stops(t, again, p, limits, progress, w, workspace):
         workspace.touched[j] = event and closed[j] == 0
         workspace.parting[j] = event and closed[j] == 1
     return change_contacts_at(p.change)(
-        t, p, progress, workspace, w, slow, _height(p, limits, progress), 1e-9 * limits.longest,
-        workspace.slopes[0])
+        t, p, progress, workspace, w, _rebound(slow, p, limits, progress), workspace.slopes[0])
 
 
 @helper

@@ -9,6 +9,7 @@ whose changes of sign are found however close.
 # Compiled functions: their types are those of their signatures for numba.
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law, helper, routine
@@ -46,6 +47,17 @@ NOTE = Callable[[Step, float, int, NonsmoothProblem, Progress, Evaluation, Works
 note_at = function_at(NOTE)
 
 _LOOKS, _HALVINGS = 16, 44
+
+
+class View(NamedTuple):
+    """A step that is examined: what a run knows of it, and the events that are watched."""
+
+    step: Step
+    problem: NonsmoothProblem
+    progress: Progress
+    evaluation: Evaluation
+    workspace: Workspace
+    watch: Watch
 
 
 @helper
@@ -101,17 +113,20 @@ def _counts(rising, k, watch):
 
 
 @routine
-def _look(part, step, p, progress, w, workspace):
-    """Put the state within a step into ``workspace.state``, and what acts into w; the time."""
+def _look(part, view):
+    """Put the state within a step into its workspace, and what acts there; the time."""
+    step, progress, workspace = view.step, view.progress, view.workspace
     t = min(step.t + part * step.h, step.latest)
     interpolate(part, progress.state, workspace.parts, workspace.state)
-    derivative(t, workspace.state, p, progress.status, progress.closed, w, workspace.rate)
+    derivative(t, workspace.state, view.problem, progress.status, progress.closed, view.evaluation,
+               workspace.rate)
     return t
 
 
 @routine
-def _note_linear(k, upto, step, p, progress, w, workspace, watch):
+def _note_linear(k, upto, view):
     """Note the passages of a linear function of the state."""
+    watch, progress, workspace = view.watch, view.progress, view.workspace
     row, c, b = watch.own_parameters[k], workspace.nested, workspace.bound
     size = watch.states.shape[1]
     c[:] = 0.0
@@ -126,13 +141,14 @@ def _note_linear(k, upto, step, p, progress, w, workspace, watch):
     for i in range(sign_changes(b, workspace.halves, workspace.along, places)):
         sign = -sign
         if places[i] <= upto and _counts(sign > 0.0, k, watch):
-            t = _look(places[i], step, p, progress, w, workspace)
+            t = _look(places[i], view)
             _note(watch, t, FIRST_OWN + k, -1, workspace.state)
 
 
 @routine
-def _note_own(k, left, right, new, step, p, progress, w, workspace, watch):
+def _note_own(k, left, right, new, view):
     """Note the change of sign of a user's function between two looks."""
+    watch, workspace = view.watch, view.workspace
     g, row, size = event_at(watch.own[k]), watch.own_parameters[k], watch.states.shape[1]
     old = watch.own_values[k]
     rising = old < 0.0 <= new
@@ -141,60 +157,64 @@ def _note_own(k, left, right, new, step, p, progress, w, workspace, watch):
     low, high = left, right
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        t = _look(middle, step, p, progress, w, workspace)
+        t = _look(middle, view)
         value = g(t, workspace.state[:size], row)
         if (value >= 0.0) if rising else (value <= 0.0):
             high = middle
         else:
             low = middle
-    t = _look(high, step, p, progress, w, workspace)
+    t = _look(high, view)
     _note(watch, t, FIRST_OWN + k, -1, workspace.state)
 
 
 @routine
-def _note_touch(j, left, right, step, p, progress, w, workspace, watch):
+def _note_touch(j, left, right, view):
     """Note that the normal law of a node begins or ends between two looks."""
+    p, progress, w, watch = view.problem, view.progress, view.evaluation, view.watch
     low, high, old = left, right, watch.zones[j]
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        _look(middle, step, p, progress, w, workspace)
+        _look(middle, view)
         if _zone(j, p, progress, w) == old:
             low = middle
         else:
             high = middle
-    t = _look(high, step, p, progress, w, workspace)
-    _note_zone(j, _zone(j, p, progress, w), t, workspace.state, watch)
+    t = _look(high, view)
+    _note_zone(j, _zone(j, p, progress, w), t, view.workspace.state, watch)
 
 
 @routine
-def _note_step(upto, step, p, progress, w, workspace, watch):
+def _note_step(upto, view):
     """Note the events of a step up to a part of it."""
-    size = watch.states.shape[1]
+    p, progress, w, watch = view.problem, view.progress, view.evaluation, view.watch
+    size, state = watch.states.shape[1], view.workspace.state
     nodes = watch.counts[NODES] != 0 and p.rigid == 0
     looks = nodes
     for k in range(len(watch.own)):
         if watch.linear[k]:
-            _note_linear(k, upto, step, p, progress, w, workspace, watch)
+            _note_linear(k, upto, view)
         else:
             looks = True
     for look in range(_LOOKS if looks else 1):
         left, right = (upto * look / _LOOKS, upto * (look + 1) / _LOOKS) if looks else (0.0, upto)
-        t = _look(right, step, p, progress, w, workspace)
+        t = _look(right, view)
         for j in range(len(watch.zones)):
             if nodes and _zone(j, p, progress, w) != watch.zones[j]:
-                _note_touch(j, left, right, step, p, progress, w, workspace, watch)
-                _look(right, step, p, progress, w, workspace)
+                _note_touch(j, left, right, view)
+                _look(right, view)
         for k in range(len(watch.own)):
-            new = event_at(watch.own[k])(t, workspace.state[:size], watch.own_parameters[k])
+            new = event_at(watch.own[k])(t, state[:size], watch.own_parameters[k])
             if not watch.linear[k]:
-                _note_own(k, left, right, new, step, p, progress, w, workspace, watch)
-                _look(right, step, p, progress, w, workspace)
+                _note_own(k, left, right, new, view)
+                _look(right, view)
             watch.own_values[k] = new
 
 
 @routine
-def _note_change(t, begin, p, progress, w, workspace, watch):
-    """Note what has changed at a moment, of which w knows; at the start, what is struck."""
+def _note_change(begin, view):
+    """Note what has changed at the begin of a step; at that of a run, what is struck."""
+    t, p, progress, w = view.step.t, view.problem, view.progress, view.evaluation
+    watch, workspace = view.watch, view.workspace
     Y, size = progress.state, watch.states.shape[1]
     for j in range(len(watch.zones)):
         zone = _zone(j, p, progress, w)
@@ -222,10 +242,11 @@ def _note_events(step, upto, what, p, progress, w, workspace, watch):
     Events after the first at which the run ends are dropped.
     """
     begun = watch.counts[FOUND]
+    view = View(step, p, progress, w, workspace, watch)
     if what == WITHIN:
-        _note_step(upto, step, p, progress, w, workspace, watch)
+        _note_step(upto, view)
     else:
-        _note_change(step.t, what == BEGIN, p, progress, w, workspace, watch)
+        _note_change(what == BEGIN, view)
     stop = NOWHERE
     for row in range(begun, watch.counts[FOUND]):
         if watch.stops[int(watch.found[row, 1])] != 0:

@@ -47,6 +47,7 @@ from fecontact.integrate.nonsmooth.problem import (
     NonsmoothProblem,
     Output,
     Progress,
+    Step,
     next_target,
     pace,
     pass_break,
@@ -199,15 +200,15 @@ def _add_powers(t, h, Y, out, p, workspace):
 
 
 @routine
-def _go(t, h, latest, Y, closed, which, quick, p, workspace, out):
+def _go(step, Y, closed, which, quick, p, workspace, out):
     """One step of impulses from Y to ``out``; 0, 1 with an impact, 2 if that gained energy, or -1.
 
     ``which`` is the row of forces and closed contacts that it fills; -1 where no impulses were
     found.
     """
-    s, middle, change = p.system, workspace.middle, workspace.change
+    s, middle, change, h = p.system, workspace.middle, workspace.change, step.h
     n, _, m = s.rows.shape
-    at = min(t + 0.5 * h, latest)
+    at = min(step.t + 0.5 * h, step.latest)
     for i in range(m):
         middle[i] = Y[i] + 0.5 * h * Y[m + i]
         middle[m + i] = Y[m + i]
@@ -334,14 +335,15 @@ def _attempt(step, last, smallest, data):
     p, limits, progress, workspace = data.problem, data.limits, data.progress, data.workspace
     Y, closed, counts = progress.state, progress.closed, progress.counts
     t, length, latest, m = step.t, step.h, step.latest, p.system.rows.shape[2]
-    half = 0.5 * length
+    middle = t + 0.5 * length
     quick = _fastest(p, workspace)
-    whole = _go(t, length, latest, Y, closed, 0, quick, p, workspace, workspace.whole)
-    first = _go(t, half, latest, Y, closed, 1, quick, p, workspace, workspace.half)
+    whole = _go(step, Y, closed, 0, quick, p, workspace, workspace.whole)
+    first = _go(Step(t, 0.5 * length, latest, middle, False), Y, closed, 1, quick, p, workspace,
+                workspace.half)
     second = -1
     if first >= 0:
-        second = _go(t + half, half, latest, workspace.half, workspace.closed[1], 2, quick, p,
-                     workspace, workspace.end)
+        second = _go(Step(middle, 0.5 * length, latest, step.target, step.at_break),
+                     workspace.half, workspace.closed[1], 2, quick, p, workspace, workspace.end)
     if whole < 0 or first < 0 or second < 0:
         return NOT_SOLVED, 0.25 * length
     struck = whole > 0 or first > 0 or second > 0

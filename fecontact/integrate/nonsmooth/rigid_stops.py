@@ -24,6 +24,7 @@ Lectures 302 (1988). F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -88,8 +89,39 @@ RATE_ROUNDING = 1e-14
 # Corrections of the places of stops that close or open.
 _MOST_CORRECTIONS = 5
 
+
+
+class Rebound(NamedTuple):
+    """Rebounds after which a stop closes if a force presses it.
+
+    Their penetration rate is at most ``slow`` [m/s], or they are lower than the rounding of the
+    ``height`` [m], or shorter than the time ``brief`` [s].
+    """
+
+    slow: float
+    height: float
+    brief: float
+
+
+class Moment(NamedTuple):
+    """A moment at which contacts change: its time, what a run knows of it, and Y' there.
+
+    ``near`` is a slip velocity that counts as none [m/s]; ``struck`` says that a node had an
+    impact.
+    """
+
+    t: float
+    problem: NonsmoothProblem
+    progress: Progress
+    workspace: Workspace
+    evaluation: Evaluation
+    rates: Vector
+    near: float
+    struck: bool
+
+
 CHANGE = Callable[[
-    float, NonsmoothProblem, Progress, Workspace, Evaluation, float, float, float, Vector,
+    float, NonsmoothProblem, Progress, Workspace, Evaluation, Rebound, Vector,
 ], float]
 change_contacts_at = function_at(CHANGE)
 
@@ -296,21 +328,23 @@ def _set_gaining(t, p, progress, workspace, w, out):
 
 
 @routine
-def _accelerate(t, near, struck, resting, fall, p, progress, workspace, w, case):
+def _accelerate(moment, resting, fall, case):
     """Fill a case with the forces that ``fall`` (n,), u'' without contact, asks for.
 
-    Whether there is one solution. ``near`` is a slip velocity that counts as none, unless the
+    Whether there is one solution. A slip velocity below ``moment.near`` counts as none, unless the
     cluster slips ever faster; after a strike only clusters without slip may stick.
     """
+    p, progress, workspace = moment.problem, moment.progress, moment.workspace
+    w, near, struck = moment.evaluation, moment.near, moment.struck
     n, k = len(p.cluster), len(p.rows)
     status, friction = progress.status, False
     sizes = np.empty(p.rows.shape[1])
-    set_prescribed(t, p.system, workspace)
+    set_prescribed(moment.t, p.system, workspace)
     for i in range(len(sizes)):
         sizes[i] = force_size(i, progress.state, workspace.applied_forces, p.system)
     conditions = _conditions(resting, sizes, p, w)
     _omit_fixed(status, conditions)
-    ground = speed_rate(t, p)
+    ground = speed_rate(moment.t, p)
     for j in range(n):
         conditions.given[j] = -fall[j]
     for c in range(k):
@@ -333,8 +367,10 @@ def _accelerate(t, near, struck, resting, fall, p, progress, workspace, w, case)
 
 
 @routine
-def _decide(t, touching, struck, slow, height, brief, near, p, progress, workspace, w, out):
+def _decide(touching, rebound, moment):
     """Decide which touching stops stay closed and which clusters stick; see `change_contacts`."""
+    t, p, progress, workspace = moment.t, moment.problem, moment.progress, moment.workspace
+    w, out = moment.evaluation, moment.rates
     s, Y, status, closed = p.system, progress.state, progress.status, progress.closed
     n, _, m = s.rows.shape
     k = len(p.rows)
@@ -355,11 +391,12 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, workspa
         fall[j] = w.nodes[j, CURVED] - w.nodes[j, SLOPE] * ground
         for i in range(m):
             fall[j] -= held_row(j, i, p, w) * workspace.rate[i]
-        blurred = 30.0 * math.sqrt(2.2e-16 * height * abs(fall[j])) + brief * abs(fall[j])
+        blurred = (30.0 * math.sqrt(2.2e-16 * rebound.height * abs(fall[j]))
+                   + rebound.brief * abs(fall[j]))
         resting[j] = (touching[j] and not workspace.parting[j]
-                      and abs(w.nodes[j, RATE]) <= max(slow, blurred))
+                      and abs(w.nodes[j, RATE]) <= max(rebound.slow, blurred))
     case = new_case(n, k)
-    if not _accelerate(t, near, struck, resting, fall, p, progress, workspace, w, case):
+    if not _accelerate(moment, resting, fall, case):
         return NO_ACCELERATION
     flight = math.inf
     for j in range(n):
@@ -380,28 +417,28 @@ def _decide(t, touching, struck, slow, height, brief, near, p, progress, workspa
         before[c] = STICK if workspace.fresh[c] else status[c]
     settle(t, p, before, closed, w, out, Y)
     derivative(t, Y, p, status, closed, w, out)
-    noise = RATE_ROUNDING / _NEAR * near
+    noise = RATE_ROUNDING / _NEAR * moment.near
     for j in range(n):
         if closed[j]:
             workspace.flights[j, YOUNG] = 0.0
         elif touching[j]:
             begin_flight(j, noise, p, w, workspace)
-        elif struck and abs(w.nodes[j, RATE]) > noise:
+        elif moment.struck and abs(w.nodes[j, RATE]) > noise:
             workspace.flights[j, CLIMB] = -w.nodes[j, RATE]
     return flight
 
 
-def _change_contacts(t, p, progress, workspace, w, slow, height, brief, out):
+def _change_contacts(t, p, progress, workspace, w, rebound, out):
     """Impact of ``workspace.touched`` nodes, then which stops stay closed and which clusters stick.
 
     An approach at a penetration rate within rounding is stopped, but is no impact;
     ``workspace.touched`` tells afterwards which nodes had one.
     ``workspace.parting`` nodes were closed and lift off, ``workspace.released`` clusters begin to
     slip in the sense of their status, ``workspace.arrived`` ones have come to rest; HELD stops that
-    rest close. After an impact, stops whose penetration rate is below ``slow``, or whose rebound is
-    lower than the rounding of the ``height`` [m] or shorter than the time ``brief`` [s], close if a
-    force presses them. Returns the longest flight that a rebound may take [s], infinite if none,
-    NO_ACCELERATION or NO_IMPULSES, and fills ``out`` with Y'.
+    rest close. After an impact, stops close whose rebound is within ``rebound``.
+
+    Returns the longest flight that a rebound may take [s], infinite if none, NO_ACCELERATION or
+    NO_IMPULSES, and fills ``out`` with Y'.
     """
     Y, status, closed, largest = progress.state, progress.status, progress.closed, progress.largest
     n = len(p.cluster)
@@ -425,10 +462,9 @@ def _change_contacts(t, p, progress, workspace, w, slow, height, brief, out):
         progress.counts[IMPACTS] += 1 if workspace.touched[j] else 0
     if approached and not _strike(t, touching, p, progress, w):
         return NO_IMPULSES
-    return _decide(t, touching, struck, slow, height, brief, _NEAR * near, p, progress, workspace,
-                   w, out)
+    return _decide(touching, rebound,
+                   Moment(t, p, progress, workspace, w, out, _NEAR * near, struck))
 
 
 compiled_change = compile_law(
-    CHANGE, "change_contacts(t, p, progress, workspace, w, slow, height, brief, out)",
-    _change_contacts)
+    CHANGE, "change_contacts(t, p, progress, workspace, w, rebound, out)", _change_contacts)

@@ -35,7 +35,12 @@ from fecontact.core.types import Array, Integers
 from fecontact.integrate.nonsmooth.equations import stick_limit
 from fecontact.integrate.nonsmooth.problem import CREEP
 from fecontact.system.kernels import body_acceleration, prescribed_at
-from fecontact.system.node_forces import friction_along, normal_gradients, tangent_force
+from fecontact.system.node_forces import (
+    NodeForces,
+    friction_along,
+    normal_gradients,
+    tangent_force,
+)
 from fecontact.system.nodes import (
     AXES,
     COMBINATIONS,
@@ -145,7 +150,7 @@ def along_tangents(values, j, n):
 
 
 @helper
-def _set_friction(j, contact, pressing, g, p, hold, turning, partial, force):
+def _set_friction(j, node, g, p, hold, turning, partial, force):
     """Fill ``force`` and ``hold.side`` of node j; returns its creep velocity.
 
     Fills rows 0 and 2 of ``partial`` (d + 1, 2 d) with the derivatives of the friction force to V
@@ -153,7 +158,7 @@ def _set_friction(j, contact, pressing, g, p, hold, turning, partial, force):
     there must not be: of a sticking node, or of slip athwart its friction; infinite when the node
     has changed between stick and slip.
     """
-    s, side, slip = p.system, hold.side, contact.slip
+    s, side, slip, pressing = p.system, hold.side, node.contact.slip, node.pressing
     n, d, _ = s.rows.shape
     grip, limit = _grip(j, g, hold, s), stick_limit(j, pressing, p)
     for k in range(d - 1):
@@ -218,7 +223,8 @@ def _linearise(stage, moved, p, hold, turning, workspace, force):
         for row in (1, d):
             for axis in range(d):
                 partial[row, axis] = g * partial[row, axis] + partial[row, d + axis]
-        creep = max(creep, _set_friction(j, contact, pressing, g, p, hold, turning, partial, force))
+        node = NodeForces(F, pressing, contact)
+        creep = max(creep, _set_friction(j, node, g, p, hold, turning, partial, force))
         for k in range(d - 1):
             if s.follows_surface:
                 for axis in range(d):
