@@ -7,10 +7,13 @@ from test_followed_elements import T, in_space
 
 import fecontact as fc
 from fecontact.bifurcation import HarmonicBalance, nonlinear_mode
-from fecontact.bifurcation.harmonic.elements import follow_elements
+from fecontact.bifurcation.harmonic.elements import (
+    Displacements,
+    ElementForces,
+    follow_elements,
+)
 from fecontact.bifurcation.harmonic.series import series
 from fecontact.laws import JenkinsFriction, LinearContact
-from fecontact.system.elastic_sliders import without_elements
 
 LIMIT = 1.0  # deflection at which the element of in_space slides [m]
 
@@ -39,10 +42,10 @@ def followed(X, offset, samples):
     """Friction (2, N) and deflections (N, 2) by the code under test."""
     system = in_space()
     X = X @ system.basis.contact_T[0, :3]  # coordinates of the modes of a mass of 1 kg
-    r, z, rows = np.zeros((2, samples)), np.zeros((samples, 2)), np.zeros((2, samples, 9))
-    assert follow_elements(X, T, without_elements(system.arrays), system.arrays, np.array([1]),
-                           offset, series(1, samples).values, False, r, z, rows)
-    return r, z
+    found = ElementForces(np.zeros((2, samples)), np.zeros((samples, 2)), np.zeros((0, 0, 0)))
+    assert follow_elements(Displacements(X, T, series(1, samples).values), system.arrays,
+                           np.array([1]), offset, False, found)
+    return found.friction, found.deflections
 
 
 @pytest.mark.parametrize("excess", [-1e-2, 1e-6, 1e-3, 1e-2, 0.1])

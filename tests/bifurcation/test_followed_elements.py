@@ -8,7 +8,11 @@ from systems import TURN
 import fecontact as fc
 from fecontact.bifurcation import HarmonicBalance, contact_field
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
-from fecontact.bifurcation.harmonic.elements import follow_elements
+from fecontact.bifurcation.harmonic.elements import (
+    Displacements,
+    ElementForces,
+    follow_elements,
+)
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated, series
 from fecontact.bifurcation.harmonic.starts import converged_orbit, problem_for
 from fecontact.laws import (
@@ -19,7 +23,6 @@ from fecontact.laws import (
     LinearContact,
     PrescribedForce,
 )
-from fecontact.system.elastic_sliders import without_elements
 
 T, H = 5.0, 3
 CONSTANT, PRESSED = PrescribedForce(1.0), LinearContact(3.0, 0.4, preload=2.5)
@@ -76,12 +79,12 @@ def coefficients(seed=0):
 def followed(system, X, samples, offsets=None):
     """Friction (N,), deflections (N, c) and derivatives (N, 2 L) by the code under test."""
     count = system.friction.memory
-    r, z = np.zeros((1, samples)), np.zeros((samples, count))
-    rows = np.zeros((1, samples, 2 * len(X)))
-    assert follow_elements(X, T, without_elements(system.arrays), system.arrays, np.array([count]),
-                           np.zeros(count) if offsets is None else offsets,
-                           series(H, samples).values, True, r, z, rows)
-    return r[0], z, rows[0]
+    found = ElementForces(np.zeros((1, samples)), np.zeros((samples, count)),
+                          np.zeros((1, samples, 2 * len(X))))
+    assert follow_elements(Displacements(X, T, series(H, samples).values), system.arrays,
+                           np.array([count]), np.zeros(count) if offsets is None else offsets,
+                           True, found)
+    return found.friction[0], found.deflections, found.rows[0]
 
 
 def densely(system, X, samples=20_000, start=0.0, periods=2):

@@ -8,8 +8,12 @@ import numpy as np
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
-from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks, kink_onsets
-from fecontact.bifurcation.harmonic.elements import follow_elements
+from fecontact.bifurcation.harmonic.compiled.kinks import SampledRates, add_kinks, kink_onsets
+from fecontact.bifurcation.harmonic.elements import (
+    Displacements,
+    ElementForces,
+    follow_elements,
+)
 from fecontact.bifurcation.harmonic.engine_order import Waves
 from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
@@ -24,7 +28,6 @@ from fecontact.bifurcation.harmonic.woodbury import Factors, WoodburySolver, con
 from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, Integers
-from fecontact.system.elastic_sliders import without_elements
 from fecontact.system.fields.vector_field import VectorField
 
 # Relative step of differences in a parameter that changes the period.
@@ -164,8 +167,9 @@ class Balance(OrbitUnknowns):
         widths = np.zeros((self.layout.displacements, len(rates)))
         if self.onsets.size and isinstance(self.field, ContactField):
             add_kinks(times, states, self.field.arrays(values), self.onsets, period / self.samples,
-                      derivatives is not None, rates,
-                      np.zeros((1, 1, 1)) if derivatives is None else derivatives, widths)
+                      derivatives is not None, SampledRates(
+                          rates, np.zeros((1, 1, 1)) if derivatives is None else derivatives,
+                          widths))
         return widths
 
     @cached_property
@@ -182,11 +186,8 @@ class Balance(OrbitUnknowns):
 
     def followed(
         self, u: Array, period: float, derivatives: bool = True
-    ) -> tuple[Array, Array, Array]:
-        """Friction (t n, N) of elements at the samples, deflections (N, c), and derivatives.
-
-        The latter (t n, N, d (2 H + 1)) are those to coefficients along the d axes of a node, of
-        which t are tangents.
+    ) -> ElementForces:
+        """Friction of elements at the samples, their deflections, and derivatives.
 
         Raises
         ------
@@ -196,13 +197,15 @@ class Balance(OrbitUnknowns):
         assert isinstance(self.field, ContactField)
         laws, N = self.field.arrays(self.parameters(u)), self.samples
         n, d, _ = laws.rows.shape
-        r, z = np.zeros(((d - 1) * n, N)), np.zeros((N, self.layout.memory))
-        rows = np.zeros((len(r), N, d * (2 * self.harmonics + 1)) if derivatives else (0, 0, 0))
-        X = np.ascontiguousarray(self.coefficients(u)[:, : self.layout.displacements])
-        if not follow_elements(X, period, without_elements(laws), laws, self.kept.elements,
-                               self.kept.offsets, self.series.values, derivatives, r, z, rows):
+        t, L = (d - 1) * n, 2 * self.harmonics + 1
+        found = ElementForces(np.zeros((t, N)), np.zeros((N, self.layout.memory)),
+                              np.zeros((t, N, d * L) if derivatives else (0, 0, 0)))
+        x = Displacements(
+            np.ascontiguousarray(self.coefficients(u)[:, : self.layout.displacements]), period,
+            self.series.values)
+        if not follow_elements(x, laws, self.kept.elements, self.kept.offsets, derivatives, found):
             raise AnalysisError(UNREPEATED)
-        return r, z, rows
+        return found
 
     def rates(self, times: Array, states: Array, values: Array, period: float) -> Array:
         """Rates (N, d) at the samples, with kinks between them; those of :attr:`bare`."""
@@ -292,7 +295,7 @@ class Linearised:
         return self.problem.marched(self.u, self.period)
 
     @cached_property
-    def elements(self) -> tuple[Array, Array, Array]:
+    def elements(self) -> ElementForces:
         """See :meth:`Balance.followed`."""
         return self.problem.followed(self.u, self.period)
 
@@ -308,7 +311,7 @@ class Linearised:
         """Internal variables (N, c) at the samples."""
         layout = self.problem.layout
         if self.problem.kept.exact:
-            return self.elements[1]
+            return self.elements.deflections
         if not layout.memory:
             return np.zeros((self.problem.samples, 0))
         return np.ascontiguousarray(self.marched[:, layout.states - layout.memory :])
@@ -329,7 +332,7 @@ class Linearised:
         if self.problem.kept.exact:
             found = found.copy()
             m = self.problem.layout.displacements
-            found[:, m : 2 * m] -= self.elements[0].T @ self.tangents
+            found[:, m : 2 * m] -= self.elements.friction.T @ self.tangents
         return found
 
     @cached_property
@@ -499,7 +502,7 @@ class Linearised:
         problem, u, rows = self.problem, self.u, self.tangents
         assert isinstance(problem.field, ContactField)
         L, n = len(problem.reference), problem.size
-        change = problem.series.projection @ self.elements[2]
+        change = problem.series.projection @ self.elements.rows
         axes = problem.field.arrays(problem.parameters(u)).rows
         within = found[:n, :n].reshape(L, -1, L, axes.shape[2])
         for axis in range(axes.shape[1]):
@@ -512,7 +515,7 @@ class Linearised:
             for sign in (1.0, -1.0):
                 end = u.copy()
                 end[column] += sign * h
-                sides.append(problem.followed(end, problem.period(end), False)[0])
+                sides.append(problem.followed(end, problem.period(end), False).friction)
             by_column = problem.series.projection @ ((sides[0] - sides[1]).T / (2.0 * h) @ rows)
             found[:n, column] += by_column.reshape(-1)
 

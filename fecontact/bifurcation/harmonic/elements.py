@@ -7,19 +7,21 @@ Derivatives are those to a node's own coefficients, whatever the number of modes
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from fecontact.bifurcation.harmonic.memory import (
     LEAK,
+    Sliding,
     solve_around,
     solve_around_limit,
     take_element,
 )
 from fecontact.bifurcation.harmonic.slip_path import Path, cut_pieces, moved_at
-from fecontact.bifurcation.harmonic.stick_and_slip import follow_along
+from fecontact.bifurcation.harmonic.stick_and_slip import Element, Sums, follow_along
 from fecontact.core.addresses import function_at
-from fecontact.core.compiled import kernel, routine
+from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Block, IntegerVector, Matrix, Vector
 from fecontact.system.elastic_sliders import limit_of
 from fecontact.system.node_forces import normal_gradients, set_friction
@@ -32,15 +34,59 @@ from fecontact.system.nodes import (
 )
 
 
-@routine
-def _pressing_of(j, X, T, values, s, derivatives, series, moved, pressing, slopes):
-    """Fill series and motion of node j, the force that presses it, and its derivatives.
+class Displacements(NamedTuple):
+    """Displacements of the modes over a period T [s].
 
-    X (L, m) are coefficients of the displacements, those of the node along its d axes are
-    ``series`` (d, L); its places and velocities at the samples are ``moved`` (N, 2 d). Returns
-    whether ``pressing`` (N,) varies, or may vary, and whether this or the slip depend on T for
-    given coefficients; ``slopes`` are (N, d L).
+    ``coefficients`` (L, m) are those of their series, ``values`` (N, L) the functions of the series
+    at the samples.
     """
+
+    coefficients: Matrix
+    period: float
+    values: Matrix
+
+
+class ElementForces(NamedTuple):
+    """Elements of n nodes at N samples.
+
+    Their friction (t n, N) along the t tangents of each node, their deflections (N, c), and the
+    derivatives (t n, N, d L) of the former to the coefficients of a node along its d axes.
+    """
+
+    friction: Matrix
+    deflections: Matrix
+    rows: Block
+
+
+class NodeSamples(NamedTuple):
+    """Motion of a node with d axes, and the force that presses it, at N samples.
+
+    ``series`` (d, L) are the coefficients of its displacements along the axes; ``moved`` (N, 2 d)
+    places and velocities; ``pressing`` (N,) the force, ``slopes`` (N, d L) its derivatives.
+    """
+
+    series: Matrix
+    moved: Matrix
+    pressing: Vector
+    slopes: Matrix
+
+
+@helper
+def _node_samples(d, values):
+    """Arrays for a node with d axes."""
+    N, L = values.shape
+    return NodeSamples(np.empty((d, L)), np.empty((N, 2 * d)), np.empty(N), np.zeros((N, d * L)))
+
+
+@routine
+def _set_samples(j, x, s, derivatives, node):
+    """Fill motion and force of node j.
+
+    Returns whether the force varies, or may vary, and whether this or the slip depend on the period
+    for given coefficients.
+    """
+    X, T, values = x.coefficients, x.period, x.values
+    series, moved, pressing, slopes = node.series, node.moved, node.pressing, node.slopes
     N, L = values.shape
     d, m = len(series), X.shape[1]
     series[:, :] = 0.0
@@ -79,37 +125,37 @@ def _pressing_of(j, X, T, values, s, derivatives, series, moved, pressing, slope
 
 
 @routine
-def _along_one_tangent(j, X, T, s, count, offsets, values, derivatives, r, z, rows):
+def _along_one_tangent(j, x, s, count, offsets, friction, z, rows):
     """Forces of the ``count`` elements of a node of a plane body; see :func:`element_forces`."""
+    T, values, derivatives = x.period, x.values, len(rows) > 0
     N, L = values.shape
-    series, moved, pressing = np.empty((2, L)), np.empty((N, 4)), np.empty(N)
-    slopes, nothing = np.zeros((N, 2 * L)), np.empty((0, 2 * L))
-    varies, timed = _pressing_of(j, X, T, values, s, derivatives, series, moved, pressing, slopes)
-    most = 3 * N
-    path = Path(series[0], pressing, slopes if varies else nothing,
+    node, nothing = _node_samples(2, values), np.empty((0, 2 * L))
+    varies, timed = _set_samples(j, x, s, derivatives, node)
+    slopes, most = node.slopes, 3 * N
+    path = Path(node.series[0], node.pressing, slopes if varies else nothing,
                 np.empty(most, dtype=np.int64), np.empty(most), np.empty(most), np.empty(most),
                 np.empty(most), np.empty(most), np.empty(most), s.sliding[j, 0, 0], T)
     pieces = cut_pieces(path, s)
     own = rows[0] if derivatives else nothing
     own[:, :] = 0.0
     workspace, p, done = np.empty((5, 2 * L)), s.friction_parameters[j], 1
-    held, sliding = np.zeros(N), np.zeros(N)
-    turned = np.zeros((N if derivatives else 0, 2 * L))
+    sums = Sums(friction[0], own, np.zeros(N), np.zeros(N),
+                np.zeros((N if derivatives else 0, 2 * L)), workspace[0], workspace[1],
+                workspace[2], workspace[3], workspace[4])
     start = moved_at(path, 0, 0.0, s)[0] + path.slides * ground_motion(0.0, s).travel
     for i in range(count):
-        if not follow_along(path, pieces, limit_of(j, i, count, 1.0, s), p[1 + i],
-                            start + offsets[i], p[0], s, z[:, i], r[0], (held, sliding, turned),
-                            own, workspace):
+        element = Element(limit_of(j, i, count, 1.0, s), p[1 + i], start + offsets[i], p[0])
+        if not follow_along(path, pieces, element, s, z[:, i], sums):
             done = 0
     if not derivatives:
         return done, timed
     stiffness, limits, kept = 0.0, 0.0, workspace[0]
     kept[:] = 0.0
     for n in range(N):
-        stiffness += held[n]
-        limits += sliding[n]
+        stiffness += sums.held[n]
+        limits += sums.sliding[n]
         for k in range(2 * L):
-            kept[k] += turned[n, k]
+            kept[k] += sums.turned[n, k]
             own[n, k] += kept[k]
         for k in range(L):
             own[n, k] += stiffness * values[n, k]
@@ -120,12 +166,13 @@ def _along_one_tangent(j, X, T, s, count, offsets, values, derivatives, r, z, ro
 
 
 @routine
-def _along_two_tangents(j, X, T, s, count, offsets, values, derivatives, r, z, rows):
+def _along_two_tangents(j, x, s, count, offsets, r, z, rows):
     """Forces of the ``count`` elements of a node in space; see :func:`element_forces`."""
+    T, values, derivatives = x.period, x.values, len(rows) > 0
     N, L = values.shape
-    series, moved, pressing = np.empty((3, L)), np.empty((N, 6)), np.empty(N)
-    slopes = np.zeros((N, 3 * L))
-    _, timed = _pressing_of(j, X, T, values, s, derivatives, series, moved, pressing, slopes)
+    node = _node_samples(3, values)
+    _, timed = _set_samples(j, x, s, derivatives, node)
+    moved, pressing, slopes = node.moved, node.pressing, node.slopes
     rate, leak = N / T, LEAK / T
     slip, target, path = np.empty((N, 3)), np.empty((N, 2)), np.empty((N, 2))
     p, force, rates, blocks = np.empty(3), np.empty(12), np.empty((2, 6)), np.array([2])
@@ -144,7 +191,7 @@ def _along_two_tangents(j, X, T, s, count, offsets, values, derivatives, r, z, r
         for n in range(N):
             for c in range(2):
                 target[n, c] = moved[n, 2 * c] + offsets[2 * i + c]
-        if solve_around_limit(j, s, T, slip, p, target, path) == 0:
+        if solve_around_limit(j, s, T, Sliding(p, slip), target, path) == 0:
             done = 0
         for n in range(N):
             set_friction(j, (slip[n, 0], slip[n, 1]), slip[n, 2], path[n], p, s, force, rates)
@@ -179,36 +226,31 @@ def _along_two_tangents(j, X, T, s, count, offsets, values, derivatives, r, z, r
 
 @kernel(by_address=True)
 def element_forces(
-    X: Matrix, T: float, s: SystemArrays, laws: SystemArrays, elements: IntegerVector,
-    offsets: Vector, values: Matrix, derivatives: bool, r: Matrix, z: Matrix, rows: Block,
+    x: Displacements, s: SystemArrays, elements: IntegerVector, offsets: Vector, derivatives: bool,
+    out: ElementForces,
 ) -> int:
-    """Fill r (t n, N) with the friction of the elements of n nodes along their t tangents.
+    """Fill ``out``, without derivatives but for these.
 
-    X (L, m) are coefficients of the displacements, T the period [s], s the system without elements
-    and ``laws`` with them, ``elements`` (n,) their numbers, ``offsets`` (c,) deflections less
-    displacements of those that never slide, ``values`` (N, L) the series at the samples. Also fills
-    the deflections z (N, c) and, with derivatives, rows (t n, N, d L) of those of r to the
-    coefficients of a node along its d axes. Returns 0 where an element does not come to repeat,
-    else 1, or 2 if r depends on T for given X.
+    s is the system with elements, ``elements`` (n,) their numbers, ``offsets`` (c,) deflections
+    less displacements of those that never slide. Returns 0 where an element does not come to
+    repeat, else 1, or 2 if the friction depends on the period for given coefficients.
     """
     tangents = s.rows.shape[1] - 1
     states = len(offsets) // len(elements)
     done, by_period = 1, False
-    r[:, :] = 0.0
-    z[:, :] = 0.0
+    out.friction[:] = 0.0
+    out.deflections[:, :] = 0.0
     for j in range(len(elements)):
         if elements[j] == 0:
             continue
         first, at = tangents * j, j * states
-        own = rows[first : first + tangents] if derivatives else rows
+        friction = out.friction[first : first + tangents]
+        z, kept = out.deflections[:, at : at + states], offsets[at : at + states]
+        rows = out.rows[first : first + tangents] if derivatives else out.rows[:0]
         if tangents == 1:
-            found, timed = _along_one_tangent(
-                j, X, T, s, elements[j], offsets[at : at + states], values, derivatives,
-                r[first : first + 1], z[:, at : at + states], own)
+            found, timed = _along_one_tangent(j, x, s, elements[j], kept, friction, z, rows)
         else:
-            found, timed = _along_two_tangents(
-                j, X, T, laws, elements[j], offsets[at : at + states], values, derivatives,
-                r[first : first + 2], z[:, at : at + states], own)
+            found, timed = _along_two_tangents(j, x, s, elements[j], kept, friction, z, rows)
         done, by_period = min(done, found), by_period or timed
     return 2 * done if by_period else done
 
@@ -218,8 +260,8 @@ element_forces_at = function_at(element_forces)
 
 @kernel
 def follow_elements(
-    X: Matrix, T: float, s: SystemArrays, laws: SystemArrays, elements: IntegerVector,
-    offsets: Vector, values: Matrix, derivatives: int, r: Matrix, z: Matrix, rows: Block,
+    x: Displacements, s: SystemArrays, elements: IntegerVector, offsets: Vector, derivatives: int,
+    out: ElementForces,
 ) -> int:
     """:func:`element_forces` for Python; ``rows`` may be empty without derivatives."""
-    return element_forces(X, T, s, laws, elements, offsets, values, derivatives != 0, r, z, rows)
+    return element_forces(x, s, elements, offsets, derivatives != 0, out)

@@ -19,6 +19,7 @@ followed one by one are in :mod:`fecontact.bifurcation.harmonic.elements`.
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -219,14 +220,38 @@ def _take_slip(j, t, y, s, slip):
         slip[n, 2] = pressing_force(j, contact, F, s)
 
 
+class Sliding(NamedTuple):
+    """An elastic Coulomb element over a period, and what slides under it.
+
+    ``parameters`` (3,) are the return time, the stiffness and the coefficient; ``slip`` (N, 3) are
+    the slip velocities and the pressing force at the samples.
+    """
+
+    parameters: Vector
+    slip: Matrix
+
+
+class Samples(NamedTuple):
+    """Times (N,) [s] and states (N, d) at the samples of a period [s]."""
+
+    times: Vector
+    states: Matrix
+    period: float
+
+
 @borrowing
-def march_block(j, alone, t, y, s, T, slip, p, target, force, rates, path):
+def march_block(j, alone, samples, s, element, target, path):
     """Fill path (N, b) with variables of node j that repeat; 1 if they do, else 0.
 
-    ``alone`` is for one element with parameters p (3,), under ``slip`` (N, 3); otherwise these are
-    all variables of the node. The deflections to which they leak are ``target`` (N, b).
+    ``alone`` is for one element; otherwise these are all variables of the node. The deflections to
+    which they leak are ``target`` (N, b).
     """
     N, b = path.shape
+    p, slip = element.parameters, element.slip
+    t, y, T = samples.times, samples.states, samples.period
+    force, rates = force_workspace(s)
+    if alone:
+        force, rates = np.empty(2 * (4 + b)), np.empty((b, 4 + b))
     rate, leak = N / T, LEAK / T
     turned, part = np.empty((N, b, 2 * b)), np.empty(2 * b)
     a, pivots = np.empty((b, b)), np.empty(b, dtype=np.int64)
@@ -306,13 +331,24 @@ def march_block(j, alone, t, y, s, T, slip, p, target, force, rates, path):
     return 0
 
 
-@borrowing
-def _left_over(j, s, T, slip, p, target, force, rates, path, left, slopes):
-    """Fill ``left`` (N, 2, 1) with what the equations of an element leave, ``slopes`` with g_z.
+class LeftOver(NamedTuple):
+    """What the equations of an element leave, (N, 2, 1), and ``slopes`` g_z; workspace."""
 
-    Returns the largest of it, and the largest deflection.
+    left: Block
+    slopes: Array4
+    force: Vector
+    rates: Matrix
+
+
+@borrowing
+def _left_over(j, s, T, element, target, path, out):
+    """Fill ``out`` at the deflections ``path`` (N, 2).
+
+    Returns the largest number that is left, and the largest deflection.
     """
     N, b = path.shape
+    p, slip, left, slopes = element.parameters, element.slip, out.left, out.slopes
+    force, rates = out.force, out.rates
     rate, most, largest = N / T, 0.0, 0.0
     for n in range(N):
         set_friction(j, (slip[n, 0], slip[n, 1]), slip[n, 2], path[n], p, s, force, rates)
@@ -327,26 +363,25 @@ def _left_over(j, s, T, slip, p, target, force, rates, path, left, slopes):
 
 
 @borrowing
-def solve_around_limit(j, s, T, slip, p, target, path):
+def solve_around_limit(j, s, T, element, target, path):
     """Fill path (N, 2) with deflections of an element along two tangents that repeat; 1 if found.
 
-    p (3,) are the return time, the stiffness and the coefficient. Newton's method for all samples
-    at once, beginning with an element that never slides; if it does slide, with a return time that
-    is reduced in turn. With z the deflection and x the displacement the equations are monotone in z
-    - x: differences around a period give no energy, and the return to the limit is the gradient of
-    a convex function. An element that slides a little forgets next to nothing in a period, so that
-    marching around it does not end.
+    Newton's method for all samples at once, beginning with an element that never slides; if it does
+    slide, with a return time that is reduced in turn. With z the deflection and x the displacement
+    the equations are monotone in z - x: differences around a period give no energy, and the return
+    to the limit is the gradient of a convex function. An element that slides a little forgets next
+    to nothing in a period, so that marching around it does not end.
     """
     N, b = path.shape
-    final, own = p[0], np.empty(3)
+    final, own = element.parameters[0], element.parameters.copy()
     left, slopes = np.empty((N, b, 1)), np.empty((N, 1, b, b))
-    force, rates = np.empty(2 * (4 + b)), np.empty((b, 4 + b))
+    found = LeftOver(left, slopes, np.empty(2 * (4 + b)), np.empty((b, 4 + b)))
+    softened = Sliding(own, element.slip)
     for n in range(N):
         for i in range(b):
             path[n, i] = target[n, i]
-    own[0], own[1], own[2] = p[0], p[1], p[2]
     enough = _ROUNDINGS * (3.0 * N / T + 1.0 / final)
-    most, largest = _left_over(j, s, T, slip, own, target, force, rates, path, left, slopes)
+    most, largest = _left_over(j, s, T, softened, target, path, found)
     if most <= enough * largest:
         return 1
     own[0], factor = _SOFT * T, _STIFFER
@@ -355,7 +390,7 @@ def solve_around_limit(j, s, T, slip, p, target, path):
         own[0] = max(own[0] / factor, final)
         enough = _ROUNDINGS * (3.0 * N / T + 1.0 / own[0])
         nearly = _NEARLY if own[0] > final else _REPEATS
-        most, largest = _left_over(j, s, T, slip, own, target, force, rates, path, left, slopes)
+        most, largest = _left_over(j, s, T, softened, target, path, found)
         solved = False
         for _ in range(_MOST):
             _solve_block(slopes, T, 0, 0, b, left)
@@ -364,7 +399,7 @@ def solve_around_limit(j, s, T, slip, p, target, path):
                 for i in range(b):
                     path[n, i] += left[n, i, 0]
                     change = max(change, abs(left[n, i, 0]))
-            most, largest = _left_over(j, s, T, slip, own, target, force, rates, path, left, slopes)
+            most, largest = _left_over(j, s, T, softened, target, path, found)
             if change <= nearly * largest or most <= enough * largest:
                 solved = True
                 break
@@ -401,6 +436,7 @@ def march(
     """
     N, n, states = len(t), len(s.rows), s.memory.max()
     slip, p = np.empty((N, 3)), np.empty(3)
+    element, samples = Sliding(p, slip), Samples(t, y, T)
     z[:, :] = 0.0
     done = 1
     for j in range(n):
@@ -410,17 +446,14 @@ def march(
             _take_slip(j, t, y, s, slip)
         for first in range(0, k, max(b, 1)):
             alone = blocks[j] > 0
-            force, rates = force_workspace(s)
             if alone:
                 take_element(j, first // b, k // b, s, p)
-                force, rates = np.empty(2 * (4 + b)), np.empty((b, 4 + b))
             path = np.empty((N, b))
             at = j * states + first
             if alone and b == 2:
-                if solve_around_limit(j, s, T, slip, p, target[:, at : at + b], path) == 0:
+                if solve_around_limit(j, s, T, element, target[:, at : at + b], path) == 0:
                     done = 0
-            elif march_block(j, alone, t, y, s, T, slip, p, target[:, at : at + b], force, rates,
-                            path) == 0:
+            elif march_block(j, alone, samples, s, element, target[:, at : at + b], path) == 0:
                 done = 0
             for place in range(N):
                 for i in range(b):

@@ -22,6 +22,8 @@ Derivatives are those of these equations. They change from sample to sample only
 begins or ceases to slide: the work hardly grows with the number of elements.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from fecontact.bifurcation.harmonic.compiled.kinks import kernel_integrals
@@ -33,6 +35,7 @@ from fecontact.bifurcation.harmonic.slip_path import (
     zero_between,
 )
 from fecontact.core.compiled import borrowing, helper
+from fecontact.core.records import Matrix, Vector
 
 # Largest number of periods after which elements repeat, and relative change that is none.
 _ROUNDS, _REPEATS = 6, 1e-12
@@ -149,17 +152,52 @@ def _means(y):
     return step, ramp, curve
 
 
-@borrowing
-def _add_begun(path, n, part, compliance, spring, stuck, s, r, rows, workspace):
-    """Add to forces r (N,), and to their derivatives, the means about a place where slip begins.
+class Element(NamedTuple):
+    """An elastic Coulomb element.
 
-    ``stuck`` (2 L,) are the derivatives of z - s before.
+    ``ratio`` is its limit over the pressing force [m/N], ``stiffness`` [N/m], ``kept`` the
+    deflection at the start of the period if it never slides [m], and ``return_time`` that of its
+    return to the limit [s].
     """
+
+    ratio: float
+    stiffness: float
+    kept: float
+    return_time: float
+
+
+class Sums(NamedTuple):
+    """Forces (N,) of the elements of a node, their derivatives, and workspace.
+
+    ``rows`` (N, 2 L), empty if none are wanted, are the derivatives of the forces about jumps. From
+    each sample on, ``held`` (N,) is added to the stiffness of elements that stick, ``sliding`` (N,)
+    to the limits of those that slide, ``turned`` (N, 2 L) to the derivatives that stay in stick.
+
+    ``stuck`` (2 L,) are the derivatives of z - s of an element, ``last`` (2 L,) those at the sample
+    before; ``shift``, ``by_jump``, ``by_bend`` (2 L,) those of the place and the size of a jump.
+    """
+
+    forces: Vector
+    rows: Matrix
+    held: Vector
+    sliding: Vector
+    turned: Matrix
+    stuck: Vector
+    last: Vector
+    shift: Vector
+    by_jump: Vector
+    by_bend: Vector
+
+
+@borrowing
+def _add_begun(path, n, part, compliance, spring, s, sums):
+    """Add to forces, and to their derivatives, the means about a place where slip begins."""
+    r, rows, stuck = sums.forces, sums.rows, sums.stuck
     N = len(r)
     _, rate, bend, third = moved_at(path, n, part, s)
     jump = compliance * pressing_at(path, n, part, 1) - rate
     over = bend - compliance * pressing_at(path, n, part, 2)
-    shift, by_jump, by_bend = workspace[0], workspace[1], workspace[2]
+    shift, by_jump, by_bend = sums.shift, sums.by_jump, sums.by_bend
     if len(rows) > 0:
         for k in range(len(shift)):
             shift[k], by_jump[k], by_bend[k] = stuck[k], 0.0, 0.0
@@ -182,12 +220,13 @@ def _add_begun(path, n, part, compliance, spring, stuck, s, r, rows, workspace):
 
 
 @borrowing
-def _add_ended(path, n, part, compliance, spring, s, r, rows, workspace):
-    """Add to forces r (N,), and to their derivatives, the means about a place where slip ends."""
+def _add_ended(path, n, part, compliance, spring, s, sums):
+    """Add to forces, and to their derivatives, the means about a place where slip ends."""
+    r, rows = sums.forces, sums.rows
     N = len(r)
     _, _, bend, third = moved_at(path, n, part, s)
     off, over = beyond(path, n, part, 1, compliance, 0.0, s)
-    shift, by_bend = workspace[0], workspace[2]
+    shift, by_bend = sums.shift, sums.by_bend
     if len(rows) > 0:
         for k in range(len(shift)):
             shift[k], by_bend[k] = 0.0, 0.0
@@ -207,28 +246,30 @@ def _add_ended(path, n, part, compliance, spring, s, r, rows, workspace):
 
 
 @helper
-def _count_in(side, ratio, spring, kept, sign, n, held, sliding, turned):
-    """Count an element in, or out, of those that stick and slide from sample n on."""
+def _count_in(side, element, turned, sign, n, sums):
+    """Count an element in, or out, of those that stick and slide from sample n on.
+
+    ``turned`` (2 L,) are its derivatives in stick.
+    """
+    spring = sign * element.stiffness
     if side == 0.0:
-        held[n] += sign * spring
-        for k in range(len(kept)):
-            turned[n, k] += sign * spring * kept[k]
+        sums.held[n] += spring
+        for k in range(len(turned)):
+            sums.turned[n, k] += spring * turned[k]
     else:
-        sliding[n] += sign * spring * side * ratio
+        sums.sliding[n] += spring * side * element.ratio
 
 
 @borrowing
-def follow_along(path, count, ratio, spring, kept, return_time, s, z, r, sums, rows, workspace):
-    """Fill the deflections z (N,) of one element, and add its forces to r (N,).
+def follow_along(path, count, element, s, z, sums):
+    """Fill the deflections z (N,) of one element, and add what it does to the sums.
 
-    With rows (N, 2 L), derivatives of the forces about jumps are added to them, and to ``sums``
-    what the element adds to the stiffness of those that stick, (N,), to the limits of those that
-    slide, (N,), and to derivatives that stay in stick, (N, 2 L). Returns whether it repeats.
+    ``count`` is the number of pieces of the path. Returns whether the element repeats.
     """
-    deflection, side, end, repeats = _repeated(path, count, ratio, kept, s)
-    N, wanted = len(r), len(rows) > 0
-    held, sliding, turned = sums
-    stuck, last = workspace[3], workspace[4]
+    ratio, spring = element.ratio, element.stiffness
+    deflection, side, end, repeats = _repeated(path, count, ratio, element.kept, s)
+    r, stuck, last = sums.forces, sums.stuck, sums.last
+    N, wanted = len(r), len(sums.rows) > 0
     for k in range(len(stuck)):
         stuck[k] = 0.0
     if wanted and side == 0.0 and end[0] >= 0:
@@ -237,21 +278,21 @@ def follow_along(path, count, ratio, spring, kept, return_time, s, z, r, sums, r
         last[k] = stuck[k]
     last_side, changed = side, False
     if wanted:
-        _count_in(side, ratio, spring, stuck, 1.0, 0, held, sliding, turned)
+        _count_in(side, element, stuck, 1.0, 0, sums)
     for k in range(count):
         n = path.interval[k]
         deflection, side, ends, begins, of = _advance(path, k, ratio, deflection, side, True, s)
         again = side == 0.0 and begins >= 0.0
         if again:
-            _add_begun(path, n, begins, of * ratio, spring, stuck, s, r, rows, workspace)
+            _add_begun(path, n, begins, of * ratio, spring, s, sums)
         if ends >= 0.0:
-            _add_ended(path, n, ends, of * ratio, spring, s, r, rows, workspace)
+            _add_ended(path, n, ends, of * ratio, spring, s, sums)
             if wanted:
                 for i in range(len(stuck)):
                     stuck[i] = 0.0
                 add_row(path, n, ends, 0, of * ratio, -1.0, stuck)
         if begins >= 0.0 and not again:
-            _add_begun(path, n, begins, side * ratio, spring, stuck, s, r, rows, workspace)
+            _add_begun(path, n, begins, side * ratio, spring, s, sums)
         changed = changed or ends >= 0.0 or begins >= 0.0
         if path.last[k] < 1.0:
             continue
@@ -259,10 +300,10 @@ def follow_along(path, count, ratio, spring, kept, return_time, s, z, r, sums, r
         r[sample] += spring * deflection
         z[sample] = deflection
         if side != 0.0:
-            z[sample] += side * return_time * abs(path.end_rate[k]) * N / path.period
+            z[sample] += side * element.return_time * abs(path.end_rate[k]) * N / path.period
         if changed and wanted and sample > 0:
-            _count_in(last_side, ratio, spring, last, -1.0, sample, held, sliding, turned)
-            _count_in(side, ratio, spring, stuck, 1.0, sample, held, sliding, turned)
+            _count_in(last_side, element, last, -1.0, sample, sums)
+            _count_in(side, element, stuck, 1.0, sample, sums)
             for i in range(len(stuck)):
                 last[i] = stuck[i]
             last_side = side

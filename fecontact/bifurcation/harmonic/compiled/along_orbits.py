@@ -4,7 +4,7 @@ import numpy as np
 
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
 from fecontact.bifurcation.harmonic.compiled.evaluation import speed_coefficient, take_parameter
-from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks
+from fecontact.bifurcation.harmonic.compiled.kinks import SampledRates, add_kinks
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Array4, Block, Matrix, Vector
 from fecontact.system.jacobian import batch_derivatives
@@ -57,7 +57,7 @@ def derivatives_along(
                 x[p, 2 * m + i] = ((1.0 - part_of) * zs[k, first % N, i]
                                    + part_of * zs[k, (first + 1) % N, i])
         batch_derivatives(t, x, e.whole, e.whole, 0.0, f, J[k], np.empty((0, 0)))
-        add_kinks(t, x, e.whole, e.onsets, T / N, 1, f, J[k], widths)
+        add_kinks(t, x, e.whole, e.onsets, T / N, 1, SampledRates(f, J[k], widths))
         for p in range(P):
             for i in range(m):
                 for j in range(m):

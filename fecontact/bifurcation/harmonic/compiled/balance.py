@@ -15,7 +15,7 @@ from fecontact.bifurcation.harmonic.compiled.evaluation import (
     evaluate_plain,
     evaluate_sampled,
 )
-from fecontact.bifurcation.harmonic.compiled.loads import forces_at_rest
+from fecontact.bifurcation.harmonic.compiled.loads import AffineSystem, forces_at_rest
 from fecontact.bifurcation.harmonic.elements import element_forces
 from fecontact.core.types import Array
 from fecontact.laws.normal.bilateral import BilateralPolynomial
@@ -155,8 +155,9 @@ class CompiledBalance:
         periods = (problem.periods * problem.turn / places if problem.turn is not None
                    else np.full(len(places), problem.periods * problem.fixed))
         body, given, sizes = np.empty((4, m, m)), np.empty((2, N, m)), np.empty(3)
-        forces_at_rest(places, periods, problem.series.times, near.flat, near.base, near.slope,
-                       near.arrays, body, given, sizes)
+        forces_at_rest(places, periods, problem.series.times,
+                       AffineSystem(near.flat, near.base, near.slope, near.arrays), body, given,
+                       sizes)
         off, mean, change = sizes.tolist()
         return None if off > _AFFINE else (body, given, mean <= _NOTHING and change <= _NOTHING)
 

@@ -16,13 +16,17 @@ from fecontact.bifurcation.harmonic.compiled.arrays import (
     TURN,
     Equations,
 )
-from fecontact.bifurcation.harmonic.compiled.kinks import add_kinks
+from fecontact.bifurcation.harmonic.compiled.kinks import SampledRates, add_kinks
 from fecontact.bifurcation.harmonic.compiled.memoryless_forces import (
     combine,
     memoryless_forces,
     project,
 )
-from fecontact.bifurcation.harmonic.elements import element_forces_at
+from fecontact.bifurcation.harmonic.elements import (
+    Displacements,
+    ElementForces,
+    element_forces_at,
+)
 from fecontact.bifurcation.harmonic.memory import LEAK, march, solve_around
 from fecontact.bifurcation.harmonic.series import fill_blocks
 from fecontact.core.addresses import function_at
@@ -141,8 +145,8 @@ def _follow(u, T, derivatives, e, friction, z):
     """Fill friction (t n, N) of elements along their tangents; 0 if they do not repeat."""
     m, L = e.springs.shape[1], e.values.shape[1]
     return element_forces_at(e.element_forces)(
-        u[: L * m].reshape((L, m)), T, e.contact, e.whole, e.elements, e.kept_offsets, e.values,
-        derivatives, friction, z, e.workspace.by_node)
+        Displacements(u[: L * m].reshape((L, m)), T, e.values), e.whole, e.elements, e.kept_offsets,
+        derivatives, ElementForces(friction, z, e.workspace.by_node))
 
 
 @helper
@@ -210,7 +214,7 @@ def evaluate_sampled(u: Vector, derivatives: bool, e: Equations) -> float:
     else:
         batch_rates(workspace.t, workspace.x, e.contact, workspace.f)
     add_kinks(workspace.t, workspace.x, e.contact, e.onsets, T / len(e.tau), derivatives,
-              workspace.f, workspace.J, workspace.widths)
+              SampledRates(workspace.f, workspace.J, workspace.widths))
     if len(e.elements) > 0 and _friction_at(u, T, derivatives, e) == 0.0:
         return 0.0
     take_pushes(workspace.f, e)
@@ -346,8 +350,8 @@ def _by_differences(u, central, e, followed):
         T = take_parameter(there[n], e)
         take_states(there, T, e, workspace.x)
         batch_rates(workspace.t, workspace.x, e.contact, workspace.f)
-        add_kinks(workspace.t, workspace.x, e.contact, e.onsets, T / len(e.tau), 0, workspace.f,
-                  workspace.J, workspace.widths)
+        add_kinks(workspace.t, workspace.x, e.contact, e.onsets, T / len(e.tau), 0,
+                  SampledRates(workspace.f, workspace.J, workspace.widths))
         _add_friction(e)
         take_pushes(workspace.f, e)
         balance(there, T, 1.0, e, workspace.perturbed)

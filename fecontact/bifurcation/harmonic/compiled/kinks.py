@@ -14,6 +14,7 @@ Jumps of the force, as of dashpots, are treated alike. Forces more than two samp
 those of the law.
 """
 
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -117,10 +118,23 @@ def _add_friction(j, contact, F, part, s, force, by_force):
         by_force[0, k] += by_force[1, k]
 
 
+class SampledRates(NamedTuple):
+    """Rates f (N, d) at N samples, their Jacobians J (N, d, d), and widths (m, N).
+
+    The latter are what the Jacobians contain of velocities times derivatives through the width w,
+    which stays where velocities change with the period.
+    """
+
+    f: Matrix
+    J: Block
+    widths: Matrix
+
+
 @helper
-def _add_node(j, n, contact, change, far, s, f, A, widths, derivatives):
-    """Add the change of a normal force to the rates f (d,) and their Jacobian A (d, d)."""
-    dF, dF_u, dF_v, by_width = change
+def _add_node(j, n, contact, change, s, derivatives, out):
+    """Add the change of a normal force, as :func:`kink_change` returns it, to a sample's rates."""
+    dF, dF_u, dF_v, by_width, far = change
+    f, A, widths = out.f[n], out.J[n if derivatives else 0], out.widths
     _, d, m = s.rows.shape
     F, F_u, F_v = normal_force(j, contact.penetration, contact.rate, s)
     new, slip = F + dF, contact.slip
@@ -176,18 +190,16 @@ def _add_node(j, n, contact, change, far, s, f, A, widths, derivatives):
 
 @kernel
 def add_kinks(
-    t: Vector, x: Matrix, s: SystemArrays, onsets: Matrix, h: float, derivatives: int, f: Matrix,
-    J: Block, widths: Matrix,
+    t: Vector, x: Matrix, s: SystemArrays, onsets: Matrix, h: float, derivatives: int,
+    out: SampledRates,
 ) -> None:
-    """Add to rates f (N, d) at samples t (N,), x (N, d) a distance h apart what kinks change.
+    """Add to the rates at samples t (N,), x (N, d) a distance h apart what kinks change.
 
-    ``onsets`` (k, n) are penetrations of the nodes; with ``derivatives`` the Jacobians J (N, d, d)
-    change too, and widths (m, N) is filled with what these contain of velocities times derivatives
-    through the width w, which stays where velocities change with the period. Friction with memory
-    feels the force of the law.
+    ``onsets`` (k, n) are penetrations of the nodes; with ``derivatives`` the Jacobians change too,
+    and the widths are filled. Friction with memory feels the force of the law.
     """
     if derivatives:
-        widths[:, :] = 0.0
+        out.widths[:, :] = 0.0
     if len(onsets) == 0:
         return
     for n in range(len(t)):
@@ -202,8 +214,7 @@ def add_kinks(
                     dF, dF_u, dF_v = dF + one, dF_u + one_u, dF_v + one_v
                     by_width, found = by_width + one_w, True
             if found:
-                _add_node(j, n, contact, (dF, dF_u, dF_v, by_width), far, s, f[n],
-                          J[n] if derivatives else J[0], widths, derivatives != 0)
+                _add_node(j, n, contact, (dF, dF_u, dF_v, by_width, far), s, derivatives != 0, out)
 
 
 def kink_onsets(field: ContactField, values: Array, free: int) -> Array:

@@ -1,6 +1,7 @@
 """Forces on a body at rest over a period, for several values of a parameter, in compiled code."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,27 +12,37 @@ from fecontact.system.node_forces import axis_force, force_workspace, node_force
 from fecontact.system.nodes import SystemArrays, memory_of, node_motion
 
 
+class AffineSystem(NamedTuple):
+    """A system whose arrays are parts of ``flat`` = ``base`` + p ``slope`` at a parameter p."""
+
+    flat: Vector
+    base: Vector
+    slope: Vector
+    system: SystemArrays
+
+
 @kernel
 def forces_at_rest(
-    places: Vector, periods: Vector, tau: Vector, flat: Vector, base: Vector, slope: Vector,
-    s: SystemArrays, body: Block, given: Block, sizes: Vector,
+    places: Vector, periods: Vector, tau: Vector, affine: AffineSystem, body: Block, given: Block,
+    sizes: Vector,
 ) -> None:
     """Fill body (4, m, m) and given (2, N, m), affine in a parameter p, from its first two places.
 
-    These are stiffness and damping, and loads at the samples: values at p = 0 and their slopes. The
-    arrays of the system are ``flat`` = ``base`` + p ``slope``. Entries of ``sizes`` (3,) are the
+    These are stiffness and damping, and loads at the samples: values at p = 0 and their slopes.
+    Entries of ``sizes`` (3,) are the
     largest deviation of the loads from the affine ones over all places, relative to the largest;
     the largest mean of the forces of loads and contact at rest for the last place, relative to the
     largest force; and the largest change of the mean of the loads, relative to the largest load.
     """
+    s = affine.system
     n, d, m = s.rows.shape
     P, N, states = len(places), len(tau), s.memory.max()
     force, rates = force_workspace(s)
     load, still = np.empty(m), np.zeros(2 * m + n * states)
     loads, rest, matrices = np.empty((P, N, m)), np.empty((N, m)), np.empty((P, 2, m, m))
     for place in range(P):
-        for k in range(len(flat)):
-            flat[k] = base[k] + places[place] * slope[k]
+        for k in range(len(affine.flat)):
+            affine.flat[k] = affine.base[k] + places[place] * affine.slope[k]
         for c in range(N):
             moved = prescribed_at(tau[c] * periods[place], s, load)
             for i in range(m):

@@ -1,6 +1,7 @@
 """Newton's method of compiled steps: to a branch, to a fold or a bound on it, to an orbit."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from fecontact.bifurcation.harmonic.compiled.linear_systems import (
     solve_with,
 )
 from fecontact.core.compiled import helper, routine
+from fecontact.core.records import Vector
 
 # Newton steps before a step fails, and largest factor by which a step with kept factors may leave
 # the error of the one before.
@@ -210,28 +212,49 @@ def damped_newton(u, row, weights, tolerance, e):
     return 0
 
 
+class Chord(NamedTuple):
+    """Two points of a branch, from ``start`` to ``end`` (n + 1,), with directions (n + 1,) there.
+
+    Lengths between them count along the ``row``, that of the direction at the start.
+    """
+
+    start: Vector
+    entering: Vector
+    end: Vector
+    leaving: Vector
+    row: Vector
+
+
 @helper
-def _cubic(u, tangent, there, leaving, row, way, along, out):
-    """Fill out with the Hermite cubic through u and there, at a length along the row."""
+def _length_of(chord):
+    """Length between the points of a chord."""
+    way = 0.0
+    for k in range(len(chord.row)):
+        way += chord.row[k] * (chord.end[k] - chord.start[k])
+    return way
+
+
+@helper
+def _cubic(chord, way, along, out):
+    """Fill out with the Hermite cubic through the points of a chord, at a length."""
     x = along / way
-    first = way * x * (1.0 - x) ** 2 / inner(row, tangent)
-    last = way * x * x * (x - 1.0) / inner(row, leaving)
+    first = way * x * (1.0 - x) ** 2 / inner(chord.row, chord.entering)
+    last = way * x * x * (x - 1.0) / inner(chord.row, chord.leaving)
     rest = x * x * (3.0 - 2.0 * x)
     for k in range(len(out)):
-        out[k] = u[k] + first * tangent[k] + rest * (there[k] - u[k]) + last * leaving[k]
+        out[k] = (chord.start[k] + first * chord.entering[k]
+                  + rest * (chord.end[k] - chord.start[k]) + last * chord.leaving[k])
 
 
 @routine
-def fold_between(u, tangent, there, leaving, row, weights, e, found):
+def fold_between(chord, weights, e, found):
     """Fill found with the fold between two points; ``along`` is its direction.
 
-    The row is that of the tangent at u. Returns 0 where no fold is found, else 1.
+    Returns 0 where no fold is found, else 1.
     """
-    guess, n = e.workspace.vectors[11], len(u) - 1
-    way = 0.0
-    for k in range(n + 1):
-        way += row[k] * (there[k] - u[k])
-    low, high, f_low, f_high = 0.0, way, tangent[n], leaving[n]
+    guess, n = e.workspace.vectors[11], len(chord.row) - 1
+    way = _length_of(chord)
+    low, high, f_low, f_high = 0.0, way, chord.entering[n], chord.leaving[n]
     largest = max(abs(f_low), abs(f_high))
     x, f, at, value = low, f_low, high, f_high
     for _ in range(_TRIES):
@@ -239,10 +262,10 @@ def fold_between(u, tangent, there, leaving, row, weights, e, found):
         new = at - value * (at - x) / (value - f)
         if not low < new < high:
             new = 0.5 * (low + high)
-        _cubic(u, tangent, there, leaving, row, way, new, guess)
+        _cubic(chord, way, new, guess)
         for k in range(n + 1):
             found[k] = guess[k]
-        if solved(found, guess, row, weights, e) == 0:
+        if solved(found, guess, chord.row, weights, e) == 0:
             return 0
         x, f, at = at, value, new
         value = e.workspace.along[n] / length(weights, e.workspace.along)
@@ -259,18 +282,16 @@ def fold_between(u, tangent, there, leaving, row, weights, e, found):
 
 
 @routine
-def bound_between(u, tangent, there, leaving, row, weights, bound, e, found):
+def bound_between(chord, weights, bound, e, found):
     """Fill found with the point at a bound of the parameter between two points.
 
     ``along`` becomes its direction, with one as the last number. Returns 0 where there is none.
     """
-    guess, unit, n = e.workspace.vectors[11], e.workspace.vectors[12], len(u) - 1
-    way, along = 0.0, 0.0
-    for k in range(n + 1):
-        way += row[k] * (there[k] - u[k])
-        unit[k] = 0.0
+    guess, unit, n = e.workspace.vectors[11], e.workspace.vectors[12], len(chord.row) - 1
+    way, along, first = _length_of(chord), 0.0, chord.start[n]
+    unit[:] = 0.0
     unit[n] = 1.0
-    _cubic(u, tangent, there, leaving, row, way, way * (bound - u[n]) / (there[n] - u[n]), guess)
+    _cubic(chord, way, way * (bound - first) / (chord.end[n] - first), guess)
     guess[n] = bound
     for k in range(n + 1):
         found[k] = guess[k]
@@ -278,5 +299,5 @@ def bound_between(u, tangent, there, leaving, row, weights, bound, e, found):
         return 0
     found[n] = bound
     for k in range(n + 1):
-        along += row[k] * (found[k] - u[k])
+        along += chord.row[k] * (found[k] - chord.start[k])
     return 1 if 0.0 < along <= way else 0

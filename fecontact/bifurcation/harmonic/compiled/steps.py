@@ -27,6 +27,7 @@ from fecontact.bifurcation.harmonic.compiled.arrays import (
 from fecontact.bifurcation.harmonic.compiled.evaluation import take_forces, take_mean
 from fecontact.bifurcation.harmonic.compiled.linear_systems import inner, length
 from fecontact.bifurcation.harmonic.compiled.newton import (
+    Chord,
     bound_between,
     fold_between,
     linearised,
@@ -80,11 +81,10 @@ def _grow(u, scales, e):
 
 
 @helper
-def _keep(count, u, along, weights, sign, scales, way, e, out):
-    """Store a point with its direction and what its values are made from."""
-    size = sign * length(weights, along)
+def _keep(count, u, size, scales, way, e, out):
+    """Store a point, its direction ``along`` over ``size``, and what its values are made from."""
     for k in range(len(u)):
-        out.u[count, k], out.tangent[count, k] = u[k], along[k] / size
+        out.u[count, k], out.tangent[count, k] = u[k], e.workspace.along[k] / size
     for n in range(len(e.tau)):
         for i in range(len(e.kept_offsets)):
             out.z[count, n, i] = e.workspace.z[n, i]
@@ -203,19 +203,20 @@ def steps(
             for k in range(n + 1):
                 leaving[k] = workspace.along[k] / size
             if last_turn == 0.0 and bound_between(
-                    u, tangent, there, leaving, row, weights, bound, e, found) == 1:
-                _keep(count, found, workspace.along, weights, 1.0 if slope > 0.0 else -1.0, scales,
-                      far, e, out)
+                    Chord(u, tangent, there, leaving, row), weights, bound, e, found) == 1:
+                size = length(weights, workspace.along)
+                _keep(count, found, size if slope > 0.0 else -size, scales, far, e, out)
                 why[0] = BOUND
                 count += 1
             break
         last = count + 1 if turns else count
-        _keep(last, there, workspace.along, weights, 1.0, scales, far, e, out)
+        _keep(last, there, length(weights, workspace.along), scales, far, e, out)
         if turns:
-            if fold_between(u, tangent, there, out.tangent[last], row, weights, e, found) == 0:
+            between = Chord(u, tangent, there, out.tangent[last], row)
+            if fold_between(between, weights, e, found) == 0:
                 why[0] = EVENT
                 break
-            _keep(count, found, workspace.along, weights, 1.0, scales, far, e, out)
+            _keep(count, found, length(weights, workspace.along), scales, far, e, out)
             out.folds[count] = 1
         way, bent = inner(row, chord), 1.0 if last_turn == 0.0 else 0.0
         cubic = smooth * bent / (way * way * way)
