@@ -37,13 +37,17 @@ def may_switch(step, problem, progress, workspace):
 
 
 @helper
-def _range(first, last, k1, k2, k3):
-    """Smallest and largest coefficient of an interpolant, and whether they are monotonic."""
+def coefficient_range(first, last, k1, k2, k3):
+    """Smallest and largest coefficient of an interpolant, and whether they are monotonic.
+
+    Of one interpolant, or of eight in SIMD lanes.
+    """
     a, c = 0.75 * first + 0.25 * (last + k1), 0.25 * (first + k1 + k2 + k3) + 0.75 * last
-    b = 0.5 * (first + last) + k1 / 3.0 + k2 / 6.0
+    b = 0.5 * (first + last) + k1 * (1.0 / 3.0) + k2 * (1.0 / 6.0)
     low, high = min(min(first, a), min(b, c)), max(max(first, a), max(b, c))
-    monotone = first <= a <= b <= c <= last or first >= a >= b >= c >= last
-    return min(low, last), max(high, last), monotone
+    rising = (first <= a) & (a <= b) & (b <= c) & (c <= last)
+    falling = (first >= a) & (a >= b) & (b >= c) & (c >= last)
+    return min(low, last), max(high, last), rising | falling
 
 
 @helper
@@ -67,7 +71,7 @@ def _nodes_may_switch(moved, h, s, blocks, control, workspace):
                 r2 += along * dense[1, m + i]
                 r3 += along * dense[2, m + i]
         first, last = ends[0, n + j], nodes[0, n + j]
-        low, high, monotone = _range(first, last, k1, k2, k3)
+        low, high, monotone = coefficient_range(first, last, k1, k2, k3)
         touching = nodes[2, n + j] != 0.0
         for level in range(levels.shape[0]):
             shift = s.gap[j] + levels[level, j] - control.ground[HIGHEST]
@@ -78,7 +82,7 @@ def _nodes_may_switch(moved, h, s, blocks, control, workspace):
         if s.rows.shape[1] > 2:
             continue
         first, last = ends[1, j] - passing, nodes[1, j] - passing
-        low, high, monotone = _range(first, last, r1, r2, r3)
+        low, high, monotone = coefficient_range(first, last, r1, r2, r3)
         largest = max(-low, high) + spread
         mixed = low < spread and high > -spread and largest > control.slip_scale[j]
         at_ends = 2.0 * max(max(abs(first), abs(last)), control.slip_scale[j]) + spread

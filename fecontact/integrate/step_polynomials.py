@@ -162,7 +162,7 @@ def keep_ends(n, workspace):
 @helper
 def ground_part(part, polynomial):
     """Contribution of the ground at a part of the step: height under the node, or its speed."""
-    s, step, row = polynomial.system, polynomial.step, polynomial.row
+    s, step = polynomial.system, polynomial.step
     now = min(step.t + part * step.h, step.latest)
     if polynomial.what == SLIP:
         return ground_speed(0, polynomial.node, ground_motion(now, s), s)
@@ -171,21 +171,16 @@ def ground_part(part, polynomial):
     if not s.on_ground[polynomial.node]:
         return 0.0
     n, d, _ = s.rows.shape
-    along, across = _displaced(part, 2 * n + polynomial.node, polynomial, row), 0.0
+    along, across = _displaced(part, 2 * n + polynomial.node, polynomial), 0.0
     if d > 2:
-        across = _displaced(part, 3 * n + polynomial.node, polynomial, row)
+        across = _displaced(part, 3 * n + polynomial.node, polynomial)
     return _height_at(polynomial.node, along, across, ground_motion(now, s), s)
 
 
 @helper
-def _displaced(part, column, polynomial, row):
+def _displaced(part, column, polynomial):
     """Value of a column of the coefficients at a part of the step."""
-    for k in range(COEFFICIENTS):
-        row[k] = polynomial.coefficients[k, column]
-    for k in range(COEFFICIENTS - 1, 0, -1):
-        for i in range(k):
-            row[i] += part * (row[i + 1] - row[i])
-    return row[0]
+    return bernstein.value(polynomial.coefficients[:COEFFICIENTS, column], part, polynomial.row)
 
 
 @helper

@@ -8,17 +8,10 @@ Checks and their limits are as in :mod:`fecontact.integrate.rodas5p.error_contro
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.simd.vectors import (
-    chosen,
-    magnitude,
-    mask_of,
-    read,
-    root,
-    signed,
-    spread,
-    write,
-)
+from fecontact.core.simd.vectors import chosen, magnitude, mask_of, read, spread, write
+from fecontact.integrate.polynomial_bounds import coefficient_range
 from fecontact.integrate.rodas5p.driver import SLIP_PART as _SLIP_PART
+from fecontact.integrate.rodas5p.dynamics import crossing
 from fecontact.integrate.rodas5p.tableau import STAGES
 from fecontact.integrate.simd.arrays import (
     BY_PLACE,
@@ -32,26 +25,14 @@ from fecontact.integrate.simd.arrays import (
 
 
 @helper
-def larger(a, b):
-    """The larger of two."""
-    return chosen(a > b, a, b)
-
-
-@helper
-def smaller(a, b):
-    """The smaller of two."""
-    return chosen(a < b, a, b)
-
-
-@helper
 def note_extremes(control, progress):
     """Take the state at the start of a step into the sizes so far."""
     m = len(progress.extremes)
     speed = read(progress.numbers[SPEED_SCALE])
     for i in range(m):
-        write(progress.extremes[i], larger(read(progress.extremes[i]),
-                                           magnitude(read(progress.state[i]))))
-        speed = larger(speed, magnitude(read(progress.state[m + i])) * read(control.largest[i]))
+        write(progress.extremes[i], max(magnitude(read(progress.state[i])),
+                                        read(progress.extremes[i])))
+        speed = max(magnitude(read(progress.state[m + i])) * read(control.largest[i]), speed)
     write(progress.numbers[SPEED_SCALE], speed)
 
 
@@ -69,14 +50,13 @@ def state_error(control, progress, w):
 def modal_error(difference, control, progress, w):
     """Largest entry of a difference of modal states, as a multiple of the allowed error."""
     m, error = len(progress.extremes), spread(0.0)
-    per_speed = 1.0 / larger(read(progress.numbers[SPEED_SCALE]),
-                             read(control.numbers[LEAST_SPEED]))
+    per_speed = 1.0 / max(read(control.numbers[LEAST_SPEED]), read(progress.numbers[SPEED_SCALE]))
     for i in range(m):
-        scale = larger(larger(read(progress.extremes[i]), magnitude(read(w.after[i]))),
-                       read(control.displacement_scale[i]))
-        error = larger(error, magnitude(read(difference[i])) / scale)
-        error = larger(error, magnitude(read(difference[m + i])) * read(control.largest[i])
-                       * per_speed)
+        scale = max(read(control.displacement_scale[i]),
+                    max(magnitude(read(w.after[i])), read(progress.extremes[i])))
+        error = max(magnitude(read(difference[i])) / scale, error)
+        error = max(magnitude(read(difference[m + i])) * read(control.largest[i]) * per_speed,
+                    error)
     return error / read(control.numbers[RTOL])
 
 
@@ -96,15 +76,6 @@ def slip_error(error, speed, s, control, w):
     return error
 
 
-@helper
-def _crossing(u, v, a, within):
-    """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier."""
-    q = -(v + signed(root(v * v - 2.0 * a * u), v))
-    one, other = q / a, 2.0 * u / q
-    within = chosen((one > 0.0) & (one < within), one, within)
-    return chosen((other > 0.0) & (other < within), other, within)
-
-
 @routine
 def next_kink(s, control, progress, within):
     """Time until forces of a node change their character, or ``within`` if later."""
@@ -117,8 +88,8 @@ def next_kink(s, control, progress, within):
             x += read(s.rows[j, 0, i]) * read(progress.rate[m + i])
             y += read(s.rows[j, 1, i]) * read(progress.rate[m + i])
         u, v, a = -read(progress.places[n + j]) - read(s.gap[j]), -read(progress.speeds[n + j]), -y
-        first = _crossing(u, v, a, first)
-        first = _crossing(u - read(control.depth[j]), v, a, first)
+        first = crossing(u, v, a, first)
+        first = crossing(u - read(control.depth[j]), v, a, first)
         force = read(progress.forces[j, FORCE])
         pressed = force > 0.0
         fall = (read(progress.forces[j, BY_PLACE]) * v + read(progress.forces[j, BY_RATE]) * a)
@@ -145,18 +116,6 @@ def _course(rows, first_row, dense):
     return k1, k2, k3
 
 
-@helper
-def _range(first, last, k1, k2, k3):
-    """Smallest and largest coefficient of an interpolant, and whether they are monotonic."""
-    a, c = 0.75 * first + 0.25 * (last + k1), 0.25 * (first + k1 + k2 + k3) + 0.75 * last
-    b = 0.5 * (first + last) + k1 * (1.0 / 3.0) + k2 * (1.0 / 6.0)
-    low = smaller(smaller(smaller(first, a), smaller(b, c)), last)
-    high = larger(larger(larger(first, a), larger(b, c)), last)
-    rising = (first <= a) & (a <= b) & (b <= c) & (c <= last)
-    falling = (first >= a) & (a >= b) & (b >= c) & (c >= last)
-    return low, high, rising | falling
-
-
 @routine
 def may_switch(h, s, control, progress, w):
     """Lanes, one bit each, in which a contact may have changed unnoticed within the step."""
@@ -167,12 +126,12 @@ def may_switch(h, s, control, progress, w):
         spread_ = magnitude(read(s.sliding[j, 0, 0])) * read(control.numbers[QUICKEST]) * h
         k1, k2, k3 = _course(s.rows[j, 1], 0, w.dense)
         first, last = read(progress.places[n + j]), read(w.places[n + j])
-        low, high, monotone = _range(first, last, k1, k2, k3)
-        nearer = smaller(first, last)
+        low, high, monotone = coefficient_range(first, last, k1, k2, k3)
+        nearer = min(last, first)
         touching = magnitude(read(w.forces[j, FORCE])) > 0.0
         for level in range(len(control.levels)):
             shift = read(s.gap[j]) + read(control.levels[level, j])
-            at_ends = 2.0 * smaller(nearer + shift, spread(0.0))
+            at_ends = 2.0 * min(spread(0.0), nearer + shift)
             bottom = low + shift
             mixed = (bottom < 0.0) & (high + shift > 0.0)
             some = some | ((mixed | (bottom < at_ends)) & ~monotone)
@@ -180,10 +139,10 @@ def may_switch(h, s, control, progress, w):
         k1, k2, k3 = _course(s.rows[j, 0], m, w.dense)
         passing = read(s.sliding[j, 0, 0]) * speed
         first, last = read(progress.speeds[j]) - passing, read(w.speeds[j]) - passing
-        low, high, monotone = _range(first, last, k1, k2, k3)
-        largest = larger(-low, high) + spread_
+        low, high, monotone = coefficient_range(first, last, k1, k2, k3)
+        largest = max(high, -low) + spread_
         width = read(control.slip_scale[j])
         mixed = (low < spread_) & (high > -spread_) & (largest > width)
-        at_ends = 2.0 * larger(larger(magnitude(first), magnitude(last)), width) + spread_
+        at_ends = 2.0 * max(width, max(magnitude(last), magnitude(first))) + spread_
         some = some | (touching & (mixed | (largest > at_ends)) & ~(monotone & (spread_ == 0.0)))
     return some

@@ -134,11 +134,9 @@ def _begin(b):
     _go_to_end(new, progress, w)
     m, quickest = len(w.load), spread(1e-300)
     for i in range(m):
-        quickest = checks.larger(
-            quickest, magnitude(read(w.base[m + i])) * read(b.control.largest[i]))
+        quickest = max(magnitude(read(w.base[m + i])) * read(b.control.largest[i]), quickest)
     limits, numbers = b.control.numbers, progress.numbers
-    first = checks.smaller(0.1 * read(limits[LEAST_SPEED]) / quickest,
-                           0.01 * read(limits[LONGEST]))
+    first = min(0.01 * read(limits[LONGEST]), 0.1 * read(limits[LEAST_SPEED]) / quickest)
     write(numbers[STEP], chosen(new, first, read(numbers[STEP])))
     progress.fresh[0] = 0
 
@@ -160,15 +158,15 @@ def _next_target(t, b):
     target = t + h
     near = chosen(target + 0.01 * h >= stop, stop,
                   chosen(target + h > stop, t + 0.5 * (stop - t), target))
-    target = chosen(read(numbers[EXACTLY]) > 0.0, checks.smaller(target, stop), near)
+    target = chosen(read(numbers[EXACTLY]) > 0.0, min(stop, target), near)
     limit = read(numbers[CAUTIOUS])
     careful = limit > 0.0
     caution = spread(0.0)
     if bits(careful) != 0:
-        reach = checks.larger(target - t, limit)
+        reach = max(limit, target - t)
         kink = checks.next_kink(b.system, b.control, progress, reach)
         cut = careful & (kink > 1e-3 * limit) & (kink < 0.9 * reach)
-        target = chosen(cut, checks.smaller(t + 1.0003 * kink, stop), target)
+        target = chosen(cut, min(stop, t + 1.0003 * kink), target)
         caution = chosen(cut, limit, 0.0)
         write(numbers[CAUTIOUS], spread(0.0))
     return target, caution
@@ -246,20 +244,19 @@ def _write_outputs(lane, t, h, target, b, runs):
 def _set_next(h, error, caution, good, missed, part, b):
     """Lengths of the next steps: of lanes whose step was ``good``, missed something, or failed."""
     numbers = b.progress.numbers
-    bounded = checks.smaller(checks.larger(error, _LEAST_ERROR), spread(_LARGEST_ERROR))
+    bounded = min(spread(_LARGEST_ERROR), max(_LEAST_ERROR, error))
     root = reciprocal_fifth_root(bounded)
-    factor = checks.smaller(checks.larger(_SAFETY * root, _SMALLEST_FACTOR),
-                            spread(_LARGEST_FACTOR))
+    factor = min(spread(_LARGEST_FACTOR), max(_SMALLEST_FACTOR, _SAFETY * root))
     last, last_root = read(numbers[LAST_STEP]), read(numbers[LAST_ROOT])
     # Steps that had to shrink will have to shrink on (predictive control, Gustafsson).
-    predicted = checks.smaller(factor, factor * (h / last) * (root / last_root))
-    grown = chosen(last > 0.0, checks.larger(predicted, _SMALLEST_FACTOR), factor)
-    grown = chosen(read(numbers[REJECTED_LAST]) > 0.0, checks.smaller(grown, spread(1.0)), grown)
-    longer = checks.smaller(h * grown, read(b.control.numbers[LONGEST]))
+    predicted = min(factor * (h / last) * (root / last_root), factor)
+    grown = chosen(last > 0.0, max(_SMALLEST_FACTOR, predicted), factor)
+    grown = chosen(read(numbers[REJECTED_LAST]) > 0.0, min(spread(1.0), grown), grown)
+    longer = min(read(b.control.numbers[LONGEST]), h * grown)
     failed = ~(good | missed)
     write(numbers[STEP], chosen(good, longer, h * chosen(missed, part, factor)))
     write(numbers[LAST_STEP], chosen(good, h, last))
-    write(numbers[LAST_ROOT], chosen(good, checks.smaller(root, spread(_LARGEST_ROOT)),
+    write(numbers[LAST_ROOT], chosen(good, min(spread(_LARGEST_ROOT), root),
                                      last_root))
     write(numbers[REJECTED_LAST],
           chosen(failed, 1.0, chosen(good, 0.0, read(numbers[REJECTED_LAST]))))
@@ -302,7 +299,7 @@ def _attempt(active, b, runs, problem, progress, workspace):
     if bits(switched) != 0:
         stages.set_defect(t, h, s, mine, w)
         found = checks.modal_error(w.stages[0], control, mine, w) / _SWITCH_PART
-        error = chosen(switched, checks.larger(error, found), error)
+        error = chosen(switched, max(found, error), error)
     good = passed & ~missed & (error <= 1.0)
     outputs = bits(good & (read(numbers[NEXT_OUTPUT]) <= target))
     complete = 0
