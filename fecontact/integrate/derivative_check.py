@@ -26,7 +26,7 @@ _APART, _ERRORS, _FINER, _FINEST = 0.02, 10.0, 1e-2, 1e-12
 
 def doubts(
     system: ContactSystem, times: Array, states: Array, transitions: Array, forced: Array | None,
-    at: SystemAt | None, solver: Solver, rtol: float, max_step: float | None,
+    at: SystemAt | None, *, solver: Solver, rtol: float, max_step: float | None,
 ) -> str:
     """Sentence on the spans between output times whose derivatives disagree with differences.
 

@@ -176,7 +176,8 @@ def sensitivity(
     if isinstance(solver, CompiledSolver):
         at = None if parameter is None else _function_of(system, parameter)
         found = replace(found, note=doubts(system, times, found.states, found.transitions,
-                                           found.forced, at, solver, float(rtol), max_step))
+                                           found.forced, at, solver=solver, rtol=float(rtol),
+                                           max_step=max_step))
     if found.note:
         warnings.warn(found.note, ModelWarning, stacklevel=2)
     return found

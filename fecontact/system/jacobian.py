@@ -1,5 +1,7 @@
 """Compiled Jacobian of the reduced contact system; see :mod:`fecontact.system.kernels`."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from fecontact.core.compiled import borrowing, helper, kernel, routine
@@ -20,6 +22,7 @@ from fecontact.system.nodes import (
     node_motion,
 )
 from fecontact.system.parameter_derivatives import (
+    DerivativesWorkspace,
     given_rates,
     moves,
     node_rates,
@@ -169,11 +172,25 @@ def _add_contact(j, node_force, s, partial, gradient, rate, out):
                 out[m + i, k] += row * gradient[axis, k]
 
 
+class Derivatives(NamedTuple):
+    """Rates f (N, d) at N states, and their derivatives to the states and to a parameter.
+
+    J is (N, d, d), P (N, d), or (0, 0) where no derivative to a parameter is wanted.
+    """
+
+    f: Matrix
+    J: Block
+    P: Matrix
+
+
 @borrowing
-def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
+def _fill_derivatives(t, x, s, r, laws, workspace, found):
     # Counting references to what is made for it costs as much as the laws.
-    load, load_p, force, workspace, memory, shifts, node_force, node_force_p = vectors
-    rates, workspace_rates, partial, gradient, stiffening = matrices
+    load, load_p, shifts = workspace.load, workspace.load_p, workspace.shifts
+    force, rates, partial = workspace.force, workspace.rates, workspace.partial
+    node_force, node_force_p = workspace.node_force, workspace.node_force_p
+    stiffening, memory = workspace.stiffening, workspace.memory
+    f, J, P = found.f, found.J, found.P
     n, d, m = s.rows.shape
     states = len(rates)
     differs = len(P) > 0
@@ -210,8 +227,7 @@ def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
                 node_force[axis] = axis_force(axis, node, force, rates, s)
             if differs:
                 set_shifts(j, y, s, r, basis_moves, moved, moved_p, shifts)
-                pressing_p = node_rates(j, node, z, shifts, s, laws, force, partial,
-                                        (workspace, workspace_rates, memory), node_force_p)
+                pressing_p = node_rates(j, node, z, s, laws, workspace)
                 for axis in range(d):
                     for i in range(m):
                         P[c, m + i] += s.rows[j, axis, i] * node_force_p[axis]
@@ -224,7 +240,7 @@ def _fill_derivatives(t, x, s, r, laws, vectors, matrices, f, J, P):
                         P[c, first + k] += (rates[k, slip_entry(tangent, states)]
                                             * shifts[d + 2 * tangent])
             if node.normal != 0.0:
-                _add_contact(j, node_force, s, partial, gradient, out, A)
+                _add_contact(j, node_force, s, partial, workspace.gradient, out, A)
 
 
 @kernel
@@ -239,13 +255,11 @@ def batch_derivatives(
     wanted.
     """
     _, d, m = s.rows.shape
-    states = s.memory.max()
     step = h if len(P) > 0 else 0.0
     force, rates = force_workspace(s)
-    beside, rates_beside = force_workspace(s)
-    _fill_derivatives(t, x, s, r, offset_laws(s, r, step),
-                      (np.empty(m), np.empty(m), force, beside, np.empty(states),
-                       np.empty(2 * d), np.empty(d), np.empty(d)),
-                      (rates, rates_beside, np.empty((d + 1, 2 * d)), np.empty((d, 2 * m)),
-                       np.empty_like(s.polynomial_rows)),
-                      f, J, P)
+    offset_force, offset_rates = force_workspace(s)
+    workspace = DerivativesWorkspace(
+        np.empty(m), np.empty(m), force, rates, np.empty((d + 1, 2 * d)), np.empty(d),
+        np.empty((d, 2 * m)), np.empty_like(s.polynomial_rows), offset_force, offset_rates,
+        np.empty(s.memory.max()), np.empty(2 * d), np.empty(d))
+    _fill_derivatives(t, x, s, r, offset_laws(s, r, step), workspace, Derivatives(f, J, P))

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper
+from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.laws.signatures import ground_at, signal_at, surface_at
 from fecontact.system.node_forces import (
@@ -188,17 +189,43 @@ def _pressing_rate(j, node, F_p, shifts, s, laws):
     return scale * pressing_p + size * own
 
 
-@helper
-def node_rates(j, node, z, shifts, s, laws, force, partial, workspace, out):
-    """Fill out (d,) with the derivatives of the forces on node j along its axes.
+class DerivativesWorkspace(NamedTuple):
+    """Workspace of the derivatives of the rates at a state.
 
-    Returns that of the force that friction sees. ``shifts`` are those of :func:`set_shifts`;
-    ``node``, ``force`` and ``partial`` are results of
-    :func:`fecontact.system.node_forces.node_gradients`. Of ``workspace``, for the results of
-    friction with memory, the last is filled with what the friction law's own parameters add to the
-    rates of its internal variables; the others are overwritten.
+    Modal forces ``load`` (m,) and their derivatives to the parameter, ``load_p``; of a node
+    ``force``, ``rates`` and ``partial`` as :func:`fecontact.system.node_forces.node_gradients`
+    fills them, its forces ``node_force`` (d,) along the axes and their ``gradient`` (d, 2 m) to q
+    and q'; ``stiffening`` (D, m) is of :mod:`fecontact.system.polynomial_forces`. For the
+    parameter: results of the friction law beside it, ``offset_force`` and ``offset_rates``; what
+    its own parameters add to the rates of the internal variables, ``memory`` (s,); ``shifts``
+    (2 d,) of :func:`set_shifts`; and the derivatives ``node_force_p`` (d,) of the forces.
     """
-    workspace_force, workspace_rates, memory = workspace
+
+    load: Vector
+    load_p: Vector
+    force: Vector
+    rates: Matrix
+    partial: Matrix
+    node_force: Vector
+    gradient: Matrix
+    stiffening: Matrix
+    offset_force: Vector
+    offset_rates: Matrix
+    memory: Vector
+    shifts: Vector
+    node_force_p: Vector
+
+
+@helper
+def node_rates(j, node, z, s, laws, workspace):
+    """Fill ``node_force_p`` and ``memory`` of node j; returns the rate of what friction sees.
+
+    ``node``, ``force`` and ``partial`` are results of
+    :func:`fecontact.system.node_forces.node_gradients`.
+    """
+    force, partial, shifts = workspace.force, workspace.partial, workspace.shifts
+    offset_force, offset_rates = workspace.offset_force, workspace.offset_rates
+    memory, out = workspace.memory, workspace.node_force_p
     contact, F, h, d = node.contact, node.normal, laws.step, s.rows.shape[1]
     states = len(memory)
     ground, slope = 0.0, (0.0, 0.0)
@@ -231,10 +258,10 @@ def node_rates(j, node, z, shifts, s, laws, force, partial, workspace, out):
         memory[i] = 0.0
     for k in range(len(laws.friction)):
         weight = _WEIGHTS[k] / (12.0 * h)
-        set_friction(j, contact.slip, node.pressing, z, laws.friction[k, j], s, workspace_force,
-                     workspace_rates)
+        set_friction(j, contact.slip, node.pressing, z, laws.friction[k, j], s, offset_force,
+                     offset_rates)
         for tangent in range(d - 1):
-            out[2 * tangent] -= weight * workspace_force[friction_entry(tangent, states)]
+            out[2 * tangent] -= weight * offset_force[friction_entry(tangent, states)]
         for i in range(s.memory[j]):
-            memory[i] += weight * workspace_rates[i, 0]
+            memory[i] += weight * offset_rates[i, 0]
     return pressing_p

@@ -104,8 +104,8 @@ def storing_power(j, F, z, rates, s):
 
 
 @helper
-def add_node_powers(j, motion, moved, z, stick_speed, s, force, rates, out, nodes):
-    """Add to out (p,) the powers of node j; fill its entries of ``nodes`` (2 n,)."""
+def add_node_powers(j, motion, moved, z, s, force, rates, out):
+    """Add to out (p,) the powers of node j; returns what friction takes, and the slip speed."""
     node = node_forces(j, motion, moved, z, s, force, rates)
     F, contact, taken = node.normal, node.contact, 0.0
     elastic = normal_force(j, contact.penetration, 0.0, s)[0]
@@ -120,8 +120,14 @@ def add_node_powers(j, motion, moved, z, stick_speed, s, force, rates, out, node
     lost = taken - storing
     out[BRISTLES] += storing
     out[FRICTION] += lost
-    nodes[j] = lost
-    nodes[len(s.gap) + j] = lost if size_of(contact.slip) < stick_speed else 0.0
+    return lost, size_of(contact.slip)
+
+
+@helper
+def set_losses(j, lost, speed, stick_speed, out):
+    """Fill the entries of node j of out (2 n,): its loss in friction, and that by creep."""
+    out[j] = lost
+    out[len(out) // 2 + j] = lost if speed < stick_speed else 0.0
 
 
 @routine
@@ -136,8 +142,9 @@ def set_powers(t, y, s, stick_speed, out, nodes):
     force, rates = force_workspace(s)
     body_powers(t, y, s, out)
     for j in range(n):
-        add_node_powers(j, node_motion(j, y, s), moved, memory_of(j, y, s), stick_speed[j], s,
-                        force, rates, out, nodes)
+        lost, speed = add_node_powers(j, node_motion(j, y, s), moved, memory_of(j, y, s), s, force,
+                                      rates, out)
+        set_losses(j, lost, speed, stick_speed[j], nodes)
 
 
 @kernel

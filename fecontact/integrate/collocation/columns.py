@@ -42,7 +42,7 @@ from fecontact.integrate.collocation.tableau import (
     STAGES,
     TWICE,
 )
-from fecontact.integrate.collocation.workspace import Collocation
+from fecontact.integrate.collocation.workspace import Collocation, Step
 from fecontact.integrate.rodas5p import dynamics, stage_solver
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import tableau as rows
@@ -284,7 +284,7 @@ def _cross(t, near, problem, c, vary):
 
 @kernel(by_address=True)
 def propagate(
-    t: float, h: float, latest: float, before: float, near: float, problem: run_arrays.Problem,
+    step: Step, before: float, near: float, problem: run_arrays.Problem,
     progress: run_arrays.Progress, workspace: run_arrays.Workspace, c: Collocation, vary: Vary,
 ) -> float:
     """Carry the columns over the step whose stages ``c`` holds; return the largest error of one.
@@ -293,6 +293,7 @@ def propagate(
     far. The step continues for its part ``before`` after a switch of forces, which its last stage
     does not feel. The switch is located to the part ``near`` of the step.
     """
+    t, h, latest = step.t, step.h, step.latest
     s, v = problem.system, vary.variation
     count, m = v.column_forces.shape
     J, forced = workspace.reduced.J, v.column_forces[count - 1]

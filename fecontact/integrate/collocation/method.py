@@ -30,6 +30,7 @@ from fecontact.integrate.collocation.workspace import (
     PAST,
     WHOLE,
     Collocation,
+    Step,
 )
 from fecontact.integrate.rodas5p import dynamics, state
 from fecontact.integrate.rodas5p.error_control import take_scales
@@ -86,20 +87,6 @@ class Data(NamedTuple):
     kept: state.Output
     collocation: Collocation
     vary: Vary
-
-
-class Step(NamedTuple):
-    """A step that is tried, as :class:`fecontact.integrate.rodas5p.state.Step`.
-
-    ``wanted`` is the length that it should have had.
-    """
-
-    t: float
-    h: float
-    target: float
-    latest: float
-    at_break: bool
-    wanted: float
 
 
 @routine
@@ -275,8 +262,7 @@ def _attempt(step, last, smallest, data):
         return CUT, h * (1.0 + c.cuts[PAST])
     if error <= 1.0 and varies:
         error = max(error, propagate_at(vary.propagate)(
-            t, step.h, step.latest, before, near, problem, progress, workspace, c, vary)
-            / vary.variation.tolerance)
+            step, before, near, problem, progress, workspace, c, vary) / vary.variation.tolerance)
     if not error <= 1.0:
         numbers[REJECTED_LAST] = 1.0
         if error < np.inf:

@@ -32,6 +32,7 @@ from fecontact.system.powers import (
     add_node_powers,
     given_powers,
     matrix_powers,
+    set_losses,
 )
 
 # Resolution of 2 s - 1 where a force begins or ends.
@@ -157,9 +158,9 @@ def powers_at(t, y, problem, workspace, out):
     matrix_powers((0, m, 0, m), y, s, out)
     moved = ground_motion(t, s)
     for j in range(len(s.gap)):
-        add_node_powers(j, node_motion(j, y, s), moved, y[2 * m :], problem.control.stick_speed[j],
-                        s, workspace.scratch.force[0], workspace.scratch.rates[0], out,
-                        out[POWER_COUNT:])
+        lost, speed = add_node_powers(j, node_motion(j, y, s), moved, y[2 * m :], s,
+                                      workspace.scratch.force[0], workspace.scratch.rates[0], out)
+        set_losses(j, lost, speed, problem.control.stick_speed[j], out[POWER_COUNT:])
 
 
 @helper

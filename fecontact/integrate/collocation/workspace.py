@@ -33,6 +33,20 @@ BEGINS, JACOBIANS, ITERATIONS = range(3)
 AGAIN, WHOLE, PAST = range(3)
 
 
+class Step(NamedTuple):
+    """A step that is tried, as :class:`fecontact.integrate.rodas5p.state.Step`.
+
+    ``wanted`` is the length that it should have had.
+    """
+
+    t: float
+    h: float
+    target: float
+    latest: float
+    at_break: bool
+    wanted: float
+
+
 class Collocation(NamedTuple):
     """A step by collocation: what it hands on to the next one, and workspace.
 

@@ -8,6 +8,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.simd.functions import select
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.laws.signatures import signal_at
@@ -380,22 +381,24 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
 
 
 @routine
-def next_kink(y, rate, s, blocks, g, depth, slow, moved, w, within):
+def next_kink(moved, problem, progress, w, within):
     """Time until the forces of a node change their character, or ``within`` if later.
 
     By the velocity and acceleration of the nodes: touch-down and lift-off on level ground, the
-    penetrations ``depth`` (n,), slip velocities that fall to ``slow`` (n,) of either sign, and
-    normal forces that fall to zero. Stepping there saves the steps that would fail because
-    forces change within them; it is an estimate, and nothing depends on its accuracy.
+    penetrations ``control.depth`` (n,), slip velocities that fall to ``control.slow`` (n,) of
+    either sign, and normal forces that fall to zero. Stepping there saves the steps that would fail
+    because forces change within them; it is an estimate, and nothing depends on its accuracy.
     """
+    s, blocks, g = problem.system, problem.blocks, progress.gradients
+    depth, slow = problem.control.depth, problem.control.slow
     m, n, d = len(blocks.position), len(s.gap), s.rows.shape[1]
-    project(blocks, y, w[0], w[1])
-    project_one(blocks, rate[m : 2 * m], w[2])
+    project(blocks, progress.state, w[0], w[1])
+    project_one(blocks, progress.rate[m : 2 * m], w[2])
     first = within
     for j in range(n):
         u, v, a = -w[0, n + j] - s.gap[j], -w[1, n + j], -w[2, n + j]
-        first = _crossing(u, v, a, first)
-        first = _crossing(u - depth[j], v, a, first)
+        first = crossing(u, v, a, first)
+        first = crossing(u - depth[j], v, a, first)
         force = normal_force(j, u, v, s)[0]
         if force > 0.0:
             fall = g.partial[j, 1, 1] * -v + g.partial[j, 1, d + 1] * -a
@@ -412,18 +415,14 @@ def next_kink(y, rate, s, blocks, g, depth, slow, moved, w, within):
 
 
 @helper
-def _crossing(u, v, a, within):
-    """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier."""
-    if u * v > 0.0 and u * a >= 0.0:
-        return within
-    discriminant = v * v - 2.0 * a * u
-    if discriminant < 0.0:
-        return within
-    q = -(v + math.copysign(math.sqrt(discriminant), v))
-    one = q / a if a != 0.0 else -1.0
-    other = 2.0 * u / q if q != 0.0 else -1.0
-    if 0.0 < one < within:
-        within = one
-    if 0.0 < other < within:
-        within = other
-    return within
+def crossing(u, v, a, within):
+    """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier.
+
+    Of one number each, or of eight in SIMD lanes.
+    """
+    # NaN without a root: comparisons with it are false.
+    root = math.sqrt(v * v - 2.0 * a * u)
+    q = -(v + select(v < 0.0, -root, root))
+    one, other = q / a, 2.0 * u / q
+    within = select((one > 0.0) & (one < within), one, within)
+    return select((other > 0.0) & (other < within), other, within)

@@ -11,7 +11,13 @@ from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, WORST_NODE
 from fecontact.integrate.step_loop import RATES
 from fecontact.system.nodes import ground_motion, ground_speed, size_of, slip_velocity
-from fecontact.system.powers import POWER_COUNT, add_node_powers, given_powers, matrix_powers
+from fecontact.system.powers import (
+    POWER_COUNT,
+    add_node_powers,
+    given_powers,
+    matrix_powers,
+    set_losses,
+)
 
 
 @routine
@@ -236,14 +242,15 @@ def _powers(point, t, y, problem, progress, workspace):
     n, m = len(s.gap), len(blocks.position)
     states = (len(y) - 2 * m) // n
     force, rates = workspace.scratch.force[0], workspace.scratch.rates[0]
-    node_powers = out[POWER_COUNT:]
+    losses = out[POWER_COUNT:]
     moved = ground_motion(t, s)
     for at in range(near.used[0]):
         j = near.nodes[at]
         first = 2 * m + j * states
-        add_node_powers(j, dynamics.motion_of(at, workspace.between, s), moved,
-                        y[first : first + s.memory[j]], problem.control.stick_speed[j], s,
-                        force, rates, out, node_powers)
+        lost, speed = add_node_powers(
+            j, dynamics.motion_of(at, workspace.between, s), moved,
+            y[first : first + s.memory[j]], s, force, rates, out)
+        set_losses(j, lost, speed, problem.control.stick_speed[j], losses)
 
 
 @helper
@@ -309,7 +316,8 @@ def set_creeps(step, problem, progress, workspace):
             high = _POINTS[point]
             fast = _above_creep(high, j, step, problem, progress, workspace)
             if (slow < 0.0) != (fast < 0.0):
-                row[passed] = _passing(low, high, slow, fast, j, step, problem, progress, workspace)
+                row[passed] = _passing(Bracket(low, high, slow, fast, 0), j, step, problem,
+                                       progress, workspace)
                 passed += 1
             low, slow = high, fast
 
@@ -330,10 +338,9 @@ def _above_creep(part, j, step, problem, progress, workspace):
 
 
 @helper
-def _passing(low, high, at_low, at_high, j, step, problem, progress, workspace):
-    """Part of the step, between two, at which node j begins or ceases to creep."""
-    near, part = _CLOSE * problem.control.stick_speed[j], high
-    bracket = Bracket(low, high, at_low, at_high, 0)
+def _passing(bracket, j, step, problem, progress, workspace):
+    """Part of the step, within a bracket, at which node j begins or ceases to creep."""
+    near, part = _CLOSE * problem.control.stick_speed[j], bracket.high
     for _ in range(_MOST_TRIALS):
         part = between(bracket)
         found = _above_creep(part, j, step, problem, progress, workspace)

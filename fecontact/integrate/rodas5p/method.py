@@ -155,9 +155,7 @@ def _next_target(t, h, last, smallest, data):
     caution, limit = 0.0, numbers[CAUTIOUS]
     if limit > 0.0:
         reach = max(target - t, limit)
-        kink = dynamics.next_kink(progress.state, progress.rate, s, problem.blocks,
-                                  progress.gradients, control.depth, control.slow, moved,
-                                  workspace.nodes, reach)
+        kink = dynamics.next_kink(moved, problem, progress, workspace.nodes, reach)
         # Nearer kinks would shrink the steps without end. They are left to the error control,
         # and so are kinks within rounding of this time.
         if max(1e-3 * limit, 100.0 * smallest) < kink < 0.9 * reach:

@@ -81,6 +81,22 @@ class View(NamedTuple):
     rates: Matrix
 
 
+class Moment(NamedTuple):
+    """A state y (size,) in which deflections change, with its rates and gradients of the forces.
+
+    ``force`` and ``node_rates`` are filled by friction.
+    """
+
+    t: float
+    y: Vector
+    rate: Vector
+    gradients: dynamics.Gradients
+    problem: state.Problem
+    vary: Vary
+    force: Vector
+    node_rates: Matrix
+
+
 @routine
 def _look(part, view):
     """Put the state at a part of the step into ``view.y``; returns the motion of the ground."""
@@ -160,14 +176,16 @@ def _since_touch(j, contact, deepening, earlier, s):
 
 
 @routine
-def _begin_columns(j, i, through, deepening, t, y, g, problem, vary, force, rates):
+def _begin_columns(j, i, through, deepening, moment):
     """Let the derivatives of a deflection be those of z = v (t - t_b), of which t_b varies.
 
     Contact begins at t_b: the penetration passes a level, or the normal force comes ``through``
-    zero with the rate F_u u' + F_v u''; ``deepening`` is u''. g are the derivatives of node forces.
+    zero with the rate F_u u' + F_v u''; ``deepening`` is u''.
     """
-    s, v, tangents = problem.system, vary.variation, problem.system.rows.shape[1] - 1
-    first = 2 * len(problem.control.largest) + j * s.memory.max() + tangents * i
+    t, y, vary, force, rates = (moment.t, moment.y, moment.vary, moment.force,
+                                moment.node_rates)
+    s, v, tangents = moment.problem.system, vary.variation, moment.problem.system.rows.shape[1] - 1
+    first = 2 * len(moment.problem.control.largest) + j * s.memory.max() + tangents * i
     F, pressing, contact = pressing_at(j, y, ground_motion(t, s), s, force, rates)
     _, by_depth, by_rate = normal_force(j, contact.penetration, contact.rate, s)
     rate = by_depth * contact.rate + by_rate * deepening if through else contact.rate
@@ -175,7 +193,8 @@ def _begin_columns(j, i, through, deepening, t, y, g, problem, vary, force, rate
         places = node_motion(j, v.columns[c], s).places
         change = contact.slope[0] * places[0] - places[1] + contact.slope[1] * places[2]
         if through:
-            change = F / pressing * change_by(g.partial[j, tangents + 1], j, v.columns[c], s)
+            change = F / pressing * change_by(moment.gradients.partial[j, tangents + 1], j,
+                                              v.columns[c], s)
         if vary.width != 0.0 and c == len(v.columns) - 1:
             over, under = ground_motion(t, vary.above), ground_motion(t, vary.below)
             up, _, above = pressing_at(j, y, over, vary.above, force, rates)
@@ -186,20 +205,19 @@ def _begin_columns(j, i, through, deepening, t, y, g, problem, vary, force, rate
 
 
 @routine
-def _begin_contact(
-    j, since, through, acceleration, t, problem, progress, vary, force, rates,
-):
+def _begin_contact(j, since, through, acceleration, moment):
     """Set the deflections of node j a time after its touch; True if any changes.
 
     They are ``z = v since``, of which the part beyond the limit is the distance of slip. It may be
     longer by any amount. ``acceleration`` is that of the ground.
     """
-    s, y, changed = problem.system, progress.state, False
-    count = problem.control.slider_counts[j]
-    _, pressing, contact = pressing_at(j, y, ground_motion(t, s), s, force, rates)
+    problem, y, changed = moment.problem, moment.y, False
+    s, count = problem.system, problem.control.slider_counts[j]
+    _, pressing, contact = pressing_at(j, y, ground_motion(moment.t, s), s, moment.force,
+                                       moment.node_rates)
     slip, tangents = contact.slip, s.rows.shape[1] - 1
     speed = size_of(slip)
-    deepening = _penetration_acceleration(j, contact, progress.rate, acceleration, s)
+    deepening = _penetration_acceleration(j, contact, moment.rate, acceleration, s)
     z, scales = memory_of(j, y, s), problem.control.memory_scale
     for i in range(count):
         limit = limit_of(j, i, count, pressing, s)
@@ -210,9 +228,8 @@ def _begin_contact(
             moves |= z[first + k] != slip[k] * time
         if not moves:
             continue
-        if len(vary.variation.columns):
-            _begin_columns(j, i, through, deepening, t, y, progress.gradients, problem, vary, force,
-                           rates)
+        if len(moment.vary.variation.columns):
+            _begin_columns(j, i, through, deepening, moment)
         for k in range(tangents):
             z[first + k] = slip[k] * time
         changed = True
@@ -238,6 +255,8 @@ def _after_touch(step, t, problem, progress, workspace, vary):
     force, rates = force_workspace(s)
     moved = ground_motion(t, s)
     acceleration = dynamics.ground_acceleration(step.t, dynamics.t_plus(step), moved, s)
+    moment = Moment(t, progress.state, progress.rate, progress.gradients, problem, vary, force,
+                    rates)
     for j in range(len(control.slider_counts)):
         if control.slider_counts[j] == 0:
             continue
@@ -245,8 +264,7 @@ def _after_touch(step, t, problem, progress, workspace, vary):
         deepening = _penetration_acceleration(j, contact, progress.rate, acceleration, s)
         since, through = _since_touch(j, contact, deepening, earlier, s)
         if since >= 0.0:
-            changed |= _begin_contact(j, since, through, acceleration, t, problem, progress, vary,
-                                      force, rates)
+            changed |= _begin_contact(j, since, through, acceleration, moment)
     if changed:
         _set_rates(t, problem, progress, workspace)
 
@@ -284,18 +302,17 @@ def _largest(low, high, j, i, view):
 
 
 @routine
-def _columns(j, i, count, limit, size, t, y, g, problem, vary, force, rates):
-    """Make the derivatives of a deflection those of its limit.
-
-    ``y`` is the state before it returns, g the derivatives of the node forces there.
-    """
-    s, v = problem.system, vary.variation
-    tangents = s.rows.shape[1] - 1
-    first = 2 * len(problem.control.largest) + j * s.memory.max() + tangents * i
+def _columns(j, i, limit, size, moment):
+    """Make the derivatives of a deflection those of its limit; the state is that before it."""
+    t, y, vary, force, rates = (moment.t, moment.y, moment.vary, moment.force,
+                                moment.node_rates)
+    s, v, control = moment.problem.system, vary.variation, moment.problem.control
+    tangents, count = s.rows.shape[1] - 1, control.slider_counts[j]
+    first = 2 * len(control.largest) + j * s.memory.max() + tangents * i
     z, p = memory_of(j, y, s), s.friction_parameters[j]
     slope = p[1 + count + i] / p[1 + i]
     for c in range(len(v.columns)):
-        change = slope * change_by(g.partial[j, tangents + 1], j, v.columns[c], s)
+        change = slope * change_by(moment.gradients.partial[j, tangents + 1], j, v.columns[c], s)
         if vary.width != 0.0 and c == len(v.columns) - 1:
             _, above, _ = pressing_at(j, y, ground_motion(t, vary.above), vary.above, force, rates)
             _, below, _ = pressing_at(j, y, ground_motion(t, vary.below), vary.below, force, rates)
@@ -312,15 +329,16 @@ def _columns(j, i, count, limit, size, t, y, g, problem, vary, force, rates):
 
 
 @routine
-def _return_one(j, i, within, t, y, g, problem, vary, force, rates):
+def _return_one(j, i, within, moment):
     """Return element i of node j to its limit, or a little below it, if it is beyond it."""
-    s, count = problem.system, problem.control.slider_counts[j]
-    _, pressing, _ = pressing_at(j, y, ground_motion(t, s), s, force, rates)
+    s, count, y = moment.problem.system, moment.problem.control.slider_counts[j], moment.y
+    _, pressing, _ = pressing_at(j, y, ground_motion(moment.t, s), s, moment.force,
+                                 moment.node_rates)
     limit, size = limit_of(j, i, count, pressing, s), deflection_of(memory_of(j, y, s), i, s)
     if size <= limit:
         return
-    if len(vary.variation.columns):
-        _columns(j, i, count, limit, size, t, y, g, problem, vary, force, rates)
+    if len(moment.vary.variation.columns):
+        _columns(j, i, limit, size, moment)
     part = 1.0 - SHORT if within else 1.0 + SHORT
     return_deflection(memory_of(j, y, s), i, size, limit * part, s)
 
@@ -342,6 +360,8 @@ def _switch(step, problem, progress, workspace, vary):
     near = nearest if varies else max(_NEAR, nearest)
     least, past = near, 0.0
     after_t = np.nextafter(t, np.inf)
+    start = Moment(after_t, progress.state, progress.rate, progress.gradients, problem, vary, force,
+                   rates)
     for look in range(_LOOKS + 2):
         if again:
             break
@@ -368,8 +388,7 @@ def _switch(step, problem, progress, workspace, vary):
                 else:
                     again |= _begin_contact(
                         j, 0.0, pushing[(look + 2) % 3, j] != 0.0, dynamics.ground_acceleration(
-                            t, dynamics.t_plus(step), step.moved, s),
-                        after_t, problem, progress, vary, force, rates)
+                            t, dynamics.t_plus(step), step.moved, s), start)
                 _look(part, view)
         if look == 0:
             starts[:, :] = now
@@ -410,8 +429,7 @@ def _switch(step, problem, progress, workspace, vary):
     for j in range(n):
         for i in range(control.slider_counts[j]):
             if places[j, i] <= near:
-                _return_one(j, i, True, after_t, progress.state, progress.gradients,
-                            problem, vary, force, rates)
+                _return_one(j, i, True, start)
                 again = True
             elif at_once[j, i]:
                 z = memory_of(j, progress.state, s)
@@ -431,6 +449,8 @@ def _at_end(step, problem, progress, workspace, vary):
     y = np.empty(len(progress.state))
     earlier = _look(1.0 - _NEAR_VARIED, View(step, problem, progress, workspace, y, force, rates))
     now = ground_motion(step.latest, s)
+    end = Moment(step.latest, workspace.after, workspace.rate_after, workspace.gradients_after,
+                 problem, vary, force, rates)
     for j in range(len(control.slider_counts)):
         if control.slider_counts[j] == 0:
             continue
@@ -440,8 +460,7 @@ def _at_end(step, problem, progress, workspace, vary):
         if before < 0.5 * after:
             continue
         for i in range(control.slider_counts[j]):
-            _return_one(j, i, False, step.latest, workspace.after, workspace.gradients_after,
-                        problem, vary, force, rates)
+            _return_one(j, i, False, end)
     dynamics.set_rate_and_gradients(workspace.after, s, problem.blocks, workspace.given,
                                     workspace.load, workspace.nodes, workspace.gradients_after,
                                     workspace.rate_after)

@@ -28,6 +28,7 @@ from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.memory_saltation import switch_memory
+from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import keep_sides, set_sides, widen_scales
 from fecontact.system.nodes import (
     AXES,
@@ -136,17 +137,17 @@ class Vary(NamedTuple):
 
 
 def variation_for(
-    columns: int, modes: int, nodes: int, states: int, dimension: int, width: float,
-    tolerance: float, error_floor: float, combinations: int = 0,
+    system: ContactSystem, columns: int, width: float, tolerance: float, error_floor: float,
 ) -> Variation:
     """Workspace for so many columns; the first ``size`` of them are the unit matrix.
 
-    ``combinations`` is the number D of :mod:`fecontact.system.polynomial_forces`. ``width`` is that
-    of the parameter whose column comes last: 2e-5 of its value; zero without.
+    ``width`` is that of the parameter whose column comes last: 2e-5 of its value; zero without.
     """
-    directions = 2 * dimension + states if columns else 1
-    sizes = {COLUMNS: columns, DIRECTIONS: directions, MODES: modes, NODES: nodes, MEMORY: states,
-             AXES: dimension, COMBINATIONS: combinations}
+    nodes, dimension, modes = system.arrays.rows.shape
+    directions = 2 * dimension + system.memory if columns else 1
+    sizes = {COLUMNS: columns, DIRECTIONS: directions, MODES: modes, NODES: nodes,
+             MEMORY: system.memory, AXES: dimension,
+             COMBINATIONS: len(system.arrays.polynomial_rows)}
     made = allocate(
         Variation, sizes, tolerance=tolerance, error_floor=error_floor,
         second_derivatives=allocate(dynamics.Gradients, {**sizes, NODES: directions * nodes}))
@@ -159,8 +160,12 @@ def variation_for(
 
 
 @routine
-def _expand(step, y, s, blocks, given, load, v, g, time_rate):
-    """Fill gradients g and the rate at a fixed state of y' of a system at the begin of a step."""
+def _expand(side, step, y, s, blocks, v, g, time_rate):
+    """Fill gradients g and the rate at a fixed state of y' of a system at the begin of a step.
+
+    What is given there goes to row ``side`` of that in v.
+    """
+    given, load = v.given[side], v.load[side]
     after_t, later = np.nextafter(step.t, np.inf), dynamics.t_plus(step)
     dynamics.set_given(after_t, s, given, load)
     dynamics.set_gradients(y, s, blocks, dynamics.motion_given(given), v.nodes, g)
@@ -175,8 +180,8 @@ def _begin_parameter(step, progress, blocks, vary):
     """Fill d2f/dt dp (v.vectors[6]) and v.between at the begin of a step."""
     v, y = vary.variation, progress.state
     drift, other = v.vectors[6], v.vectors[5]
-    _expand(step, y, vary.above, blocks, v.given[0], v.load[0], v, v.ahead, drift)
-    _expand(step, y, vary.below, blocks, v.given[1], v.load[1], v, v.behind, other)
+    _expand(0, step, y, vary.above, blocks, v, v.ahead, drift)
+    _expand(1, step, y, vary.below, blocks, v, v.behind, other)
     for k in range(len(y)):
         drift[k] = (drift[k] - other[k]) / vary.width
     columns.set_between(v.ahead, progress.gradients, v.behind, vary.width, vary.central != 0,
@@ -283,15 +288,13 @@ def propagate(
     parameter that are still smaller than ``least`` count as if they had that size.
     """
     s, blocks, v = problem.system, problem.blocks, vary.variation
-    state, gradients, reduced, stages = (progress.state, progress.gradients, workspace.reduced,
-                                         workspace.stages)
+    state, gradients, stages = progress.state, progress.gradients, workspace.stages
     size = len(state)
     m = len(v.none)
-    Y, forced = v.vectors[0], v.vectors[3]
+    Y = v.vectors[0]
     varies = vary.width != 0.0
-    G = 1.0 / (step.h * tableau.GAMMA)
     if size == 2 * m:
-        stage_solver.set_solver(G, blocks, reduced, v.solver)
+        stage_solver.set_solver(1.0 / (step.h * tableau.GAMMA), blocks, workspace.reduced, v.solver)
     acceleration = dynamics.ground_acceleration(step.t, dynamics.t_plus(step), step.moved, s)
     columns.learn(gradients, v.usual)
     columns.set_paths(step, acceleration, s, blocks, stages, v)
@@ -323,12 +326,12 @@ def propagate(
                 _leave_turns(state, progress, s, counts, gradients, v.inside)
             columns.learn(v.inside, v.usual)
         if varies:
-            _set_forced(tableau.TIME[i] * step.h, Y, stages[i], blocks, vary, forced)
+            _set_forced(tableau.TIME[i] * step.h, Y, stages[i], blocks, vary, v.vectors[3])
         columns.set_ahead(i, state, s, stages, v)
         if size > 2 * m:
-            columns.one_by_one(i, step.h, G, s, blocks, gradients, reduced, forced, varies, v)
+            columns.one_by_one(i, step.h, problem, progress, workspace, vary)
         else:
-            columns.all_at_once(i, step.h, G, s, blocks, reduced, forced, varies, v)
+            columns.all_at_once(i, step.h, problem, workspace, vary)
     if size > 2 * m:
         switch_memory(step, acceleration, problem, progress, workspace, vary)
     if sliders:

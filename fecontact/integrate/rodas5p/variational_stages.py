@@ -103,7 +103,7 @@ def _reach(direction, j, y, s, control, v):
 
 
 @helper
-def _onward(direction, j, motion, acceleration, step, s, v, between, rate):
+def _onward(direction, j, acceleration, step, s, v, between, rate):
     """Rate of a node's motion or internal variable; of places, that towards the other side.
 
     Its sign says on which side of a kink the step goes on. ``between`` (2, d n) holds velocities
@@ -118,7 +118,7 @@ def _onward(direction, j, motion, acceleration, step, s, v, between, rate):
         rate_of_speed = between[1, axis * n + j]
         return rate_of_speed if axis == 1 else rate_of_speed - ground_moved(
             axis // 2, j, acceleration[0], acceleration[1], s)
-    contact = node_contact(j, motion, step.moved, s)
+    contact = node_contact(j, dynamics.motion_of(j, v.nodes, s), step.moved, s)
     if direction == 1:
         return -contact.rate
     slope = contact.slope[direction // 2]
@@ -126,11 +126,12 @@ def _onward(direction, j, motion, acceleration, step, s, v, between, rate):
 
 
 @routine
-def _offset_gradients(direction, e, j, motion, moved, z, s, v, out):
+def _offset_gradients(direction, e, j, moved, s, v, out):
     """Fill row j of the gradients ``out`` at the distance e along a direction.
 
-    ``z`` (size,) holds internal variables where the state does.
+    v.nodes holds the motions of the nodes, v.vectors[0] internal variables where the state does.
     """
+    motion, z = dynamics.motion_of(j, v.nodes, s), v.vectors[0]
     states, motions = out.rates.shape[1], out.partial.shape[2]
     first, d = 2 * len(v.none) + j * states, motions // 2
     places, speeds = motion.places, motion.speeds
@@ -204,17 +205,15 @@ def set_second_derivatives(step, acceleration, problem, progress, workspace, v):
     for k in range(2 * len(v.none), len(z)):
         z[k] = progress.state[k]
     for j in range(n):
-        motion = dynamics.motion_of(j, w, s)
         for direction in range(v.paths.shape[1]):
             reach = _reach(direction, j, progress.state, s, control, v)
             if reach == 0.0 or (even and (direction == 0 or (direction == 2 and motions > 4))):
                 for i in range(tableau.STAGES):
                     v.paths[i, direction, j] = 0.0
                 continue
-            _offset_gradients(direction, reach, j, motion, step.moved, z, s, v, v.ahead)
-            _offset_gradients(direction, -reach, j, motion, step.moved, z, s, v, v.behind)
-            forward = _onward(direction, j, motion, acceleration, step, s, v, between,
-                              progress.rate) >= 0.0
+            _offset_gradients(direction, reach, j, step.moved, s, v, v.ahead)
+            _offset_gradients(direction, -reach, j, step.moved, s, v, v.behind)
+            forward = _onward(direction, j, acceleration, step, s, v, between, progress.rate) >= 0.0
             _set_bend(j, direction * n + j, 1.0 / reach, forward, progress.gradients, v)
 
 
@@ -303,11 +302,14 @@ def set_derivatives(s, blocks, g, reduced, force_jacobian, out):
 
 
 @helper
-def all_at_once(i, h, G, s, blocks, reduced, forced, varies, v):
+def all_at_once(i, h, problem, workspace, vary):
     """Solve stage i of all columns; systems without internal variables and polynomial forces.
 
-    Columns of those with polynomial forces go in parts of the step.
+    Columns of those with polynomial forces go in parts of the step. v.vectors[3] holds what the
+    parameter adds to the rates of its column.
     """
+    s, blocks, reduced, v = problem.system, problem.blocks, workspace.reduced, vary.variation
+    G, forced = 1.0 / (h * tableau.GAMMA), v.vectors[3]
     count, size = v.columns.shape
     m = len(v.none)
     stage_solver.set_force_jacobian(blocks, v.inside, reduced, v.force_jacobian)
@@ -332,7 +334,7 @@ def all_at_once(i, h, G, s, blocks, reduced, forced, varies, v):
             right[k] += moved[k]
         for k in range(m):
             faster[k] += column_forces[k]
-    if varies:
+    if vary.width != 0.0:
         for k in range(size):
             v.right[count - 1, k] += forced[k]
     _products(v.right, v.solver, v.column_forces)
@@ -376,8 +378,10 @@ def add_node_forces(g, s, blocks, x, w, rate):
 
 
 @helper
-def one_by_one(i, h, G, s, blocks, gradients, reduced, forced, varies, v):
-    """Solve stage i of all columns; ``gradients`` are those at the start of the step."""
+def one_by_one(i, h, problem, progress, workspace, vary):
+    """Solve stage i of all columns; with v.vectors[3] as in :func:`all_at_once`."""
+    s, blocks, v = problem.system, problem.blocks, vary.variation
+    G, forced = 1.0 / (h * tableau.GAMMA), v.vectors[3]
     count, size = v.columns.shape
     m = len(v.none)
     w, right, X, rate = v.nodes, v.vectors[1], v.vectors[2], v.vectors[4]
@@ -392,11 +396,12 @@ def one_by_one(i, h, G, s, blocks, gradients, reduced, forced, varies, v):
         if has_polynomial(s):
             add_polynomial_product(-1.0, v.inside.polynomial, X, s, rate[m : 2 * m])
             add_polynomial_product(-1.0, v.ahead.polynomial, v.columns[c], s, rate[m : 2 * m])
-        if varies and c == count - 1:
+        if vary.width != 0.0 and c == count - 1:
             for k in range(size):
                 rate[k] += forced[k]
         tableau.combined(tableau.C[i], 1.0 / h, rate, own, right)
-        stage_solver.solve_stage(G, s, blocks, gradients, reduced, right, w, own[i])
+        stage_solver.solve_stage(G, s, blocks, progress.gradients, workspace.reduced, right, w,
+                                 own[i])
         if i == tableau.STAGES - 1:
             for k in range(size):
                 v.after[c, k] = X[k] + own[i, k]

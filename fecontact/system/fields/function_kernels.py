@@ -249,13 +249,13 @@ def _correct(function, place, moved, at, size, workspace):
 
 
 @helper
-def columns_by_complex_step(function, analytic, place, x, scales, workspace, complex_workspace, J,
+def columns_by_complex_step(function, analytic, place, scales, workspace, complex_workspace, J,
                             wrong):
     """Fill J (d, d) at a place by the complex step; ``wrong`` counts columns put right.
 
-    The workspace holds the state x and the parameters of the place.
+    The workspaces hold the state and the parameters of the place.
     """
-    d = len(x)
+    x, d = place.y, len(J)
     z, w = complex_workspace[0, :d], complex_workspace[1, : len(place.q)]
     out = complex_workspace[2, :d]
     column = workspace.column
@@ -324,8 +324,8 @@ def complex_steps(
         for i in range(d):
             z[i], y[i] = x[n, i], x[n, i]
         if places.states:
-            columns_by_complex_step(function, complex_function, place, x[n], places.scales,
-                                    workspace, complex_workspace, J[n], wrong)
+            columns_by_complex_step(function, complex_function, place, places.scales, workspace,
+                                    complex_workspace, J[n], wrong)
         for a in range(len(active)):
             at = active[a]
             w[at] = complex(p[at], _TINY)

@@ -87,7 +87,7 @@ def _with_complex_step(t, x, field, f, J):
         y[i], complex_workspace[0, i] = x[i], x[i]
     for a in range(len(q)):
         q[a], complex_workspace[1, a] = field.p[a], field.p[a]
-    columns_by_complex_step(function, complex_rates_at(field.analytic), Place(t, y, q, f), x,
+    columns_by_complex_step(function, complex_rates_at(field.analytic), Place(t, y, q, f),
                             field.scales, workspace, complex_workspace, J, field.wrong)
 
 

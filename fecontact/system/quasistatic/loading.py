@@ -94,24 +94,26 @@ def load_history(
         slope = _slope_under_preload(system, arrays, path, given, balance, q, rtol)
         sliders = sliders_of(system, tangential_ratio, tangential_stiffness, slope)
         pose = _begin(system, q, given[0], sliders)
-        return _loaded(system, arrays, path, given, pose, sliders, balance, rtol, 0)
+        marched = _marched(arrays, given, pose, sliders, balance.scale, rtol)
+        return _loaded(system, path, given, sliders, marched, 0)
     require_kind("load_history", (LoadHistory, RestState), start=start)
     state = start.state() if isinstance(start, LoadHistory) else start
     state.check(system)
     # Tuples for kernels hold no read-only arrays.
     sliders = Sliders(*map(np.array, state.sliders))
     pose = _pose(state.modal_coordinates, sliders, state.slider_place, state.slider_force)
-    balance = _balance(system, arrays, given[0])
-    return _loaded(system, arrays, path, np.vstack([state.given, given]), pose, sliders, balance,
-                   rtol, 1)
+    scale = _balance(system, arrays, given[0]).scale
+    given = np.vstack([state.given, given])
+    return _loaded(system, path, given, sliders,
+                   _marched(arrays, given, pose, sliders, scale, rtol), 1)
 
 
 def _loaded(
-    system: ContactSystem, arrays: SystemArrays, path: LoadPath, given: Array, pose: Pose,
-    sliders: Sliders, balance: Balance, rtol: float, skipped: int,
+    system: ContactSystem, path: LoadPath, given: Array, sliders: Sliders,
+    marched: tuple[int, Kept], skipped: int,
 ) -> LoadHistory:
     """Result of a march, without its first ``skipped`` rows; issues the warnings."""
-    reached, found = _marched(arrays, given, pose, sliders, balance.scale, rtol)
+    reached, found = marched
     counts = found.counts
     if reached <= skipped:
         raise AnalysisError("There is no equilibrium with friction at the first vertex of the "
