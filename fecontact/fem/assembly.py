@@ -19,7 +19,7 @@ lateral constant for lambda.
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -92,20 +92,20 @@ def assembled(
         constants[:, column] = value
     tensors, which_tensor = anisotropic or (np.empty((0, 6, 6)), np.full(len(constants), -1))
     for block, own in zip(blocks, slots, strict=True):
-        material = np.ascontiguousarray(constants[block.numbers]), tensors, np.ascontiguousarray(
-            which_tensor[block.numbers])
+        material = Materials(np.ascontiguousarray(constants[block.numbers]), tensors,
+                             np.ascontiguousarray(which_tensor[block.numbers]))
+        out = Entries(own, entries, mass)
         corners = np.ascontiguousarray(block.nodes[:, : block.geometry])
         affine = _affine_cells(places, corners, block.kind)
         if affine.any():
             which = np.flatnonzero(affine)
             inverse, scale = _inverse_jacobians(places, corners[which], block.kind)
-            _add_affine(which, inverse, scale, *_reference_integrals(block), *material, own,
-                        entries, mass)
+            _add_affine(which, inverse, scale, *_reference_integrals(block), material, out)
         if not affine.all():
             values, slopes = _shapes(dimension, block.nodes.shape[1], block.local)
             stretch = _shapes(dimension, block.geometry, block.local)[1]
-            _add_quadrature(np.flatnonzero(~affine), places, corners, stretch, values, slopes,
-                            np.array(block.weights), *material, own, entries, mass)
+            _add_quadrature(np.flatnonzero(~affine), places, corners, Quadrature(
+                np.array(block.weights), stretch, values, slopes), material, out)
     return (sp.bsr_array((entries, indices, indptr), shape=(dimension * size,) * 2),
             sp.csr_array((mass, indices, indptr), shape=(size, size)))
 
@@ -283,13 +283,46 @@ def _entry(stiffness: Matrix, H: Matrix, p: int, q: int) -> float:
     return entry
 
 
+class Materials(NamedTuple):
+    """Lame's constants and density (c, 3) of cells, stiffnesses (n, 6, 6), and which a cell has."""
+
+    constants: Matrix
+    tensors: Block
+    which: IntegerVector
+
+
+class Entries(NamedTuple):
+    """Blocks (e, d, d) of the stiffness, entries (e,) of the mass, and those of each cell's nodes.
+
+    The latter are ``slots`` (c, k, k).
+    """
+
+    slots: ShortBlock
+    blocks: Block
+    mass: Vector
+
+
+class Quadrature(NamedTuple):
+    """Rule of q points in a reference cell.
+
+    ``weights`` (q,), slopes ``stretch`` (q, g, 3) of the map of the cell, and ``values`` (q, k) and
+    ``slopes`` (q, k, 3) of the shape functions.
+    """
+
+    weights: Vector
+    stretch: Block
+    values: Matrix
+    slopes: Block
+
+
 @kernel
 def _add_affine(
     which: IntegerVector, inverse: Block, scale: Vector, gradients: Array4, masses: Matrix,
-    constants: Matrix, tensors: Block, which_tensor: IntegerVector, slots: ShortBlock,
-    blocks: Block, mass: Vector,
+    material: Materials, out: Entries,
 ) -> None:
     """Add the affine cells ``which`` to the blocks of the stiffness and the entries of the mass."""
+    constants, tensors, which_tensor = material.constants, material.tensors, material.which
+    slots, blocks, mass = out.slots, out.blocks, out.mass
     width, dimension = slots.shape[1], blocks.shape[1]
     half, H = np.empty((3, 3)), np.empty((3, 3))
     for cell in range(len(which)):
@@ -327,11 +360,13 @@ def _add_affine(
 
 @kernel
 def _add_quadrature(
-    which: IntegerVector, nodes: Matrix, corners: IntegerMatrix, stretch: Block, values: Matrix,
-    slopes: Block, weights: Vector, constants: Matrix, tensors: Block,
-    which_tensor: IntegerVector, slots: ShortBlock, blocks: Block, mass: Vector,
+    which: IntegerVector, nodes: Matrix, corners: IntegerMatrix, rule: Quadrature,
+    material: Materials, out: Entries,
 ) -> None:
-    """Add the cells ``which`` by quadrature; ``stretch`` (q, g, 3) are slopes of their map."""
+    """Add the cells ``which`` by quadrature."""
+    weights, stretch, values, slopes = rule.weights, rule.stretch, rule.values, rule.slopes
+    constants, tensors, which_tensor = material.constants, material.tensors, material.which
+    slots, blocks, mass = out.slots, out.blocks, out.mass
     width, dimension, points = slots.shape[1], blocks.shape[1], len(weights)
     J, I = np.empty((3, 3)), np.empty((3, 3))
     slope, H = np.empty((width, 3)), np.empty((width, width, 3, 3))

@@ -24,13 +24,13 @@ and hinges turn by finite angles, see :mod:`fecontact.fem.finite_rotations`.
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fecontact.core.compiled import kernel
 from fecontact.core.records import Array4, Block, IntegerMatrix, Matrix, ShortBlock
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array
 from fecontact.fem.assembly import pattern
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elements.cell_kinds import HEXAHEDRON
@@ -42,6 +42,19 @@ from fecontact.fem.stress_stiffness import USED
 
 # Strain up to which St. Venant and Kirchhoff's material stands for metals.
 LARGE_STRAIN = 0.01
+
+
+class Cells(NamedTuple):
+    """Cells of one kind.
+
+    ``gradients`` (e, q, k, d) of the shape functions and ``volumes`` (e, q) at the points of
+    quadrature, nodes ``members`` (e, k), and ``stiffness`` (e, s, s).
+    """
+
+    gradients: Array4
+    volumes: Matrix
+    members: IntegerMatrix
+    stiffness: Block
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +106,8 @@ class FiniteStrainModel:
     geometric: Any = None
 
     @cached_property
-    def _blocks(self) -> list[tuple[Array, Array, Integers, Array]]:
-        """Gradients (e, q, k, d), volumes (e, q), nodes (e, k) and stiffness (e, s, s) by kind."""
+    def _blocks(self) -> list[Cells]:
+        """Cells by kind."""
         body = self.body
         used, found = USED[body.dimension], []
         for block in body.blocks:
@@ -106,8 +119,8 @@ class FiniteStrainModel:
                 own = len(body.nodes) + np.arange(3 * count).reshape(count, 3)
                 members = np.ascontiguousarray(np.concatenate([members, own], axis=1))
             stiffness = body.cell_stiffness(block.numbers)[:, used][:, :, used]
-            found.append((gradients, volumes * body.thickness, members,
-                          np.ascontiguousarray(stiffness)))
+            found.append(Cells(gradients, volumes * body.thickness, members,
+                               np.ascontiguousarray(stiffness)))
         return found
 
     @property
@@ -129,7 +142,7 @@ class FiniteStrainModel:
 
     @cached_property
     def _pattern(self) -> tuple[Any, Any, Any]:
-        return pattern([members for _, _, members, _ in self._blocks], self.nodes)
+        return pattern([cells.members for cells in self._blocks], self.nodes)
 
     @cached_property
     def _springs(self) -> Any:
@@ -189,8 +202,8 @@ class FiniteStrainModel:
         blocks = np.zeros((len(indices) if tangent else 0, d, d))
         found = np.zeros((2, 1))
         moved = np.ascontiguousarray(u.reshape(-1, d))
-        for block, own in zip(self._blocks, slots, strict=True):
-            _add_cells(*block, moved, own, blocks, force, found)
+        for cells, own in zip(self._blocks, slots, strict=True):
+            _add_cells(cells, moved, own, blocks, force, found)
         energy, total, K = float(found[0, 0]), force.ravel(), None
         if tangent:
             K = sp.bsr_array((blocks, indices, indptr), shape=(u.size, u.size)).tocsc()
@@ -248,10 +261,12 @@ class FiniteStrainModel:
 
 @kernel
 def _add_cells(
-    gradients: Array4, volumes: Matrix, members: IntegerMatrix, stiffness: Block,
-    displacement: Matrix, slots: ShortBlock, blocks: Block, force: Matrix, found: Matrix,
+    block: Cells, displacement: Matrix, slots: ShortBlock, blocks: Block, force: Matrix,
+    found: Matrix,
 ) -> None:
     """Add forces, tangent blocks and energy of all cells; ``found`` holds energy and strain."""
+    gradients, volumes = block.gradients, block.volumes
+    members, stiffness = block.members, block.stiffness
     cells, points, width, d = gradients.shape
     strains = 3 if d == 2 else 6
     first, second = np.empty(strains, np.int64), np.empty(strains, np.int64)

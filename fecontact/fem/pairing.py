@@ -329,14 +329,13 @@ def _paired(
         segments, tributary = face_segments(face.body, face.boundary, nodes, runs, _COUNT)
         samples, matrix = segment_samples(face, segments, marks), _segment_matrix(face, segments)
     found = samples.closest(other, limit)
-    pressure = pressure_samples(face, runs, marks)
-    return _described(face, other, samples, found, matrix, tributary, overlap, limit, pressure,
-                      (alone, why))
+    return _described(face, other, samples, found, matrix, tributary, overlap,
+                      alone=(alone, why), limit=limit, pressure=pressure_samples(face, runs, marks))
 
 
 def _described(
     face: Face, other: Face, samples: Samples, found: Closest, matrix: Any, tributary: Array,
-    overlap: float, limit: float, pressure: Samples, alone: tuple[Array, tuple[str, ...]],
+    overlap: float, *, alone: tuple[Array, tuple[str, ...]], limit: float, pressure: Samples,
 ) -> Pairing:
     """The pairing of contact nodes all of which have a partner."""
     import scipy.sparse as sp
