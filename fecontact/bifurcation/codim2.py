@@ -179,7 +179,7 @@ def codim2_curve(
     attributes |= {"parameters": list(names), "kind": kind,
                    "state_names": list(field.state_names)}
     return _followed(problem, u, names, chosen, ranges.get(parameter, chosen.second_bounds),
-                     direction, both, attributes, grows)
+                     direction=direction, both=both, attributes=attributes, grows=grows)
 
 
 def _ranges(
@@ -205,7 +205,7 @@ def _ranges(
 
 def _followed(
     problem: Problem, u: Array, names: tuple[str, str], options: ContinuationOptions,
-    second: tuple[float, float], direction: float, both: bool, attributes: dict[str, Any],
+    second: tuple[float, float], *, direction: float, both: bool, attributes: dict[str, Any],
     grows: Callable[[Array], float] | None,
 ) -> Branch:
     """The curve through u = [..., second parameter, first parameter], within both ranges.

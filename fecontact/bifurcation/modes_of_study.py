@@ -36,7 +36,7 @@ def unfinished(mode: NonlinearMode, points: int) -> bool:
 
 def follow_mode(
     system: "ContactSystem", wanted: "ResponseSettings", amplitudes: tuple[float, float],
-    number: int, progress: Callable[[int], None] | None = None,
+    number: int, progress: Callable[[int], None] | None = None, *,
     earlier: NonlinearMode | None = None,
     keep: Callable[[NonlinearMode], object] | None = None,
     preload: "LoadHistory | None" = None, wave: EngineOrder | None = None,

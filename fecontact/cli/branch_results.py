@@ -33,7 +33,7 @@ _COLUMNS = ("branch", "kind", "parameter", "stable", "unstable_directions", "per
 
 
 def write_branch_results(
-    result: "Branches", wanted: "BranchSettings", folder: Path, name: str,
+    result: "Branches", wanted: "BranchSettings", folder: Path, name: str, *,
     beneath: "PoincareScan | None" = None, study: str | None = None, root: Path | None = None,
     highest_hz: float = math.inf, usable_hz: float = math.inf,
 ) -> list[Path]:

@@ -59,8 +59,8 @@ def follow_mode(
             preload = study.load_history() if wanted.preload else None
             with (progress_bar(f"Mode {number}", wanted.points) as tell,
                   located("--nonlinear:", "nonlinear_mode")):
-                mode = followed(system, wanted, amplitudes, number, tell, earlier, keep, preload,
-                                wave)
+                mode = followed(system, wanted, amplitudes, number, tell, earlier=earlier,
+                                keep=keep, preload=preload, wave=wave)
         assert mode is not None
         with waiting("Writing"):
             files = write_mode_results(study, mode, observe, folder, page=wave is None)

@@ -188,7 +188,7 @@ def test_accuracy_is_stated(noise, reached):
     rough = squares * np.linspace(0.7, 1.6, 400)[::-1, None]
     start = np.random.default_rng(0).standard_normal((400, 16))
     found = lowest_modes(lambda x: squares * x, lambda x: x.copy(), lambda x: x / rough, start, 5,
-                         np.zeros((400, 0)), 1e-6, np.array([noise]))
+                         np.zeros((400, 0)), tolerance=1e-6, noise=np.array([noise]))
     assert found.converged
     assert reached / 100.0 < found.errors.max() <= reached
     assert np.sqrt(found.squares) == pytest.approx(np.sqrt(squares[:5, 0]), rel=reached**2)

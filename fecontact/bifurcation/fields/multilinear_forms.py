@@ -44,7 +44,7 @@ class Bend:
 
 def bend(
     field: VectorField, x: Array, values: Array, direction: Array, scales: Array,
-    active: tuple[int, ...] = (), shift: Array | None = None, every: int = 1,
+    active: tuple[int, ...] = (), shift: Array | None = None, *, every: int = 1,
     higher: bool = False,
 ) -> tuple[Bend, Bend]:
     """Derivatives of the Jacobian at x along a direction (d,), by formulas of order eight and six.

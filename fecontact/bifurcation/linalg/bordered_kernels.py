@@ -42,8 +42,10 @@ def _parts(factors, pivots):
 
 
 @helper
-def _take(given, first, group, groups, N, size, count, places, out):
+def _take(given, first, group, factors, count, places, out):
     """Gather given[j size + first ...] of a group of intervals in out (count, 8), zero beyond N."""
+    groups, size, _, _ = factors.inner.shape
+    N = len(factors.local)
     for lane in range(WIDTH):
         places[lane] = min(lane * groups + group, N - 1) * size + first
     for c in range(count):
@@ -72,14 +74,14 @@ def reduce_border(
     row, link, left = (np.empty((width, WIDTH)), np.empty((3 * d + e, WIDTH)),
                        np.empty((d, WIDTH)))
     places = np.empty(WIDTH, dtype=np.int64)
-    _take(given, 0, 0, groups, N, size, d, places, left)
+    _take(given, 0, 0, factors, d, places, left)
     for c in range(d):
         write(link[d + c], read(left[c]))
         write(link[2 * d + c], nothing)
     for c in range(e):
         write(link[3 * d + c], nothing)
     for group in range(groups):
-        _take(given, d, group, groups, N, size, inner, places, row)
+        _take(given, d, group, factors, inner, places, row)
         for c in range(d):
             # Until its interval is reached, x_j occupies the place of x_(j+1).
             write(row[inner + c], read(link[2 * d + c]))
@@ -95,7 +97,7 @@ def reduce_border(
             for c in range(d):
                 write(link[d + c], read(link[d + c]) + read(row[inner + c]))
         else:
-            _take(given, 0, group, groups, N, size, d, places, left)
+            _take(given, 0, group, factors, d, places, left)
             for c in range(d):
                 write(link[c], read(row[inner + c]) + read(left[c]))
             reduce_row_simd(factors.chain[group - 1], d, link, chain_weights[group - 1])

@@ -106,12 +106,14 @@ def controlled_response(
     row, observed = observed_row(field, observe)
     low, high = chosen.bounds
     first = inside(low if start is None else float(start), chosen)
-    state = preloaded(system, preload)
+    values = field.values
+    values[field.index(name)] = first
+    wanted = Forced(field, values, field.index(force), method or HarmonicBalance(), chosen,
+                    preloaded(system, preload))
     found: list[Branch] = []
     for amplitude in held.tolist():
         try:
-            problem, u = _started(field, field.index(force), field.index(name), first, amplitude,
-                                  row, method or HarmonicBalance(), chosen, state)
+            problem, u = _started(wanted, field.index(name), amplitude, row)
             found.append(continue_branch(
                 problem, u, chosen, name=name, direction=1.0 if first < high else -1.0,
                 both=low < first < high, attributes={
@@ -128,15 +130,15 @@ def controlled_response(
 
 
 def _started(
-    field: VectorField, force: int, second: int, first: float, amplitude: float, row: Array,
-    method: HarmonicBalance, options: ContinuationOptions, held: Array | None,
+    wanted: Forced, second: int, amplitude: float, row: Array
 ) -> tuple[PeakProblem, Array]:
-    """Problem, and the orbit of the amplitude at the first value of the parameter.
+    """Problem, and the orbit of the amplitude at the first value of the ``second`` parameter.
 
-    The response over the level of the force begins close to rest, and ends at the amplitude.
+    The response over the level of the force, which is free, begins close to rest and ends at the
+    amplitude.
     """
-    values, plain = field.values, replace(method, tolerance=None)
-    values[second] = first
+    field, values, force = wanted.field, wanted.values, wanted.free
+    plain = replace(wanted.method, tolerance=None, stability=None)
     failed: FecontactError = AnalysisError("")
     highest = abs(float(values[force])) or 1.0
     for _ in range(_TIMES):
@@ -145,8 +147,8 @@ def _started(
             events={_REACHED: lambda found: found["observed_amplitude"] / amplitude - 1.0},
             stop_at=[_REACHED])
         try:
-            level = Forced(field, values, force, replace(plain, stability=None), given, held)
-            branch = branch_of_response(level, given.bounds[0], row)
+            branch = branch_of_response(replace(wanted, method=plain, options=given),
+                                        given.bounds[0], row)
         except FecontactError as error:
             failed = error
             break
@@ -155,17 +157,17 @@ def _started(
             highest *= _FIRST * amplitude / sizes[0]
         elif branch.points[-1].kind == _REACHED:
             orbit, u, tangent = starts.restored(field, branch.points[-1])
-            orbit = replace(orbit, stability=method.stability)
-            width = width_of(None, options, first)
+            orbit = replace(orbit, stability=wanted.method.stability)
+            width = width_of(None, wanted.options, float(values[second]))
             rest = (rest_state(field, values) if isinstance(field, ContactField)
                     else np.zeros(field.dimension))
             problem = PeakProblem(orbit, second, width, row, HELD, orbit.weights() * tangent, rest,
                                   amplitude)
-            return problem, np.append(u, first)
+            return problem, np.append(u, values[second])
         else:
             # At a constant slope the amplitude would be reached half-way.
             highest *= max(_WIDER, 2.0 * amplitude / sizes[-1])
     names = list(field.parameters)
     raise AnalysisError(f"The amplitude {amplitude:g} was not reached at {names[second]} = "
-                        f"{first:g} with any {names[force]} up to {highest:g}; start at another "
-                        f"value, or hold a smaller one. {failed}".rstrip())
+                        f"{values[second]:g} with any {names[force]} up to {highest:g}; start at "
+                        f"another value, or hold a smaller one. {failed}".rstrip())

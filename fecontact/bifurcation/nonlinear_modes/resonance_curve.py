@@ -178,8 +178,9 @@ def resonance_curve(
     low, high = chosen.bounds
     values = field.values
     values[second] = inside(low if start is None else float(start), chosen)
-    problem, u = _first(field, values, free, second, frequencies, row, condition, float(lag),
-                        method or HarmonicBalance(), chosen, preloaded(system, preload))
+    wanted = Forced(field, values, free, method or HarmonicBalance(), chosen,
+                    preloaded(system, preload))
+    problem, u = _first(wanted, second, frequencies, row, condition, float(lag))
     branch = continue_branch(
         problem, u, chosen, name=parameter, direction=1.0 if u[-1] < high else -1.0,
         both=low < u[-1] < high, attributes={
@@ -203,16 +204,16 @@ def resonances_of(branch: Branch) -> ResonanceCurve:
 
 
 def _first(
-    field: VectorField, values: Array, free: int, second: int, frequencies: tuple[float, float],
-    row: Array, condition: str, lag: float, method: HarmonicBalance, options: ContinuationOptions,
-    held: Array | None,
+    wanted: Forced, second: int, frequencies: tuple[float, float], row: Array, condition: str,
+    lag: float,
 ) -> tuple[PeakProblem, Array]:
     """The problem, and the peak of a response."""
+    field, values = wanted.field, wanted.values
     # Kinks jump the stability, which does not matter here.
     given = options_of(ContinuationOptions(points=2000, largest_step=_RESPONSE, locate=False),
                        frequencies)
     branch = branch_of_response(
-        Forced(field, values, free, replace(method, tolerance=None), given, held),
+        replace(wanted, method=replace(wanted.method, tolerance=None), options=given),
         given.bounds[0])
     sizes = observed_amplitudes(branch, row)
     place = int(np.argmax(sizes))
@@ -223,9 +224,9 @@ def _first(
     rest = (rest_state(field, values) if isinstance(field, ContactField)
             else np.zeros(field.dimension))
     if condition == "phase" and isinstance(field, ContactField):
-        place = _place_of_phase(field, values, free, branch, rest, lag, place)
+        place = _place_of_phase(field, values, wanted.free, branch, rest, lag, place)
     orbit, u, tangent = starts.restored(field, branch.points[place])
-    width = width_of(None, options, float(values[second]))
+    width = width_of(None, wanted.options, float(values[second]))
     problem = PeakProblem(orbit, second, width, row, condition, orbit.weights() * tangent, rest,
                           float(sizes[place]), lag=lag)
     start = np.append(u, values[second])

@@ -66,9 +66,9 @@ def branch(
         if wanted.poincare_scan and not result.interrupted:
             beneath = runs_beneath(system, wanted, described.initial())
         with waiting("Writing"):
-            files = write_branch_results(result, wanted, folder, described.name, beneath,
-                                         described.to_toml(), described.folder,
-                                         np.inf if all_ else usable, usable)
+            files = write_branch_results(
+                result, wanted, folder, described.name, beneath=beneath, study=described.to_toml(),
+                root=described.folder, highest_hz=np.inf if all_ else usable, usable_hz=usable)
         for name, found in result.found.items():
             echo(f"\n{name}: {found.end}")
             if found.message:

@@ -69,8 +69,11 @@ def response(
 
     described = read_study(study, set_)
     with located(f"{described.title}: [response]:", "ResponseSettings"):
-        wanted = _wanted(described.response, parameter, bounds, levels, method, harmonics,
-                         samples, tolerance, amplitudes, force)
+        wanted = _wanted(
+            described.response, parameter, bounds, method=method, force=force, samples=samples,
+            tolerance=tolerance, levels=None if levels is None else _levels(levels),
+            harmonics=None if harmonics is None else _harmonics(harmonics),
+            amplitudes=None if amplitudes is None else _amplitudes(amplitudes))
     with located(f"{described.title}:"):
         _ = wanted.checked_bounds
     described = replace(described, response=wanted)
@@ -133,23 +136,17 @@ def response(
 
 def _wanted(
     given: "ResponseSettings", parameter: str | None, bounds: tuple[float, float] | None,
-    levels: str | None, method: str | None,
-    harmonics: str | None, samples: int | None, tolerance: float | None, amplitudes: str | None,
-    force: str | None,
+    **options: object,
 ) -> "ResponseSettings":
-    """The section [response] with the options of the command line."""
-    changes: dict[str, object] = {name: value for name, value in (
-        ("parameter", parameter), ("method", method), ("force", force),
-        ("harmonics", None if harmonics is None else _harmonics(harmonics)), ("samples", samples),
-        ("tolerance", tolerance)) if value is not None}
+    """The section [response] with the options of the command line, None for those not given."""
+    changes = {name: value for name, value in {"parameter": parameter, **options}.items()
+               if value is not None}
     if bounds is not None or (parameter is not None and parameter != given.parameter):
         changes |= {"bounds": bounds, "start": None}
-    if levels is not None:
-        changes["levels"] = _levels(levels)
-    if amplitudes is not None:
-        changes |= {"amplitudes": _amplitudes(amplitudes)} | ({} if levels else {"levels": {}})
-    if harmonics is not None and samples is None:
-        changes["samples"] = None
+    if "amplitudes" in changes:
+        changes.setdefault("levels", {})
+    if "harmonics" in changes:
+        changes.setdefault("samples", None)
     return replace(given, **changes)  # type: ignore[arg-type]
 
 

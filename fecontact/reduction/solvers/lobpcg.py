@@ -52,7 +52,7 @@ class Found:
 @one_blas_thread
 def lowest_modes(
     stiffness: Product, mass: Product, precondition: Product, start: Array, count: int,
-    rigid: Array, tolerance: float, noise: Array, most: int = 60,
+    rigid: Array, *, tolerance: float, noise: Array, most: int = 60,
 ) -> Found:
     """The lowest elastic modes of a body.
 

@@ -168,7 +168,8 @@ class SolidSolver:
         noise = np.einsum("ij,ij->j", self.gauge, self._cycle(self.gauge))
         return lowest_modes(
             self.stiffness_product, self.mass_product, self._cycle,
-            self._cycle(self.mass_product(start)), count, rigid, _MODES, np.abs(noise))
+            self._cycle(self.mass_product(start)), count, rigid, tolerance=_MODES,
+            noise=np.abs(noise))
 
     def deflections(
         self, forces: Array, tolerance: float, most: int = 100

@@ -5,6 +5,7 @@ Arrays at Gauss points are (N m, d) for N intervals of m points, nodes as in
 """
 
 import math
+from typing import NamedTuple
 
 from fecontact.core.compiled import kernel
 from fecontact.core.records import Block, ComplexMatrix, Matrix, Vector
@@ -84,16 +85,30 @@ def central(up: Block, down: Block, here: Block, step: float, first: Block, seco
                 second[row, i, c] = two * ((a + b) - 2.0 * here[row, i, c])
 
 
+class TermDerivatives(NamedTuple):
+    """Derivatives of the rates at N m Gauss points.
+
+    ``J`` (N m, d, d) and ``P`` (N m, d, q) to states and parameters; ``bend`` and ``shift`` of
+    these along the states of a term.
+    """
+
+    J: Block
+    P: Block
+    bend: Block
+    shift: Block
+
+
 @kernel
 def add_term(
-    left: Matrix, states: Matrix, period: float, T: float, widths: Vector, J: Block, P: Block,
-    bend: Block, shift: Block, points: Matrix, common: Vector,
+    left: Matrix, states: Matrix, period: float, T: float, widths: Vector,
+    derivatives: TermDerivatives, points: Matrix, common: Vector,
 ) -> None:
     """Add a term to the derivative of a test function, see the module ``singularity``.
 
     ``points`` (N m, d) are its derivatives to the states at the Gauss points, over the width of
     the interval, ``common`` those to the period, where there is room, and to the parameters.
     """
+    J, P, bend, shift = derivatives.J, derivatives.P, derivatives.bend, derivatives.shift
     rows, d, q = P.shape
     m = rows // len(widths)
     first = len(common) - q

@@ -29,6 +29,7 @@ from fecontact.bifurcation.orbits.collocation_equations import (
 )
 from fecontact.bifurcation.orbits.collocation_kernels import to_nodes
 from fecontact.bifurcation.orbits.curves.kernels import (
+    TermDerivatives,
     add_term,
     central,
     open_values,
@@ -211,8 +212,8 @@ def gradient(
     _, J, P = at.derivatives
     points, out = np.zeros(J.shape[:2]), np.zeros(len(at.u))
     for term, (bend, _, shift) in zip(terms, bent, strict=True):
-        add_term(term.left, term.states, term.period, T, problem.widths, J, P, bend, shift, points,
-                 out[problem.size :])
+        add_term(term.left, term.states, term.period, T, problem.widths,
+                 TermDerivatives(J, P, bend, shift), points, out[problem.size :])
     to_nodes(points, problem.rule.values, problem.widths,
              out[: problem.size].reshape(-1, problem.field.dimension))
     return out
