@@ -175,7 +175,7 @@ class Motion:
 
     @property
     def evaluation(self) -> Evaluation:
-        """What acts at the state that was looked at last."""
+        """Contacts and forces at the state that was evaluated last."""
         return self._workspace.evaluation
 
     @cached_property

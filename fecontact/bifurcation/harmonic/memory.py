@@ -332,7 +332,7 @@ def march_block(j, alone, samples, s, element, target, path):
 
 
 class LeftOver(NamedTuple):
-    """What the equations of an element leave, (N, 2, 1), and ``slopes`` g_z; workspace."""
+    """Residual (N, 2, 1) of the equations of an element, its ``slopes`` g_z, and workspace."""
 
     left: Block
     slopes: Array4
