@@ -101,8 +101,10 @@ def read_tdms(path: Path, units: Mapping[str, str]) -> list[Measurement]:
             if "wf_increment" not in one.properties:
                 untimed.append(one.name)
                 continue
+            times = one.properties["wf_increment"] * np.arange(len(one))
             series.append({"data": one[:], "name": one.name, "unit_str": _unit(one),
-                           "time": one.time_track(), "group": group.name})
+                           "time": times + one.properties.get("wf_start_offset", 0.0),
+                           "group": group.name})
     if series:
         found += from_sep005(series, units=units, source=str(path))
     if not found:

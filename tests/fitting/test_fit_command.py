@@ -7,7 +7,8 @@ import pytest
 from report_reading import Shown
 
 import fecontact as fc
-from fecontact.fitting import LoopData, fit_study, study_data
+from fecontact.fitting import FrequencyData, LoopData, fit_study, study_data
+from fecontact.study import FitParameter
 
 STUDY = """
 geometry = { shape = "beam", length = 0.1, height = 0.02, element_size = 0.01 }
@@ -136,6 +137,22 @@ changes = {{ "load.normal" = 150.0 }}
     code, _, said = cli("fit", str(study))
     assert code == 1
     assert "did you mean 'normal'" in said
+
+
+def test_material_and_support_from_frequencies(tmp_path):
+    """A beam, fixed at one end, with a spring at the other: Young's modulus and the spring."""
+    path = tmp_path / "beam.toml"
+    text = STUDY.partition("[fit]")[0].replace(
+        'material = "steel", thickness = 0.02', 'youngs_modulus = 2e11, poisson_ratio = 0.3, '
+        'density = 7800.0, thickness = 0.02, fixed = { right = "xy" }').replace(
+        "stiffness_x = 1e6", "stiffness_x = 1e6, stiffness_y = 2e6")
+    path.write_text(text)
+    truth = fc.Study.read(path)
+    hertz = FrequencyData(np.ones(3), 1.0).predicted(truth.with_(
+        {"body.youngs_modulus": 2.3e11, "drive.stiffness_y": 7e5}).system())
+    found = fc.fit(truth, {"body.youngs_modulus": (1e11, 4e11), "drive.stiffness_y": FitParameter(
+        1e5, 1e7, scale="log")}, FrequencyData(hertz, 0.5))
+    assert found.estimates == pytest.approx([2.3e11, 7e5], rel=1e-5)
 
 
 @pytest.mark.long

@@ -125,7 +125,7 @@ def test_tdms(tmp_path):
     path = tdms(tmp_path / "a.tdms", [
         ("test", "tip", MOTION, {**step, "unit_string": "mm"}),
         ("test", "force", 2.0 * MOTION, {**step, "NI_UnitDescription": "kN"}),
-        ("slow", "tip", MOTION[::4], {"wf_increment": TIME[4], "wf_start_offset": 0.0}),
+        ("slow", "tip", MOTION[::4], {"wf_increment": TIME[4]}),
         ("table", "time", TIME, {"unit_string": "s"}), ("table", "x", MOTION, {})])
     by_size = {one.values.size: one for one in read_measurements(path)}
     table, test, slow = (by_size.pop(n) for n in (513, 1026, 129))
