@@ -8,7 +8,6 @@ import math
 from typing import Annotated, NamedTuple
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.simd.functions import select
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.laws.signatures import signal_at
@@ -397,8 +396,8 @@ def next_kink(moved, problem, progress, w, within):
     first = within
     for j in range(n):
         u, v, a = -w[0, n + j] - s.gap[j], -w[1, n + j], -w[2, n + j]
-        first = crossing(u, v, a, first)
-        first = crossing(u - depth[j], v, a, first)
+        first = _crossing(u, v, a, first)
+        first = _crossing(u - depth[j], v, a, first)
         force = normal_force(j, u, v, s)[0]
         if force > 0.0:
             fall = g.partial[j, 1, 1] * -v + g.partial[j, 1, d + 1] * -a
@@ -415,14 +414,18 @@ def next_kink(moved, problem, progress, w, within):
 
 
 @helper
-def crossing(u, v, a, within):
-    """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier.
-
-    Of one number each, or of eight in SIMD lanes.
-    """
-    # NaN without a root: comparisons with it are false.
-    root = math.sqrt(v * v - 2.0 * a * u)
-    q = -(v + select(v < 0.0, -root, root))
-    one, other = q / a, 2.0 * u / q
-    within = select((one > 0.0) & (one < within), one, within)
-    return select((other > 0.0) & (other < within), other, within)
+def _crossing(u, v, a, within):
+    """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier."""
+    if u * v > 0.0 and u * a >= 0.0:
+        return within
+    discriminant = v * v - 2.0 * a * u
+    if discriminant < 0.0:
+        return within
+    q = -(v + math.copysign(math.sqrt(discriminant), v))
+    one = q / a if a != 0.0 else -1.0
+    other = 2.0 * u / q if q != 0.0 else -1.0
+    if 0.0 < one < within:
+        within = one
+    if 0.0 < other < within:
+        within = other
+    return within

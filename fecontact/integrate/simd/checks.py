@@ -8,10 +8,18 @@ Checks and their limits are as in :mod:`fecontact.integrate.rodas5p.error_contro
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.simd.vectors import chosen, magnitude, mask_of, read, spread, write
+from fecontact.core.simd.vectors import (
+    chosen,
+    magnitude,
+    mask_of,
+    read,
+    root,
+    signed,
+    spread,
+    write,
+)
 from fecontact.integrate.polynomial_bounds import coefficient_range
 from fecontact.integrate.rodas5p.driver import SLIP_PART as _SLIP_PART
-from fecontact.integrate.rodas5p.dynamics import crossing
 from fecontact.integrate.rodas5p.tableau import STAGES
 from fecontact.integrate.simd.arrays import (
     BY_PLACE,
@@ -76,6 +84,15 @@ def slip_error(error, speed, s, control, w):
     return error
 
 
+@helper
+def _crossing(u, v, a, within):
+    """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier."""
+    q = -(v + signed(root(v * v - 2.0 * a * u), v))
+    one, other = q / a, 2.0 * u / q
+    within = chosen((one > 0.0) & (one < within), one, within)
+    return chosen((other > 0.0) & (other < within), other, within)
+
+
 @routine
 def next_kink(s, control, progress, within):
     """Time until forces of a node change their character, or ``within`` if later."""
@@ -88,8 +105,8 @@ def next_kink(s, control, progress, within):
             x += read(s.rows[j, 0, i]) * read(progress.rate[m + i])
             y += read(s.rows[j, 1, i]) * read(progress.rate[m + i])
         u, v, a = -read(progress.places[n + j]) - read(s.gap[j]), -read(progress.speeds[n + j]), -y
-        first = crossing(u, v, a, first)
-        first = crossing(u - read(control.depth[j]), v, a, first)
+        first = _crossing(u, v, a, first)
+        first = _crossing(u - read(control.depth[j]), v, a, first)
         force = read(progress.forces[j, FORCE])
         pressed = force > 0.0
         fall = (read(progress.forces[j, BY_PLACE]) * v + read(progress.forces[j, BY_RATE]) * a)
