@@ -8,16 +8,16 @@ accelerance that sensors, filter and noise give is that of the beam with the acc
 """
 
 import numpy as np
-from scipy.signal import csd, welch
 
 import fecontact as fc
-from fecontact.analysis import receptance
+from fecontact.analysis import power_spectral_density, receptance
 from fecontact.laws import SweptSine
 from fecontact.measured import (
     Accelerometer,
     Acquisition,
     ForceGauge,
     Shaker,
+    averaged_responses,
     measure,
     with_sensors,
 )
@@ -49,25 +49,22 @@ print(test)
 # %%
 # Accelerance by averaged spectra of both channels (H1), beside that of the beam with the masses of
 # accelerometer and gauge.
-part = {"fs": 4096.0, "nperseg": 8192, "noverlap": 7168}
-hertz, cross = csd(test.values[:, 0], test.values[:, 1], **part)
-force = welch(test.values[:, 0], **part)[1]
-measured = cross / force
-shown = (hertz > 40.0) & (hertz < 850.0)
-true, alone = (receptance(one, hertz[shown], [("drive", "y")], [("tip", "y")],
+found = averaged_responses(test, "force", segment=2.0).between(40.0, 850.0)
+hertz, measured = found.abscissa, found.values[:, 0]
+true, alone = (receptance(one, hertz, [("drive", "y")], [("tip", "y")],
                           kind="accelerance").values[:, 0, 0] for one in (
     fc.reduction.with_masses(beam, {"tip": 0.012, "drive": 0.006}), beam))
-off = np.abs(measured[shown] / true - 1.0)
-peak = hertz[shown][np.argmax(np.abs(measured)[shown])]
-print(f"highest peak at {peak:.1f} Hz, without accelerometer at "
-      f"{hertz[shown][np.argmax(np.abs(alone))]:.1f} Hz")
+off = np.abs(measured / true - 1.0)
+print(f"highest peak at {hertz[np.argmax(np.abs(measured))]:.1f} Hz, without accelerometer at "
+      f"{hertz[np.argmax(np.abs(alone))]:.1f} Hz")
 print(f"accelerance off by {100.0 * np.median(off):.2f} % in the middle of all frequencies")
 with new_figure(9.0, 3.6, "shaken_beam.png") as figure:
     left, right = figure.subplots(1, 2)
-    left.semilogy(hertz[shown], np.sqrt(force[shown]))
-    left.set(xlabel="frequency [Hz]", ylabel="density of the force [N/√Hz]")
-    right.semilogy(hertz[shown], np.abs(measured)[shown], label="measured")
-    right.semilogy(hertz[shown], np.abs(true), "--", label="with sensors")
-    right.semilogy(hertz[shown], np.abs(alone), ":", label="beam alone")
+    force = power_spectral_density(test.abscissa, test.values[:, 0], piece=2.0)
+    left.semilogy(force.frequency_hz, np.sqrt(force.values))
+    left.set(xlabel="frequency [Hz]", ylabel="density of the force [N/√Hz]", xlim=(40.0, 850.0))
+    for values, style, label in ((measured, "-", "measured"), (true, "--", "with sensors"),
+                                 (alone, ":", "beam alone")):
+        right.semilogy(hertz, np.abs(values), style, label=label)
     right.set(xlabel="frequency [Hz]", ylabel="accelerance [m/s²/N]")
     right.legend()

@@ -7,6 +7,7 @@ from .assurance import (
     response_assurance,
     scale_question,
 )
+from .averaged_responses import averaged_responses
 from .experimental_modes import ExperimentalModes, experimental_modes
 from .measurement import Channel, Measurement
 from .ring_down import ring_down
@@ -26,6 +27,7 @@ __all__ = [
     "ModePairs",
     "Sensor",
     "Shaker",
+    "averaged_responses",
     "backbone_curve",
     "experimental_modes",
     "from_sep005",
