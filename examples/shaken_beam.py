@@ -62,7 +62,8 @@ with new_figure(9.0, 3.6, "shaken_beam.png") as figure:
     left, right = figure.subplots(1, 2)
     force = power_spectral_density(test.abscissa, test.values[:, 0], piece=2.0)
     left.semilogy(force.frequency_hz, np.sqrt(force.values))
-    left.set(xlabel="frequency [Hz]", ylabel="density of the force [N/√Hz]", xlim=(40.0, 850.0))
+    left.set(xlabel="frequency [Hz]", ylabel="density of the force [N/√Hz]",
+             xlim=(40.0, 850.0), ylim=(0.01, 1.0))
     for values, style, label in ((measured, "-", "measured"), (true, "--", "with sensors"),
                                  (alone, ":", "beam alone")):
         right.semilogy(hertz, np.abs(values), style, label=label)
