@@ -1,4 +1,4 @@
-"""What a file holds of the contact in a run, so that the run is drawn without its laws."""
+"""Contact quantities in the file of a run, by which it is drawn without its laws."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -40,7 +40,7 @@ class RecordedContact:
     component: str = ""
 
     def rows(self, chosen: Any) -> "RecordedContact":
-        """The same at some of the outputs, of which the messages are not known."""
+        """Quantities at some of the outputs, without the messages about limits."""
         state, energy = (None if one is None else one[chosen]
                          for one in (self.contact_state, self.energy))
         return replace(self, contact_state=state, energy=energy, limits=None, contact={

@@ -1,4 +1,4 @@
-"""What the rotation of a body adds to its modes."""
+"""Terms that the rotation of a body adds to the equations of its modes."""
 
 from dataclasses import dataclass, replace
 
