@@ -103,3 +103,10 @@ def test_many_rings_converge():
     assert forces[-1] == pytest.approx(0.75 * ts.MU * exact.load, rel=1e-4)
     area = np.trapezoid([0.0, *forces], [0.0, *travels]) - 0.5 * forces[-1] * travels[-1]
     assert 8.0 * area == pytest.approx(exact.loss(0.75), rel=1.5e-3)
+
+
+def test_elements_turn_back_all_at_once():
+    """Rounding of deflections is no end of slip: the run ended there, or stood still."""
+    finer = ts.cycle(22).run
+    assert finer.status is fc.Status.FINISHED
+    assert finer.statistics["steps"] < 40000

@@ -56,6 +56,8 @@ _LOOKS, _ASIDE = 8, 1e-5
 _FEW = 32
 # Excesses fall if they do by this part of their scale.
 _FALL = 1e-12
+# Rise of an excess, in its deflection, that may be rounding.
+_ROUNDING = 1e-14
 # Parts of a step within which a switch counts as lying on its end, without and with derivatives.
 _NEAR, _NEAR_VARIED = 1e-3, 1e-6
 _PRECISION, _TRIALS = 1e-7, 50
@@ -298,7 +300,11 @@ def _largest(low, high, j, i, view):
     at_high = _slope(high, j, i, view)
     if not at_high < 0.0:
         return high
-    return _root(True, low, high, at_low, at_high, j, i, view)
+    place = _root(True, low, high, at_low, at_high, j, i, view)
+    largest = _excess(place, j, i, view)
+    size = deflection_of(memory_of(j, view.y, view.problem.system), i, view.problem.system)
+    # In very short steps slopes are rounding: what falls all along may seem to rise first.
+    return place if largest - _excess(low, j, i, view) > _ROUNDING * size else low
 
 
 @routine
@@ -399,7 +405,9 @@ def _switch(step, problem, progress, workspace, vary):
                 continue
             for i in range(control.slider_counts[j]):
                 low, middle, high = older[j, i], last[j, i], now[j, i]
-                scale = _FALL * max(abs(middle), control.memory_scale[j * states])
+                size = deflection_of(memory_of(j, progress.state, s), i, s)
+                scale = max(_FALL * max(abs(middle), control.memory_scale[j * states]),
+                            _ROUNDING * size)
                 # The top may be above the looks by the fall on both sides.
                 rise = middle - low if look > 1 else 0.0
                 falls = middle - high > scale and rise > -scale
@@ -411,7 +419,6 @@ def _switch(step, problem, progress, workspace, vary):
                 if begins and middle <= 0.0 < high:
                     begun = 1.0 - near if look == _LOOKS + 1 else (look - 1) / _LOOKS
                     place = _root(False, begun, part, min(middle, -1e-300), high, j, i, view)
-                    size = deflection_of(memory_of(j, progress.state, s), i, s)
                     if look == 1 and middle >= -0.5 * SHORT * size:
                         # The last step ended just short of where slip begins. Without deflection
                         # and limit, at a touch, the element slides by itself.
