@@ -85,12 +85,6 @@ class FitParameter:
         return 0.5 if self.start is None else self.place(self.start)
 
 
-def places_of(parameters: tuple[FitParameter, ...], values: Array) -> Array:
-    """Places (p,) of values (p,)."""
-    return np.array([one.place(float(value))
-                     for one, value in zip(parameters, values, strict=True)])
-
-
 def values_of(parameters: tuple[FitParameter, ...], places: Array) -> Array:
     """Values (p,) at places (p,)."""
     return np.array([one.value(float(place))

@@ -8,6 +8,7 @@ import pytest
 from systems import friction_oscillator, impact_oscillator
 
 import fecontact as fc
+from fecontact.analysis.resolved import resolved
 from fecontact.core.errors import InputError
 from fecontact.integrate import (
     CVODE,
@@ -18,7 +19,7 @@ from fecontact.integrate import (
     Rodas5P,
     Scipy,
     TimeStepping,
-    kept_steps,
+    kept_rows,
 )
 from fecontact.integrate.step_loop import COUNTS, HALVED, KEPT, PASSED
 from fecontact.laws import JenkinsFriction
@@ -74,8 +75,8 @@ def test_steps_with_outputs_keep_none():
 def test_rows_without_room_are_halved(solver, monkeypatch):
     made = impact_oscillator if isinstance(solver, PowerSeries) else friction_oscillator
     whole = run(made, solver).kept
-    monkeypatch.setattr(kept_steps, "_MOST_ROWS", 100)
-    monkeypatch.setattr(kept_steps, "_FEWEST_ROWS", 100)
+    monkeypatch.setattr(kept_rows, "_MOST_ROWS", 100)
+    monkeypatch.setattr(kept_rows, "_FEWEST_ROWS", 100)
     few = run(made, solver).kept
     assert 40 <= len(few.time) <= 100
     # They are some of all, to the last bit, evenly spread over these but for outputs between them.
@@ -91,7 +92,7 @@ def test_an_odd_last_row_goes_too():
     counts = np.zeros(COUNTS, dtype=np.int64)
     counts[KEPT] = 7
     times = np.arange(1.0, 10.0)
-    kept_steps.halve((times,), counts)
+    kept_rows.halve((times,), counts)
     assert times[: counts[KEPT]].tolist() == [2.0, 4.0, 6.0]
     assert (counts[PASSED], counts[HALVED]) == (1, 1)
 
@@ -100,8 +101,8 @@ def test_halved_rows_do_not_depend_on_the_pieces_of_a_run(monkeypatch):
     """Calls of the loop return by the clock; what is kept may not show that."""
     from fecontact.integrate import step_runs
 
-    monkeypatch.setattr(kept_steps, "_MOST_ROWS", 101)
-    monkeypatch.setattr(kept_steps, "_FEWEST_ROWS", 101)
+    monkeypatch.setattr(kept_rows, "_MOST_ROWS", 101)
+    monkeypatch.setattr(kept_rows, "_FEWEST_ROWS", 101)
     whole = run(friction_oscillator, Rodas5P()).kept
     for most in (1, 7):
         monkeypatch.setattr(step_runs, "_FEWEST", most)
@@ -112,8 +113,8 @@ def test_halved_rows_do_not_depend_on_the_pieces_of_a_run(monkeypatch):
 
 
 def test_runs_from_a_checkpoint_keep_the_same(tmp_path, monkeypatch):
-    monkeypatch.setattr(kept_steps, "_MOST_ROWS", 100)
-    monkeypatch.setattr(kept_steps, "_FEWEST_ROWS", 100)
+    monkeypatch.setattr(kept_rows, "_MOST_ROWS", 100)
+    monkeypatch.setattr(kept_rows, "_FEWEST_ROWS", 100)
     monkeypatch.setattr("fecontact.integrate.step_runs._FEWEST", 20)
     monkeypatch.setattr("fecontact.integrate.step_runs._MOST_STEPS", 20)
     whole = run(friction_oscillator, Auto()).kept
@@ -146,11 +147,20 @@ def test_files_give_back_what_was_kept(tmp_path):
     for solver in (Rodas5P(), EventDriven()):
         written = run(friction_oscillator, solver)
         read = fc.read_case(fc.write_case(tmp_path / "case.h5", written)).trajectory
-        for name in ("time", "states", "work", "normal_force", "friction_force"):
+        for name in ("time", "states", "work"):
             one, other = getattr(written.kept, name), getattr(read.kept, name)
             assert (one is None) == (other is None)
             if one is not None:
                 np.testing.assert_array_equal(one, other)
+        # Pictures of stored runs need no laws: files hold forces too, with seven digits.
+        fine = resolved(written).trajectory
+        at = np.searchsorted(fine.time, written.kept.time)
+        assert (fine.time[at] == written.kept.time).all()
+        for name in ("normal_force", "friction_force"):
+            one = getattr(written.kept, name)
+            one = getattr(fine, name)[at] if one is None else one
+            np.testing.assert_allclose(getattr(read.kept, name), one, rtol=2e-7,
+                                       atol=2e-7 * np.abs(one).max())
     bare = fc.write_case(tmp_path / "case.h5", replace(written, kept=None))
     assert fc.read_case(bare).trajectory.kept is None
 
@@ -158,8 +168,6 @@ def test_files_give_back_what_was_kept(tmp_path):
 @pytest.mark.parametrize("solver", [Auto(), Scipy("Radau")])
 def test_energies_balance_between_the_outputs_too(solver):
     """With elastic Coulomb friction too, which stores what the integrator counts as lost."""
-    from fecontact.analysis.resolved import resolved
-
     elastic = friction_oscillator(2, friction=JenkinsFriction(1e4, 0.4))
     found = fc.simulate(elastic, 1.0, outputs=6, solver=solver,
                         initial=np.array([0.02, -2e-5, 0.0, 0.0, 1e-4]))

@@ -1,7 +1,7 @@
 """Branches of tori, from Neimark-Sacker points, runs, orbits and other tori."""
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -133,19 +133,31 @@ def _layout(field: VectorField) -> Layout:
     return found if slider_counts(field.system()).any() else replace(found, memory=0, nodes=0)
 
 
+class _Guess(NamedTuple):
+    """Coefficients (L, b) of a torus, its frequencies [Hz], and the amplitudes (d,) of its states.
+
+    ``kept`` (c,) are deflections less displacements of elements that never slide.
+    """
+
+    X: Array
+    frequencies: tuple[float, float]
+    amplitudes: Array
+    kept: Array | None
+
+
 def _problem(
-    excitation: Excitation, values: Array, free: int, method: TorusBalance, X: Array,
-    frequencies: tuple[float, float], amplitudes: Array, given: Any, kept: Array | None = None,
+    excitation: Excitation, values: Array, free: int, method: TorusBalance, guess: _Guess,
+    given: Any,
 ) -> TorusProblem:
     scales, width, options = given
-    sizes, limits = sizes_of(scales, amplitudes + 1e-300)
+    sizes, limits = sizes_of(scales, guess.amplitudes + 1e-300)
     layout = _layout(excitation.field)
     elements = elements_of(excitation.field, layout)
-    if elements is not None and kept is not None:
-        elements = replace(elements, kept=replace(elements.kept, offsets=kept))
+    if elements is not None and guess.kept is not None:
+        elements = replace(elements, kept=replace(elements.kept, offsets=guess.kept))
     return TorusProblem(
-        excitation, values, free, method.orders, method.counts, X,
-        np.concatenate([sizes, frequencies, [width_of(width, options, values[free])]]),
+        excitation, values, free, method.orders, method.counts, guess.X,
+        np.concatenate([sizes, guess.frequencies, [width_of(width, options, values[free])]]),
         layout, method.stability, method.tolerance, limits, elements)
 
 
@@ -190,8 +202,8 @@ def _from_neimark_sacker(
     X, amplitudes = _of_orbit(_layout(field), motion, method.orders)
     frequencies = (1.0 / motion.period, point.angle / (2.0 * np.pi * motion.period))
     values = point.parameter_values(field)
-    problem = _problem(excitation, values, free, method, X, frequencies, amplitudes, given,
-                       _kept(field, motion))
+    guess = _Guess(X, frequencies, amplitudes, _kept(field, motion))
+    problem = _problem(excitation, values, free, method, guess, given)
     u = _unknowns(problem, X, frequencies)
     leaving = np.zeros_like(X)
     rows = np.arange(2 * method.orders[0] + 1, 6 * method.orders[0] + 3)
@@ -238,8 +250,8 @@ def _from_motion(
         fit, frequencies, orders = fitted(motion.times, motion.states[:, layout.columns], known,
                                           method.orders)
         X, amplitudes = with_orders(fit, orders, method.orders), motion.amplitudes
-    problem = _problem(excitation, values, free, method, X, frequencies, amplitudes, given,
-                       _kept(field, motion))
+    guess = _Guess(X, frequencies, amplitudes, _kept(field, motion))
+    problem = _problem(excitation, values, free, method, guess, given)
     return problem, _unknowns(problem, X, frequencies)
 
 
@@ -257,9 +269,9 @@ def _from_torus(
     X = with_orders(motion.coefficients[:, layout.columns], motion.harmonics, own.orders)
     scales = np.asarray(known["scales"], dtype=float)
     frequencies = float(motion.frequencies[0]), float(motion.frequencies[1])
-    problem = _problem(excitation, values, free, own, X, frequencies, scales[: layout.states],
-                       (given[0], given[1] or float(scales[-1]), given[2]),
-                       known.get("kept_deflections"))
+    guess = _Guess(X, frequencies, scales[: layout.states], known.get("kept_deflections"))
+    problem = _problem(excitation, values, free, own, guess,
+                       (given[0], given[1] or float(scales[-1]), given[2]))
     u = _unknowns(problem, X, frequencies)
     tangent = np.zeros_like(u)
     L = len(motion.coefficients)
