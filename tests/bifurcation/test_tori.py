@@ -5,8 +5,11 @@ import pytest
 from bifurcation.torus_fields import (
     SECOND,
     duffing,
+    error_of_derivatives,
+    first_torus,
     forced_van_der_pol,
     period_of_w,
+    torus_problem,
     two_tone_duffing,
 )
 from numba import njit
@@ -44,20 +47,13 @@ def without_second(field):
     return PeriodicMotion(found.times, found.states, found.period)
 
 
-def one(field, start, name, **options):
-    """The first torus of a branch."""
-    method = options.pop("method", None)
-    return torus_branch(field, start, name, method=method,
-                        options=ContinuationOptions(points=1), **options).points[0]
-
-
 def test_a_weakly_forced_oscillator_beats_as_adler_says():
     # Phase of the averaged equations: psi' = D - K sin psi, with D = w - w0, K = F / (2 a w0).
     force, free = 0.012, 1.0 - EPS**2 / 16.0
     locking = force / 4.0
     for detuning in (1.6 * locking, 4.0 * locking):
         field = forced_van_der_pol(EPS, force, free + detuning)
-        point = one(field, settled(field, [2.0, 0.0], 600.0, 8000.0, 6000), "w",
+        point = first_torus(field, settled(field, [2.0, 0.0], 600.0, 8000.0, 6000), "w",
                     method=TorusBalance((6, 6)))
         beat = CIRCLE * (point.values["frequency_1"] - point.values["frequency_2"])
         assert beat == pytest.approx(np.sqrt(detuning**2 - locking**2), rel=0.02)
@@ -128,10 +124,10 @@ def test_back_at_the_orbit_the_branch_ends(orbits):
 def test_errors_fall_with_the_harmonics_and_are_estimated():
     field = forced_van_der_pol(0.4, 0.5, 1.6)
     run = settled(field, [1.0, 0.0], 200.0, 3000.0)
-    exact = one(field, run, "w", method=TorusBalance((13, 9)))
+    exact = first_torus(field, run, "w", method=TorusBalance((13, 9)))
     errors, estimates = [], []
     for H in (2, 4, 6, 8):
-        point = one(field, run, "w", method=TorusBalance((H, H)))
+        point = first_torus(field, run, "w", method=TorusBalance((H, H)))
         fine, coarse = torus_motion(exact), torus_motion(point)
         part = [fine.harmonic(*k)[0] - coarse.harmonic(*k)[0] for k in ((0, 1), (1, 0), (2, -1))]
         errors.append(np.abs(part).max() + abs(
@@ -150,31 +146,13 @@ def test_derivatives_are_those_of_differences(second):
     else:
         field, name = two_tone_duffing(), "w"
         start = without_second(field)
-    from fecontact.bifurcation.tori import branches as tori
-
-    kept = {}
-    followed = tori._followed
-
-    def keep(problem, u, *rest):
-        kept["at"] = problem, u
-        return followed(problem, u, *rest)
-
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(tori, "_followed", keep)
-        one(field, start, name, second=second, method=TorusBalance((2, 3)))
-    problem, u = kept["at"]
-    given = problem.linearise(u).condensed
-    columns = []
-    for k in range(len(u)):
-        h = 1e-6 * max(abs(u[k]), 1e-2)
-        sides = [problem.linearise(u + sign * h * np.eye(len(u))[k]).residual for sign in (1, -1)]
-        columns.append((sides[0] - sides[1]) / (2.0 * h))
-    assert np.abs(given - np.array(columns).T).max() < 1e-5 * np.abs(given).max()
+    problem, u = torus_problem(field, start, name, second=second, method=TorusBalance((2, 3)))
+    assert error_of_derivatives(problem, u, 1e-6) < 1e-5
 
 
 def test_two_tones_of_a_duffing_oscillator_meet_a_long_run():
     field = two_tone_duffing()
-    point = one(field, without_second(field), "second", second=SECOND,
+    point = first_torus(field, without_second(field), "second", second=SECOND,
                 method=TorusBalance((7, 7)))
     motion = torus_motion(point)
     assert motion.frequencies == pytest.approx([1.7 / CIRCLE, field.values[5]])
@@ -215,7 +193,7 @@ def test_the_second_excitation_grows_from_nothing():
                           bounds=(0.0, 0.3), method=TorusBalance((5, 5)))
     assert branch.points[0].values["minimum"] == pytest.approx(
         without_second(field).states.min(axis=0), rel=1e-2)
-    direct = one(two_tone_duffing(), without_second(field), "second", second=SECOND,
+    direct = first_torus(two_tone_duffing(), without_second(field), "second", second=SECOND,
                  method=TorusBalance((5, 5)))
     assert branch.points[-1].values["maximum"] == pytest.approx(direct.values["maximum"], rel=1e-6)
 
@@ -223,8 +201,8 @@ def test_the_second_excitation_grows_from_nothing():
 def test_a_run_finds_both_tones_too():
     field = two_tone_duffing()
     run = settled(field, [0.0, 0.0], 300.0, 1500.0)
-    by_run = one(field, run, "w", second=SECOND, method=TorusBalance((5, 5)))
-    by_orbit = one(field, without_second(field), "w", second=SECOND,
+    by_run = first_torus(field, run, "w", second=SECOND, method=TorusBalance((5, 5)))
+    by_orbit = first_torus(field, without_second(field), "w", second=SECOND,
                    method=TorusBalance((5, 5)))
     assert by_run.u == pytest.approx(by_orbit.u, abs=1e-6)
 
@@ -265,7 +243,8 @@ def test_two_oscillators_that_do_not_feel_each_other(second, tmp_path):
 def test_far_from_resonance_the_free_vibration_is_smaller():
     # Averaging about the forced vibration b: a^2 = 4 - 2 b^2.
     field = forced_van_der_pol(0.02, 0.3, 1.3)
-    point = one(field, settled(field, [2.0, 0.0], 1000.0, 2000.0), "w", method=TorusBalance((4, 4)))
+    point = first_torus(field, settled(field, [2.0, 0.0], 1000.0, 2000.0), "w",
+                        method=TorusBalance((4, 4)))
     b = 0.3 / (1.3**2 - 1.0)
     motion = torus_motion(point)
     assert abs(motion.harmonic(1, 0)[0]) == pytest.approx(b, rel=1e-2)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from bifurcation.torus_fields import error_of_derivatives, first_torus, torus_problem
 
 import fecontact as fc
 from fecontact.bifurcation import (
@@ -14,7 +15,6 @@ from fecontact.bifurcation import (
     torus_motion,
 )
 from fecontact.bifurcation.harmonic.layout import layout_of
-from fecontact.bifurcation.tori import branches as tori
 from fecontact.bifurcation.tori.elements import elements_of
 from fecontact.core.errors import InputError
 from fecontact.laws import (
@@ -68,15 +68,14 @@ def in_space():
                              fc.PointLoad("P", "z", signal=Harmonic(0.2, FIRST_HZ)))))
 
 
-def steady(system, begin=60.0, time=30.0, initial=None):
+def steady(system, begin=60.0, time=30.0, initial="rest"):
     run = fc.simulate(system, begin + time, initial=initial, rtol=1e-9,
                       outputs=np.append(0.0, np.linspace(begin, begin + time, 3001)))
     return run.between(begin)
 
 
 def one(system, start, method, second=SECOND):
-    return torus_branch(contact_field(system, [MU]), start, second=second, method=method,
-                        options=ContinuationOptions(points=1)).points[0]
+    return first_torus(contact_field(system, [MU]), start, second=second, method=method)
 
 
 def misfit(motion, run, states):
@@ -159,21 +158,6 @@ def test_a_second_tone_of_nothing_leaves_the_orbit():
         exact.states[:, :2], abs=2e-4 * np.abs(exact.states[:, 1]).max())
 
 
-def kept_torus(system, run, method, second=SECOND):
-    """Problem and unknowns of the torus near a run."""
-    kept = {}
-    followed = tori._followed
-
-    def keep(problem, u, *rest):
-        kept["at"] = problem, u
-        return followed(problem, u, *rest)
-
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(tori, "_followed", keep)
-        one(system, run, method, second)
-    return kept["at"]
-
-
 def driven_flutter():
     """Negative damping lets the mass vibrate by itself as far as the element lets it."""
     return oscillator(JENKINS, -0.2, 0.3, 0.0, first=0.45)
@@ -183,19 +167,13 @@ def driven_flutter():
                          ids=["plane", "pressed", "in space", "driven flutter"])
 def test_derivatives_are_those_of_differences(system):
     second = SECOND if len(system.load.forces) > 1 else None
-    problem, u = kept_torus(system, steady(system, 150.0, 60.0), TorusBalance(2), second)
+    problem, u = torus_problem(contact_field(system, [MU]), steady(system, 150.0, 60.0),
+                               second=second, method=TorusBalance(2))
     rng = np.random.default_rng(3)
     size = np.abs(u[: problem.size]).max()
     # Beside the torus, where no motion is exactly zero.
     u[: problem.size] += 0.02 * size * rng.standard_normal(problem.size)
-    given = problem.linearise(u).condensed
-    columns = []
-    for k in range(len(u)):
-        step = np.zeros(len(u))
-        step[k] = 1e-7 * max(abs(u[k]), 1e-2)
-        up, down = (problem.linearise(u + sign * step).residual for sign in (1.0, -1.0))
-        columns.append((up - down) / (2.0 * step[k]))
-    assert np.abs(given - np.array(columns).T).max() < 1e-6 * np.abs(given).max()
+    assert error_of_derivatives(problem, u, 1e-7) < 1e-6
 
 
 def test_self_excited_vibration_under_a_drive_finds_its_frequency():

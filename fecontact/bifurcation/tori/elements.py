@@ -161,7 +161,7 @@ def _transfer(by: Array4, whole: Block) -> None:
 
 
 class _Line(NamedTuple):
-    """What the derivatives of the deflections of an element are made of.
+    """Derivatives of the deflections of an element within a step, and of what they depend on.
 
     ``by`` as of :func:`_derive`; ``slopes`` (Q, P, 2 d) are those of its limit to places and speeds
     of the node, ``values`` and ``speeds`` (Q, P, L) the functions of the series and their rates.
@@ -197,7 +197,7 @@ def _carry(line: _Line, stiffness: float, begun: Block, rows: Array4, ends: Bloc
                     one, other = was[0, first + k], was[1, first + k]
                     change = values[k] - (line.values[q, p - 1, k] if p > 0 else 0.0)
                     if axis == 0:
-                        # On the first sample z begins with the displacement, behind it follows it.
+                        # The first z is slid + x; each later one follows the change of x.
                         one += change if p == 0 else 0.0
                     elif axis == 2:
                         other += change if p == 0 else 0.0
