@@ -258,7 +258,7 @@ def _read_kept(
         **{name: array(stored, name, shape).astype(float)
            for name, shape in zip(_KEPT_FORCES, ((count, n), of_friction), strict=True)
            if name in stored or state.get(f"held_{name}") is not None},
-        contact_state=array(stored, "contact_state", (count, n), "i")
+        contact_state=array(stored, "contact_state", (count, n), "i").astype(np.int8)
         if "contact_state" in stored else None)
 
 
@@ -276,7 +276,7 @@ def _read_recorded(stored: Any, basis: ModalBasis, count: int) -> RecordedContac
         if in_space:
             contact[_ACROSS[column]] = values[..., 1]
     return RecordedContact(
-        contact, array(stored, "contact_state", shape, "i"),
+        contact, array(stored, "contact_state", shape, "i").astype(np.int8),
         array(stored, "contact_energy", (count,)) if "contact_energy" in stored else None,
         tuple(from_json(text(stored, "limits"), list, "the limits")) if "limits" in stored.attrs
         else None,
