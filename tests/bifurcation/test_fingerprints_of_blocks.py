@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from systems import TURN, friction_oscillator, impact_oscillator
 
-from fecontact import Drive, Ground, InputError, Load, simulate
+from fecontact import ContactSystem, Drive, Ground, InputError, Load, basis_from_matrices, simulate
 from fecontact.bifurcation import VectorField, poincare_scan, vector_field
 from fecontact.bifurcation.attractors.fingerprint import fingerprint
 from fecontact.integrate import Crossing, Radau, Rodas5P
@@ -112,6 +112,17 @@ def test_the_fingerprint_sees_all_parts_of_a_system(changes):
     base = friction_oscillator()
     assert fingerprint([base]) == fingerprint([friction_oscillator()])
     assert fingerprint([base]) != fingerprint([base.with_(**changes)])
+
+
+def test_the_fingerprint_sees_the_body():
+    one, other = (contact_of(mass) for mass in (1.0, 1.0 + 1e-12))
+    assert fingerprint([one]) == fingerprint([contact_of(1.0)]) != fingerprint([other])
+
+
+def contact_of(mass):
+    """A mass on a ground; the laws, ground and loads are those of all masses."""
+    body = basis_from_matrices(mass * np.eye(2), np.eye(2), {"contact": [np.eye(2)]})
+    return ContactSystem(body, RoughSurface(10e6, 10e-6), ConstantFriction(0.4))
 
 
 def test_the_fingerprint_sees_what_a_field_does_where_it_is_asked():

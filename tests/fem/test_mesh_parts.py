@@ -64,6 +64,15 @@ def test_a_grid_becomes_a_ring(order):
     assert np.linalg.norm(ring.nodes[ring.boundary("bottom")], axis=2) == pytest.approx(inner)
 
 
+def test_middles_of_curved_edges_move_along():
+    """A triangle with a parabola of rise h over its longest side l has 2/3 h l more area."""
+    bulged = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0, 1, 2]]),
+                  curved_edges=np.array([[1, 2]]), curved_middles=np.array([[0.6, 0.6]]))
+    assert bulged.area == pytest.approx(0.5 + 2.0 / 3.0 * 0.1 * 2.0, rel=1e-12)
+    assert bulged.mapped(lambda x: x * [2.0, 1.0]).area == pytest.approx(
+        2.0 * bulged.area, rel=1e-12)
+
+
 def test_a_solid_is_bent_with_its_faces():
     bent = box().mapped(lambda x: x * [1.0, -1.0, 2.0])
     assert bent.volume == pytest.approx(2.0 * box().volume)

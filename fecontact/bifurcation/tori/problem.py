@@ -308,8 +308,7 @@ class TorusLinearisation:
 
     @cached_property
     def _friction(self) -> Friction:
-        return self.problem.friction(self.u, self._taus, self.problem.samples[1],
-                                     derivatives="derivatives" in self.__dict__)
+        return self.problem.friction(self.u, self._taus, self.problem.samples[1])
 
     @property
     def _tangents(self) -> Array:
