@@ -5,7 +5,7 @@ called anew in each caller. A part is left as intermediate code, and optimised w
 """
 
 from collections.abc import Callable
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import product
 from typing import Any
 
@@ -13,7 +13,7 @@ from llvmlite.binding import Linkage, parse_assembly
 from numba import types
 from numba.core import ir
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
+from numba.core.compiler import Compiler, Flags
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.ir_utils import build_definitions, mk_unique_var
 from numba.core.registry import CPUDispatcher
@@ -127,7 +127,36 @@ class _Borrow(FunctionPass):
         return True
 
 
-class BorrowingCompiler(Compiler):
+class _Flags(Flags):
+    """Numba's flags, which it compares at each call that it types, by reading all of them twice.
+
+    Flags of equal settings are equal without that; those that differ are compared as before.
+    """
+
+    def __hash__(self) -> int:
+        return _hash_of_flags(type(self))
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, Flags) and self._values == other._values:
+            return True
+        return bool(super().__eq__(other))
+
+
+@cache
+def _hash_of_flags(kind: type[Flags]) -> int:
+    """The hash of numba, which depends on the names of flags alone."""
+    return int(Flags.__hash__(kind()))
+
+
+class _PlainCompiler(Compiler):
+    """Numba's compiler, which spends less time on its flags."""
+
+    def __init__(self, *settings: Any) -> None:
+        super().__init__(*settings)
+        self.state.flags = _Flags(self.state.flags)
+
+
+class BorrowingCompiler(_PlainCompiler):
     """A compiler of functions that borrow what they are given."""
 
     def define_pipelines(self) -> Any:
@@ -159,7 +188,7 @@ class _OfParts:
         return super().define_pipelines()  # type: ignore[misc]
 
 
-class _PartCompiler(_OfParts, Compiler):
+class _PartCompiler(_OfParts, _PlainCompiler):
     """A compiler of parts."""
 
 

@@ -24,8 +24,8 @@ from fecontact.laws.normal.linear import PrescribedForce
 from fecontact.reduction.assembly.links import Links
 from fecontact.reduction.basis_parameters import basis_parameter, with_basis_parameters
 from fecontact.reduction.modal_basis import ModalBasis
-from fecontact.system import columns, kernels
 from fecontact.system import jacobian as contact_jacobian
+from fecontact.system import kernels
 from fecontact.system.arrays import excited, groups_of_laws, system_arrays
 from fecontact.system.elastic_sliders import exact_arrays, slider_counts
 from fecontact.system.friction_memory import bristle_history, memory_scales, velocity_scale
@@ -411,9 +411,8 @@ class ContactSystem(Summarised):
         if times.ndim != 1 or states.shape != (len(times), self.size):
             raise InputError(f"The states at {times.size} times must have shape ({times.size}, "
                              f"{self.size}), not {states.shape}.")
-        width = (columns.STATE_COLUMNS if self.basis.dimension == 2
-                 else columns.SPACE_STATE_COLUMNS)
-        out = np.empty((len(times), self.basis.contact_nodes, width))
+        out = np.empty((len(times), self.basis.contact_nodes,
+                        kernels.state_columns(self.arrays)))
         kernels.contact_history(times, states, self.arrays, out)
         return out
 

@@ -22,8 +22,9 @@ that the first ones are the same in the plane.
 
 import numpy as np
 
-from fecontact.core.compiled import helper, kernel
+from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Block, Matrix, Vector
+from fecontact.core.types import Array
 from fecontact.laws.signatures import signal_at
 from fecontact.system.columns import (
     FRICTION_ACROSS,
@@ -47,8 +48,8 @@ def state_columns(arrays: SystemArrays) -> int:
     return SPACE_STATE_COLUMNS if arrays.rows.shape[1] > 2 else STATE_COLUMNS
 
 
-@kernel
-def contact_state(t: float, y: Vector, s: SystemArrays, out: Matrix) -> None:
+@routine
+def _contact_state(t, y, s, out):
     """Fill out (n, 6): F, R, u, v, slip velocity and rate y_R' of the ground under the node.
 
     In space (n, 8): with friction force and slip velocity along the second tangent.
@@ -168,6 +169,16 @@ def right_hand_side(t: float, y: Vector, s: SystemArrays, out: Vector) -> None:
 
 @kernel(nogil=True)
 def contact_history(times: Vector, states: Matrix, s: SystemArrays, out: Block) -> None:
-    """Fill out (N, n, 6), in space (N, n, 8), with `contact_state` at N times."""
+    """Fill out (N, n, 6) with F, R, u, v, slip velocity and y_R' under the nodes at N times.
+
+    In space (N, n, 8): with friction force and slip velocity along the second tangent.
+    """
     for k in range(len(times)):
-        contact_state(times[k], states[k], s, out[k])
+        _contact_state(times[k], states[k], s, out[k])
+
+
+def contact_at(time: float, state: Array, arrays: SystemArrays) -> Array:
+    """The row of :func:`contact_history` (n, 6), in space (n, 8), of one state."""
+    out = np.empty((1, len(arrays.gap), state_columns(arrays)))
+    contact_history(np.array([float(time)]), state[None], arrays, out)
+    return out[0]

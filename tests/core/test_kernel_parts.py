@@ -10,7 +10,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from numba import types
+from numba.core.compiler import Flags
 
+from fecontact.core import kernel_parts
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law, helper, kernel, routine
 from fecontact.core.constants import constants
@@ -244,3 +246,24 @@ assert run.statistics["impacts"] > 0
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True,
                           cwd=Path(__file__).parent.parent)
     assert done.returncode == 0, done.stderr
+
+
+def test_flags_are_equal_where_numba_says_so():
+    """Settings that numba holds for equal are, those that differ are not, either way."""
+    plain, own = Flags(), kernel_parts._Flags(Flags())
+    assert own == plain
+    assert plain == own
+    assert hash(own) == hash(plain)
+    own.nrt = plain.nrt = True
+    assert own == plain
+    assert own == own.copy()
+    assert {own: 1}[plain] == 1
+    own.no_cpython_wrapper = True
+    assert own != plain
+    assert plain != own
+    assert own != kernel_parts._Flags(plain)
+    # A default that has been set is no difference.
+    plain.no_cpython_wrapper = True
+    plain.fastmath = False
+    assert own == plain
+    assert plain == own

@@ -211,6 +211,5 @@ def _slope_under_preload(
 
 def _penetration(arrays: SystemArrays, q: Array) -> Array:
     """Penetration (n,) of a system at rest."""
-    found = np.empty((len(arrays.gap), kernels.state_columns(arrays)))
-    kernels.contact_state(0.0, np.concatenate([q, np.zeros_like(q)]), arrays, found)
+    found = kernels.contact_at(0.0, np.concatenate([q, np.zeros_like(q)]), arrays)
     return found[:, columns.PENETRATION].copy()

@@ -42,9 +42,7 @@ class Balance:
         # Stiffness of the fully closed contact, and its force at zero displacement.
         far = np.full(n, max(10.0 * scale, 2.0 * self._penetration(scale)))
         values, self.face_stiffness = self.normal(far)
-        width = kernels.state_columns(arrays)
-        undisplaced = np.empty((n, width))
-        kernels.contact_state(time, self._state, arrays, undisplaced)
+        undisplaced = kernels.contact_at(time, self._state, arrays)
         self.face_force = values + self.face_stiffness * (
             undisplaced[:, columns.PENETRATION] - far)
         # Of preloaded springs, which cancel within their law.
@@ -233,8 +231,7 @@ class Balance:
         return step * (factor if exactly else min(1.0, factor))
 
     def _energy(self, q: Array, stored: Callable[[Array], Array]) -> float:
-        state = np.empty((len(self.arrays.gap), kernels.state_columns(self.arrays)))
-        kernels.contact_state(self._time, self._steady(q), self.arrays, state)
+        state = kernels.contact_at(self._time, self._steady(q), self.arrays)
         elastic = (0.5 * q @ self.arrays.stiffness @ q - self.load @ q
                    + polynomial_energy(q, self.arrays))
         return float(elastic + stored(state[:, columns.PENETRATION]))
@@ -243,8 +240,7 @@ class Balance:
         """Symmetric stiffness (m, m) at q, for ground that is level under each node."""
         arrays = self.arrays
         self._state[: len(q)] = q
-        state = np.empty((len(arrays.gap), kernels.state_columns(arrays)))
-        kernels.contact_state(self._time, self._state, arrays, state)
+        state = kernels.contact_at(self._time, self._state, arrays)
         slope = self.normal(state[:, columns.PENETRATION].copy())[1]
         normal = arrays.rows[:, 1]
         return np.asarray(arrays.stiffness + polynomial_stiffness_at(q, arrays)
