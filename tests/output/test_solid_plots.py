@@ -8,8 +8,9 @@ import fecontact as fc
 from fecontact.integrate import WearHistory
 from fecontact.laws import EnergyWear
 from fecontact.output.files.frames import contact_forces
+from fecontact.output.plots.bodies import in_picture
 from fecontact.output.plots.solids.plans import face_plans
-from fecontact.output.plots.solids.surface import seen_box, view_axes
+from fecontact.output.plots.solids.surface import view_axes
 from fecontact.plot import (
     plot_contact_map,
     plot_convergence,
@@ -170,7 +171,8 @@ def test_modes_and_stress_are_drawn_on_what_is_seen_of_the_surface(run):
     back = np.abs(view_axes()[2])
     a, b, c = SIZE
     assert area == pytest.approx(back @ [b * c, a * c, a * b])
-    assert seen_box(basis.mode_shapes.nodes)[1] == pytest.approx(corners.max(axis=(0, 1)))
+    assert in_picture(basis.mode_shapes.nodes).max(axis=0) == pytest.approx(
+        corners.max(axis=(0, 1)))
     for component in ("yz", "xz", "von_mises"):
         plot_stress(basis.fields(run.modal_coordinates[3]), component=component)
 

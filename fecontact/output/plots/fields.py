@@ -7,21 +7,18 @@ import numpy as np
 
 from fecontact.core.checks import require_kind, require_scale
 from fecontact.core.errors import require_choice
-from fecontact.core.types import Array
 from fecontact.core.units import suitable_unit
-from fecontact.fem.faces.surface import as_triangles
 from fecontact.fem.fields import BodyFields
+from fecontact.output.plots.bodies import DRAWN_DISPLACEMENT, draw_body, in_picture
 from fecontact.output.plots.drawing import name_axis
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.solids.surface import draw_surface, draw_triad, view_axes
+from fecontact.output.plots.solids.surface import draw_triad
 from fecontact.output.plots.style import stress_limit
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _STRESSES = ("xx", "yy", "zz", "xy", "yz", "xz")
-_DRAWN_DISPLACEMENT = 0.07  # largest one by default, relative to the body's extent
 # Inches: width, limits of the height, and what title and labels take of it.
 _WIDTH, _LARGEST, _LEAST, _WORDS = 9.0, 8.5, 2.5, 0.8
 
@@ -63,11 +60,9 @@ def plot_stress(
     moved = float(np.linalg.norm(fields.displacement, axis=1).max())
     if scale is None:
         extent = float(np.linalg.norm(np.ptp(fields.nodes, axis=0)))
-        scale = _DRAWN_DISPLACEMENT * extent / moved if moved else 1.0
+        scale = DRAWN_DISPLACEMENT * extent / moved if moved else 1.0
     places = fields.nodes + scale * fields.displacement
-    everything = np.vstack([fields.nodes, places])
-    if d == 3:
-        everything = everything @ view_axes()[:2].T
+    everything = in_picture(np.vstack([fields.nodes, places]))
     width, height = np.ptp(everything, axis=0)
     factor, unit = suitable_unit(float(np.abs(stress).max()), "Pa")
     peak = int(np.abs(stress).argmax())
@@ -79,17 +74,14 @@ def plot_stress(
     drawn_height = float(np.clip(0.75 * _WIDTH * height / width + _WORDS, _LEAST, _LARGEST))
     with new_figure(_WIDTH, drawn_height + 0.35 * cut, path) as figure:
         axis = figure.subplots()
-        colours: dict[str, Any] = {"cmap": "RdBu_r" if signed else "viridis"}
         margin = (0.02 if d == 2 else 0.06) * max(width, height)
         low, high = everything.min(axis=0) - margin, everything.max(axis=0) + margin
+        drawn = draw_body(axis, fields, places, stress / factor, low=-top if signed else 0.0,
+                          high=top, cmap="RdBu_r" if signed else "viridis")
         if d == 2:
-            drawn = _draw_plane(axis, fields, places, stress / factor, vmin=-top if signed else 0.0,
-                                vmax=top, **colours)
             name_axis(axis, "x", "x [m]", everything[:, 0])
             name_axis(axis, "y", "y [m]", everything[:, 1])
         else:
-            drawn = draw_surface(axis, places, fields.outline, stress / factor, rest=fields.nodes,
-                                 low=-top if signed else 0.0, high=top, **colours)
             draw_triad(axis, 0.07 * max(width, height), low + 0.5 * margin)
             axis.set_axis_off()
         axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal",
@@ -97,24 +89,7 @@ def plot_stress(
         ends: Any = ("both" if signed else "max") if cut else "neither"
         figure.colorbar(drawn, ax=axis, label=f"{name} [{unit}]", extend=ends)
         if cut:
-            at = places[peak] if d == 2 else view_axes()[:2] @ places[peak]
-            axis.plot(*at, "o", markersize=7.0, markerfacecolor="none", color="#d55e00",
-                      label=f"peak {stress[peak] / factor:.3g} {unit}")
+            axis.plot(*in_picture(places[peak]), "o", markersize=7.0, markerfacecolor="none",
+                      color="#d55e00", label=f"peak {stress[peak] / factor:.3g} {unit}")
             figure.legend(loc="outside lower right")
     return figure
-
-
-def _draw_plane(
-    axis: "Axes", fields: BodyFields, places: Array, stress: Array, **options: Any
-) -> Any:
-    """A plane body with its outline, undeformed and deformed."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.tri import Triangulation
-
-    drawn = axis.tripcolor(
-        Triangulation(places[:, 0], places[:, 1], as_triangles(fields.cells)), stress,
-        shading="gouraud", rasterized=True, **options)
-    for nodes, colour in ((fields.nodes, "#8c8c8c"), (places, "#303030")):
-        axis.add_collection(LineCollection(list(nodes[fields.outline]), colors=colour,
-                                           linewidths=0.8))
-    return drawn

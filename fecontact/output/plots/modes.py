@@ -2,16 +2,15 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, Integers
-from fecontact.fem.faces.surface import as_triangles
+from fecontact.output.plots.bodies import DRAWN_DISPLACEMENT, draw_body, in_picture
 from fecontact.output.plots.figure import new_figure
-from fecontact.output.plots.solids.surface import draw_surface, seen_box
 from fecontact.reduction.assembly.contact_faces import mode_names
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import BodyPart
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
     from fecontact.reduction.sector_modes import SectorModes
     from fecontact.system.statics.buckling import BucklingLoads
 
-
-_DRAWN_DISPLACEMENT = 0.07  # largest one, relative to the body's extent
 _WIDTH = 10.0  # inches
 
 
@@ -116,8 +113,6 @@ def plot_wheel(
     from fecontact.reduction.sector_modes import SectorModes
 
     require_kind("plot_wheel", SectorModes, found=found)
-    from fecontact.reduction.sector_modes import SectorModes
-
     require_kind("plot_wheel", (Sequence, np.ndarray), shown=shown)
     if not len(shown):
         raise InputError("plot_wheel: shown is empty; give a nodal diameter and a number of a mode "
@@ -130,27 +125,16 @@ def plot_wheel(
                           titles, path)
 
 
-class _Outlined(Protocol):
-    """Nodes, first-order cells and outline of the body whose shapes are drawn."""
-
-    @property
-    def nodes(self) -> Array: ...
-    @property
-    def cells(self) -> Integers: ...
-    @property
-    def outline(self) -> Integers: ...
-
-
 def _shapes_figure(
-    field: _Outlined, shapes: Array, titles: Sequence[str], path: str | Path | None,
+    body: Any, shapes: Array, titles: Sequence[str], path: str | Path | None,
     parts: Sequence[BodyPart] = (),
 ) -> "Figure":
     """Draw shapes (N, d, k) beside each other, each scaled to the same largest displacement."""
     shown = len(titles)
-    reach = _DRAWN_DISPLACEMENT * float(np.linalg.norm(np.ptp(field.nodes, axis=0)))
-    solid = field.nodes.shape[1] == 3
-    size = np.subtract(*seen_box(field.nodes)[::-1]) if solid else np.ptp(field.nodes, axis=0)
-    aspect = (size[0] + 2.0 * reach) / (size[1] + 2.0 * reach)
+    reach = DRAWN_DISPLACEMENT * float(np.linalg.norm(np.ptp(body.nodes, axis=0)))
+    seen = in_picture(body.nodes)
+    low, high = seen.min(axis=0) - reach, seen.max(axis=0) + reach
+    aspect = float(np.divide(*(high - low)))
     columns = min(shown, 6, int(np.ceil(np.sqrt(1.8 * shown / aspect))))
     rows = -(-shown // columns)
     height = min(_WIDTH / columns / aspect, 3.5)
@@ -160,9 +144,11 @@ def _shapes_figure(
         for axis in grid.flat:
             axis.set_axis_off()
         for title, shape, axis in zip(titles, np.moveaxis(shapes, 2, 0), grid.flat, strict=False):
-            drawn = (_draw_solid_mode(axis, field, shape, reach) if solid else
-                     _draw_mode(axis, field, shape, reach, parts))
-            axis.set_title(title)
+            amplitude = np.linalg.norm(shape, axis=1)
+            largest = float(amplitude.max()) or 1.0
+            drawn = draw_body(axis, body, body.nodes + reach / largest * shape, amplitude / largest,
+                              cmap="viridis", low=0.0, high=1.0, parts=parts)
+            axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", title=title)
         figure.colorbar(drawn, ax=grid, location="bottom", aspect=50, shrink=0.5, pad=0.02,
                         label="amplitude, relative to the largest")
     return figure
@@ -265,40 +251,3 @@ def _bodies_convergence(meshes: "Axes", modes: "Axes", result: "BodiesConvergenc
 def _distance(values: Array) -> Array:
     """Relative distance (L - 1, k) of each mesh but the last from it."""
     return np.asarray(np.abs(values[:-1] / values[-1] - 1.0))
-
-
-def _draw_solid_mode(axis: "Axes", field: _Outlined, shape: Array, reach: float) -> Any:
-    amplitude = np.linalg.norm(shape, axis=1)
-    largest = float(amplitude.max()) or 1.0
-    drawn = draw_surface(axis, field.nodes + reach / largest * shape, field.outline,
-                         amplitude / largest, rest=field.nodes, cmap="viridis", low=0.0, high=1.0)
-    low, high = seen_box(field.nodes)
-    axis.set(xlim=(low[0] - reach, high[0] + reach), ylim=(low[1] - reach, high[1] + reach),
-             aspect="equal")
-    return drawn
-
-
-def _draw_mode(
-    axis: "Axes", field: _Outlined, shape: Array, reach: float, parts: Sequence[BodyPart]
-) -> Any:
-    from matplotlib.collections import LineCollection
-    from matplotlib.tri import Triangulation
-
-    amplitude = np.linalg.norm(shape, axis=1)
-    largest = float(amplitude.max()) or 1.0
-    places = field.nodes + reach / largest * shape
-    # One body after the other, where they overlap; those that move above those that do not.
-    ranges = [(part.nodes[0], sum(part.nodes)) for part in parts] or [(0, len(places))]
-    for first, end in sorted(ranges, key=lambda one: bool(amplitude[slice(*one)].any())):
-        cells = field.cells[(first <= field.cells[:, 0]) & (field.cells[:, 0] < end)]
-        if not len(cells):
-            continue
-        drawn = axis.tripcolor(Triangulation(places[:, 0], places[:, 1], as_triangles(cells)),
-                               amplitude / largest, shading="gouraud", cmap="viridis", vmin=0.0,
-                               vmax=1.0, rasterized=True)
-    for nodes, colour in ((field.nodes, "#8c8c8c"), (places, "#303030")):
-        axis.add_collection(LineCollection(list(nodes[field.outline]), colors=colour, clip_on=False,
-                                           linewidths=0.8))
-    low, high = field.nodes.min(axis=0) - reach, field.nodes.max(axis=0) + reach
-    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    return drawn

@@ -25,12 +25,6 @@ def view_axes() -> Array:
     return np.stack([right, np.cross(back, right), back])
 
 
-def seen_box(places: Array) -> tuple[Array, Array]:
-    """Least and largest coordinates (2,) of places (..., 3) in the picture [m]."""
-    flat = places.reshape(-1, 3) @ view_axes()[:2].T
-    return flat.min(axis=0), flat.max(axis=0)
-
-
 def draw_surface(
     axes: "Axes", places: Array, facets: Integers, values: Array, *, rest: Array,
     cmap: str, low: float, high: float,
