@@ -5,7 +5,7 @@ called anew in each caller. A part is left as intermediate code, and optimised w
 """
 
 from collections.abc import Callable
-from functools import cache, cached_property
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -127,6 +127,10 @@ class _Borrow(FunctionPass):
         return True
 
 
+# Numba's hash of flags, which depends on their names alone.
+_HASH = int(Flags.__hash__(Flags()))
+
+
 class _Flags(Flags):
     """Numba's flags, which it compares at each call that it types, by reading all of them twice.
 
@@ -134,18 +138,12 @@ class _Flags(Flags):
     """
 
     def __hash__(self) -> int:
-        return _hash_of_flags(type(self))
+        return _HASH
 
     def __eq__(self, other: object) -> bool:
         if isinstance(other, Flags) and self._values == other._values:
             return True
         return bool(super().__eq__(other))
-
-
-@cache
-def _hash_of_flags(kind: type[Flags]) -> int:
-    """The hash of numba, which depends on the names of flags alone."""
-    return int(Flags.__hash__(kind()))
 
 
 class _PlainCompiler(Compiler):
