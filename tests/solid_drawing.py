@@ -8,13 +8,7 @@ from fecontact.core.units import UNITS
 from fecontact.output.plots.solids.plans import FacePlan
 from fecontact.output.report.bodies import Motions
 from fecontact.output.report.contact import contact_table
-from fecontact.output.report.drawing import (
-    DrawnBodies,
-    DrawnContact,
-    DrawnGround,
-    along_edges,
-    sharp_edges,
-)
+from fecontact.output.report.drawing import DrawnBodies, along_edges, sharp_edges
 from fecontact.output.report.page import page
 from fecontact.output.report.payload import Payload
 from fecontact.output.report.run_report import colour_maps, moving_tables
@@ -74,8 +68,16 @@ class Solid:
 
     motions: Motions
     time: np.ndarray
-    contact: DrawnContact
-    ground: DrawnGround
+    axes: np.ndarray
+    forces: np.ndarray
+    states: np.ndarray
+    places: np.ndarray
+    rows: np.ndarray
+    face: dict
+    travel: np.ndarray
+    profile: np.ndarray
+    first: float
+    spacing: float
 
 
 def squares(places, sides):
@@ -113,34 +115,43 @@ def solid(counts=(10, 6, 4), modes=20, times=201, nodes=(8, 5), waviness=0.0, en
     along = -COEFFICIENT * pressed[:, :, None] * slip / np.maximum(size_of_slip, 0.45)
     states = np.where(pressed == 0.0, 0, np.where(size_of_slip[..., 0] < 0.45, 1, 2))
     face = {"title": "contact", "label": "contact position x", "first": 0,
-            "abscissa": plan[:, 0].tolist(),
-            "plan": squares(plan, np.divide(SIZE[:2], nodes)),
+            "abscissa": plan[:, 0].tolist(), "plan": squares(plan, np.divide(SIZE[:2], nodes)),
             "sizes": np.full(len(plan), SIZE[0] * SIZE[1] / len(plan)).tolist()}
-    contact = DrawnContact([face], np.broadcast_to(np.eye(3), (len(plan), 3, 3)),
-                           np.concatenate([along, pressed[:, :, None]], axis=2), states,
-                           ("open", "stick", "slip"), below, rows)
     profile, x = np.zeros(1), np.linspace(-0.1, 0.2, 721)
-    drift = np.zeros(modes)
+    drift = np.zeros((2, modes))
     if waviness:
-        profile, drift = waviness * np.sin(2.0 * np.pi * x / 0.03), rows[:, 0].mean(axis=0)
-    ground = DrawnGround(0.0, 0.0, travel, profile, x[0], x[1] - x[0], drift)
-    return Solid(Motions(bodies, q, drift), t, contact, ground)
+        profile, drift[0] = waviness * np.sin(2.0 * np.pi * x / 0.03), rows[:, 0].mean(axis=0)
+    return Solid(Motions(bodies, q, drift), t, np.broadcast_to(np.eye(3), (len(plan), 3, 3)),
+                 np.concatenate([along, pressed[:, :, None]], axis=2), states, below, rows, face,
+                 travel, profile, x[0], x[1] - x[0])
 
 
 def solid_header(drawn, payload, scale=50.0):
     """The header of its page."""
-    force = drawn.contact.forces[:, :, 2].sum(axis=1)
+    force = drawn.forces[:, :, 2].sum(axis=1)
     chart = {"title": "total normal force", "unit": "N", "factor": 1.0,
              "lines": [{"name": "contact", "colour": "#0072b2",
                         "y": payload.add(force, 1e-4 * force.max())}]}
-    box = drawn.motions.box(scale)
+    box = drawn.motions.ranges.box(scale)
+    contact = contact_table(drawn.axes, drawn.forces, drawn.states, ("open", "stick", "slip"),
+                            payload, (drawn.places, drawn.rows))
+    plan = drawn.face["plan"]
+    contact["faces"] = [drawn.face | {"plan": {
+        "corners": payload.add(plan.corners, 1e-6), "owner": payload.add(plan.owner),
+        "edges": payload.add(plan.edges, 1e-6), "labels": plan.labels,
+        "box": plan.box.T.ravel().tolist()}}]
+    ground = {"wavy": len(drawn.profile) > 1, "level": 0.0, "gap": 0.0,
+              "profile": payload.add(drawn.profile, 1e-9), "first": drawn.first,
+              "spacing": drawn.spacing, "travel": payload.add(drawn.travel, 1e-9),
+              "drift": drawn.motions.drift.ravel().tolist(), "direction": (1.0, 0.0),
+              "centre": (0.0, 0.0), "heights": None}
     return {"format": 2, "title": "Block in space", "status": "synthetic", "good": True,
             "notes": [], "facts": [], "numbers": [], "system": [], "study": [], "versions": [],
             "units": UNITS, "spectra": [],
             "time": payload.add(drawn.time, 1e-9), "charts": [chart], "phases": [],
             "energies": [], "balance": "", "maps": colour_maps(),
-            "contact": contact_table(drawn.contact, payload),
-            **moving_tables(drawn.motions, scale, box, drawn.ground, payload)}
+            "contact": contact, "ground": ground,
+            **moving_tables(drawn.motions, scale, box, payload)}
 
 
 def write_solid(drawn, path, scale=50.0):

@@ -30,6 +30,7 @@ from fecontact.fem.incompatible_modes import mode_gradients
 from fecontact.fem.interpolation import element_kind, interpolation
 from fecontact.fem.material import Material
 from fecontact.fem.material_axes import stress_rotation
+from fecontact.fem.von_mises import von_mises_of
 
 StressAxes = Literal["global", "material"]
 
@@ -90,10 +91,7 @@ class BodyFields(Summarised):
     @property
     def von_mises(self) -> Array:
         """Von Mises stress (N,) [Pa]."""
-        xx, yy, zz, xy = self.stress.T[:4]
-        shears = xy**2 if self.stress.shape[1] == 4 else (self.stress[:, 3:] ** 2).sum(axis=1)
-        return np.asarray(np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
-                                  + 3.0 * shears))
+        return von_mises_of(self.stress.T)
 
     @property
     def cauchy_stress(self) -> Array:

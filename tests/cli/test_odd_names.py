@@ -82,9 +82,10 @@ def test_names_of_any_letters_and_length_leave_space_for_axes(name, tmp_path):
 
 
 def test_dollars_in_titles_of_pictures_are_no_mathematics():
-    from fecontact.output.render.mode_movie import _ModeStrips
+    from fecontact.output.render.overlay import Overlay
 
-    plain, odd = (_ModeStrips(640, 360, title).header(title, "") for title in ("a", r"$\frac{1}{$"))
+    scene = np.full((1, 1, 3), 255, np.uint8)
+    plain, odd = (Overlay(640, 360, title).around(scene, 0) for title in ("a", r"$\frac{1}{$"))
     assert (odd < 128).sum() > 3 * (plain < 128).sum() > 0
 
 

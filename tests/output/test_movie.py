@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from matplotlib import colormaps
 from matplotlib.image import imread
+from matplotlib.text import Text
 from scipy.interpolate import CubicSpline
 from synthetic import basis, run
 
@@ -23,11 +24,10 @@ from fecontact.laws import ConstantFriction, Frictionless, RoughSurface
 from fecontact.output.files.frames import frame_indices
 from fecontact.output.render import encoder, movie
 from fecontact.output.render import offscreen as probe
-from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.movie import frames_of
-from fecontact.output.render.overlay import Overlay
 from fecontact.output.render.plane_parts import needed_height
+from fecontact.output.render.run_overlay import RunOverlay
 from fecontact.output.render.scene import NODE_COLOURS
 from fecontact.output.render.scenes import scene_of
 from fecontact.plot import STATE_COLOURS, picture
@@ -48,6 +48,19 @@ def still(q, **options):
     q = np.asarray(q, dtype=float)
     return type(trajectory)(trajectory.system, trajectory.time, q, np.zeros_like(q),
                             trajectory.work)
+
+
+def around(furniture, frame=0):
+    """The whole picture around a white scene."""
+    return furniture.around(np.full((1, 1, 3), 255, np.uint8), frame)
+
+
+def footer(motion):
+    return around(RunOverlay(motion, 960, 540))[-68:]
+
+
+def texts(furniture):
+    return [text.get_text() for text in furniture.figure.findobj(Text)]
 
 
 def rgb(text):
@@ -94,11 +107,11 @@ def test_drawn_places_scale_the_displacements_and_stay_in_the_box():
 
 def test_ground_travels_at_its_true_speed_and_its_waves_are_scaled():
     motion = motion_of(run(times=21, waviness=4e-6, speed=0.3), given_scale=100.0)
-    np.testing.assert_allclose(motion.travel, 0.3 * motion.times)
+    np.testing.assert_allclose(motion.ground_pose[0], motion.times[:, None] * [0.3, 0.0])
     x = np.linspace(0.0, 0.2, 7)
     for frame in (0, 5, 20):
         wave = 4e-6 * np.sin(2.0 * np.pi * (x - 0.3 * motion.times[frame]) / 0.03)
-        np.testing.assert_allclose(motion.ground(frame, x), 100.0 * wave, atol=1e-15)
+        np.testing.assert_allclose(motion.ground(frame, x[:, None]), 100.0 * wave, atol=1e-15)
     gap = run(times=3)
     gap = type(gap)(gap.system.with_(gap=2e-6), gap.time, gap.modal_coordinates,
                     gap.modal_velocities, gap.work)
@@ -107,13 +120,12 @@ def test_ground_travels_at_its_true_speed_and_its_waves_are_scaled():
 
 def test_flat_bodies_leave_room_for_a_chart_of_the_forces_with_a_cursor():
     motion = motion_of(run(times=21))
-    furniture = Overlay(motion, 960, 540)
+    furniture = RunOverlay(motion, 960, 540)
     assert furniture.chart_height >= 110
     assert furniture.scene_height >= needed_height(motion) * 960
-    chart = ForceChart(motion, 960, furniture.chart_height, 10.5)
     cursors = []
     for frame in range(21):
-        image = chart.image(frame)
+        image = around(furniture, frame)[furniture.header_height : furniture.scene_top]
         assert image.shape == (furniture.chart_height, 960, 3)
         red = (image == [178, 24, 43]).all(axis=2)
         assert red.any(axis=1).mean() > 0.5  # from top to bottom of the axes
@@ -121,10 +133,10 @@ def test_flat_bodies_leave_room_for_a_chart_of_the_forces_with_a_cursor():
     assert np.diff(cursors) == pytest.approx((cursors[-1] - cursors[0]) / 20, abs=1.0)
     assert cursors[-1] - cursors[0] > 0.85 * 960
     # A tall picture of the same body has more room, one of a tall body none.
-    assert Overlay(motion, 480, 640).chart_height > 0
+    assert RunOverlay(motion, 480, 640).chart_height > 0
     tall = motion_of(still(np.zeros((3, 5))))
     object.__setattr__(tall, "bounds", np.array([[0.0, 0.0], [0.1, 0.1]]))
-    assert Overlay(tall, 960, 540).chart_height == 0
+    assert RunOverlay(tall, 960, 540).chart_height == 0
 
 
 @rendering
@@ -132,7 +144,7 @@ def test_flat_bodies_leave_room_for_a_chart_of_the_forces_with_a_cursor():
 def test_nothing_is_left_blank_between_chart_and_body(size):
     """Under a chart the scene begins with the body: less than a twelfth of the picture is blank."""
     motion = motion_of(run(basis(0.2, 0.012), times=21), frames=5)
-    furniture = Overlay(motion, *size)
+    furniture = RunOverlay(motion, *size)
     assert furniture.chart_height > 0
     with scene_of(motion, size[0], furniture.scene_height) as scene:
         blank = min(int((scene.image(frame) == 255).all(axis=(1, 2)).argmin())
@@ -154,18 +166,15 @@ def test_colours_of_stresses_end_below_a_sharp_peak():
     assert sharp.peak == pytest.approx(each.max()) == each[node]
     assert sharp.largest_colour == pytest.approx(np.percentile(each, 99.0))
     assert sharp.largest_colour < 0.5 * sharp.peak
-    said = []
-    drawn = Overlay(sharp, 960, 540)
-    object.__setattr__(drawn, "colour_scale", lambda _, *what: said.append(what))
-    assert drawn._footer.shape == (68, 960, 3)
-    (label, top, _, beyond, _), = said
+    drawn = RunOverlay(sharp, 960, 540)
+    (label,) = (text for text in texts(drawn) if text.startswith("von Mises stress ["))
     unit = {"kPa": 1e3, "MPa": 1e6}[label[label.index("[") + 1 : label.index("]")]]
-    assert top * unit == pytest.approx(sharp.largest_colour)
+    (scale,) = drawn.footer.child_axes
+    assert scale.get_xlim()[1] * unit == pytest.approx(sharp.largest_colour)
     assert label.endswith(f", peak {sharp.peak / unit:.3g}")
-    assert beyond
     # The scale ends in a point of its last colour where values lie beyond.
     last = 255.0 * np.array(colormaps["cividis"](1.0)[:3])
-    seen = [close_to(Overlay(motion, 960, 540)._footer[:, round(0.456 * 960)], last).any()
+    seen = [close_to(footer(motion)[:, round(0.456 * 960)], last).any()
             for motion in (plain, sharp)]
     assert seen == [False, True]
 
@@ -180,16 +189,15 @@ def test_without_friction_nodes_are_open_or_in_contact():
     motion = motion_of(smooth)
     assert motion.state_names == ("open", "contact")
     assert motion.states.tolist() == [[0] * 5, [1] * 5, [1] * 5]
-    footer = Overlay(motion, 960, 540)._footer
-    assert close_to(footer, rgb(STATE_COLOURS["contact"])).any()
-    assert not close_to(footer, rgb(STATE_COLOURS["stick"])).any()
+    assert close_to(footer(motion), rgb(STATE_COLOURS["contact"])).any()
+    assert not close_to(footer(motion), rgb(STATE_COLOURS["stick"])).any()
     assert motion_of(trajectory).state_names == ("open", "stick", "slip")
 
 
 def test_strips_and_scene_fill_the_picture_and_say_scale_and_time():
     for size in ((960, 540), (1280, 720), (480, 640)):
         motion = motion_of(run(times=5))
-        furniture = Overlay(motion, *size, "A title " * 30, 40.0)
+        furniture = RunOverlay(motion, *size, "A title " * 30, 40.0)
         scene = np.full((furniture.scene_height, size[0], 3), 7, dtype=np.uint8)
         image = furniture.around(scene, 3)
         assert image.shape == (size[1], size[0], 3)
@@ -198,10 +206,12 @@ def test_strips_and_scene_fill_the_picture_and_say_scale_and_time():
         assert (header[:, -size[0] // 6 :] < 128).any()
         for edge in (image[0], image[-1], image[: furniture.header_height, 0]):
             assert (edge == 255).all()  # nothing is cut off
-        assert f"deformation × {motion.scale:g}" in furniture._scales()
-        assert "slowed down 40 ×" in furniture._scales()
-        furniture._clock(3)
-        assert furniture._clock_parts[2].get_text() == "t = 15 ms"
+        place = slice(furniture.scene_top, furniture.scene_top + furniture.scene_height)
+        assert np.array_equal(image[place], scene)
+        words = " ".join(texts(furniture))
+        assert f"deformation × {motion.scale:g}" in words
+        assert "slowed down 40 ×" in words
+        assert "t = 15 ms" in texts(furniture)
 
 
 @rendering

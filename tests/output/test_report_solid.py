@@ -54,14 +54,14 @@ def test_what_is_stored_is_the_motion(drawn, path):
     shown, (motion, stress) = Shown(path), fields(drawn)
     error = np.linalg.norm(shown.displacement - motion, axis=2).max()
     assert error < 1e-4 * np.linalg.norm(motion, axis=2).max()
-    true = np.einsum("tni,nik->tnk", drawn.contact.forces, drawn.contact.axes)
+    true = np.einsum("tni,nik->tnk", drawn.forces, drawn.axes)
     assert np.linalg.norm(shown.forces - true, axis=2).max() < 1e-4 * np.linalg.norm(
         true, axis=2).max()
     largest = shown.header["bodies"]["largest"]
     assert largest["displacement"] == pytest.approx(np.linalg.norm(motion, axis=2).max(), rel=1e-6)
     assert largest["peak"] == pytest.approx(stress.max(), rel=1e-6)
     # The drift along waves is not magnified.
-    drift = drawn.motions.coordinates @ drawn.motions.drift
+    drift = drawn.motions.coordinates @ drawn.motions.drift[0]
     places = drawn.motions.bodies.nodes + SCALE * motion
     places[..., 0] += (1.0 - SCALE) * drift[:, None]
     box = np.reshape(shown.header["box"], (3, 2))
@@ -73,7 +73,7 @@ def test_what_is_stored_is_the_motion(drawn, path):
 def test_what_is_computed_and_drawn_is_the_motion(browser, drawn, path):
     motion, stress = fields(drawn)
     nodes = drawn.motions.bodies.nodes
-    drift = drawn.motions.coordinates @ drawn.motions.drift
+    drift = drawn.motions.coordinates @ drawn.motions.drift[0]
     with Opened(browser, path) as opened:
         pictures = []
         for index in (3, 77, 160):

@@ -9,6 +9,7 @@ import meshio
 import numpy as np
 import pytest
 from joined_bodies import stack, stack_run, stack_system
+from matplotlib.axes import Axes
 from matplotlib.image import imread
 from synthetic import run
 
@@ -31,9 +32,8 @@ from fecontact.output.files.frames import (
 from fecontact.output.plots.face_panels import scale_row
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.render import offscreen
-from fecontact.output.render.force_chart import ForceChart
 from fecontact.output.render.frames_data import Motion, body_labels
-from fecontact.output.render.overlay import Overlay
+from fecontact.output.render.run_overlay import RunOverlay
 from fecontact.output.render.scenes import scene_of
 from fecontact.plot import (
     picture,
@@ -139,7 +139,7 @@ def test_names_stand_inside_their_bodies():
 def test_pictures_of_two_bodies_show_arrows_in_their_directions(inclined, tmp_path):
     motion = motion_of(inclined)
     with scene_of(motion, 480, 270) as scene:
-        corners = scene.parts[-1].arrow_corners(motion.contact_places(3), motion.forces[3])
+        corners = scene.parts[-1].force_corners(motion.contact_places(3), motion.forces[3])
     tails, tips = corners.reshape(-1, 7, 2)[:, [0, 3]].mean(axis=1), corners.reshape(-1, 7, 2)[:, 5]
     drawn, forces = tips - tails, motion.forces[3]
     drawn /= np.linalg.norm(drawn, axis=1)[:, None]
@@ -159,7 +159,7 @@ def test_names_are_written_into_the_scene(trajectory):
         named = scene.image(4).astype(int)
         places = motion.body(4)[0][[node for _, node in motion.labels]]
         pixels = [scene.camera.pixel(place, named.shape) for place in places]
-        scene.parts[0]._names = []
+        scene.parts[0].labels = []
         plain = scene.image(4)
     changed = np.argwhere((named != plain).any(axis=2))
     near = np.min([np.abs(changed - pixel).max(axis=1) for pixel in pixels], axis=0)
@@ -187,9 +187,10 @@ def test_the_chart_sums_the_forces_of_each_interface(trajectory):
     np.testing.assert_allclose(lines["foot: friction"],
                                -trajectory.friction_force[:, 8:].sum(axis=1))
     motion = motion_of(trajectory)
-    overlay = Overlay(motion, 640, 900)
-    assert ForceChart(motion, 640, 200, 8.0).image(3).shape == (200, 640, 3)
+    overlay = RunOverlay(motion, 640, 900)
     assert overlay.chart_height > 0
+    (chart,) = (one for one in overlay.figure.findobj(Axes) if one.get_legend())
+    assert [line.get_text() for line in chart.get_legend().get_texts()] == list(lines)
 
 
 def test_contact_maps_have_a_row_an_interface(trajectory, inclined):

@@ -4,6 +4,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 from solid_blocks import quadratic_grid
@@ -14,11 +15,10 @@ from fecontact.laws import ConstantFriction, EnergyWear, HeightMap, Sine
 from fecontact.output.files.frames import contact_forces, frame_indices
 from fecontact.output.plots.solids.plans import face_plans
 from fecontact.output.render import offscreen
-from fecontact.output.render.force_chart import ForceChart
+from fecontact.output.render.frames_data import Motion
+from fecontact.output.render.run_overlay import RunOverlay
 from fecontact.output.render.scene import NODE_COLOURS, Camera
 from fecontact.output.render.scenes import scene_of
-from fecontact.output.render.solid_motion import SolidMotion, motion_words
-from fecontact.output.render.solid_overlay import SolidOverlay
 from fecontact.output.render.surfaces import shaded_surface, sharp_edges
 from fecontact.plot import picture, render_mode
 
@@ -27,7 +27,7 @@ rendering = pytest.mark.skipif(offscreen.rendering_problem() is not None,
 
 
 def motion_of(run, frames=9, **options):
-    return SolidMotion(run, frame_indices(run.time, frames), **options)
+    return Motion(run, frame_indices(run.time, frames), **options)
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +61,7 @@ def test_ground_travels_turns_and_waves():
     travel, turn, _ = belt.ground_pose
     assert travel == pytest.approx(10.0 * belt.times[:, None] * [0.3, -0.1])
     assert not turn.any()
-    assert motion_words(belt) == ["ground 316 mm/s at -18° from x"]
+    assert belt.moving == "ground 316 mm/s at -18° from x"
     # A belt that turns and travels: marks move with the velocity of the ground at their place.
     ground = fc.Ground(speed=0.2, speed_y=0.1, rotation_speed=4.0, centre=(0.05, 0.02))
     both = motion_of(moved(system(solid(), ground=ground)), given_scale=1.0)
@@ -77,11 +77,11 @@ def test_ground_travels_turns_and_waves():
                       given_scale=50.0)
     x, y = np.array([0.03, 0.17]), np.array([0.05, 0.01])
     expected = 50.0 * grid.shape(x - 3.0 * rough.times[4], y)[..., 0]
-    assert rough.ground_heights(4, np.column_stack([x, y])) == pytest.approx(expected)
+    assert rough.ground(4, np.column_stack([x, y])) == pytest.approx(expected)
     waves = motion_of(moved(system(solid(), ground=fc.Ground(
         speed_y=2.0, profile=Sine(1e-5, 0.03), wave_direction=(3.0, 4.0)))), given_scale=50.0)
     along = 0.6 * x + 0.8 * (y - 2.0 * waves.times[5])
-    assert waves.ground_heights(5, np.column_stack([x, y])) == pytest.approx(
+    assert waves.ground(5, np.column_stack([x, y])) == pytest.approx(
         5e-4 * np.sin(2.0 * np.pi * along / 0.03))
 
 
@@ -152,31 +152,33 @@ def test_patches_are_painted_with_their_pressures(run):
 
 def test_maps_show_pressure_state_wear_and_friction(run):
     motion = motion_of(run, wear=EnergyWear(1e-9))
-    overlay = SolidOverlay(motion, 960, 540)
-    maps = overlay._maps
+    overlay = RunOverlay(motion, 960, 540)
+
+    def maps(frame):
+        picture = overlay.around(np.full((1, 1, 3), 255, np.uint8), frame)
+        return picture[overlay.scene_top :][: overlay.scene_height - overlay.chart_height,
+                                            overlay.scene_width :]
+
     pressed = int(run.normal_force.sum(axis=1).argmax())
-    shown = maps.image(pressed)
-    assert shown.shape == (maps.height, maps.width, 3)
-    for name, state in (("open", 0), ("slip", 2)):
-        amount = close_to(shown, to_rgb(NODE_COLOURS[name])).sum()
-        # A quarter of the map for each of the four patches.
-        count = int((run.contact_state[pressed] == state).sum())
-        if name == "slip":
-            quarter = close_to(maps.image(pressed), to_rgb(NODE_COLOURS["slip"])).sum() / max(
-                count, 1)
-            assert amount == pytest.approx(count * quarter)
-            assert amount > 500 * count
-    first = maps.image(0)
-    assert not np.array_equal(first, shown)
-    assert np.array_equal(maps.image(pressed), shown)
-    titles = [one.title for one in maps._maps]
-    assert titles[:2] == ["pressure and friction", "state"]
+    shown = maps(pressed)
+    # Each of the four patches that slips has a quarter of the map.
+    counts = (run.contact_state == 2).sum(axis=1)
+    amounts = np.array([close_to(maps(frame), to_rgb(NODE_COLOURS["slip"])).sum()
+                        for frame in range(len(counts))])
+    assert len(set(counts)) > 1
+    assert amounts.max() > 500 * counts.max()
+    assert amounts == pytest.approx(counts / counts.max() * amounts.max(), rel=0.05)
+    assert not np.array_equal(maps(0), shown)
+    assert np.array_equal(maps(pressed), shown)
+    titles = map_titles(overlay)
+    assert titles[:2] == ["pressure and friction   → x  ↑ y", "state"]
     assert titles[2].startswith("worn, up to ")
     depth = run.wear_depth(EnergyWear(1e-9))
     assert motion.worn == pytest.approx(depth)
-    # The sum of friction, as the chart shows it.
-    chart = ForceChart(motion, 400, 120, 10.5)
-    assert chart.image(3).shape == (120, 400, 3)
+
+
+def map_titles(overlay):
+    return [title for one in overlay.figure.findobj(Axes) if (title := one.get_title())]
 
 
 def test_plans_of_faces_keep_areas_and_unroll_bushes(run):
@@ -223,4 +225,4 @@ def test_choices_for_solids_are_refused_elsewhere(run, tmp_path):
     with pytest.raises(fc.InputError, match="view = 'behind'"):
         picture(run, tmp_path / "solid.png", view="behind")
     still = moved(system(solid(), friction=ConstantFriction(0.0)))
-    assert SolidOverlay(motion_of(still), 480, 270)._maps._maps[0].title == "pressure"
+    assert map_titles(RunOverlay(motion_of(still), 480, 270))[0].startswith("pressure   →")

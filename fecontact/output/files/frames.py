@@ -11,6 +11,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.magnitude import magnitude
 from fecontact.core.types import Array
 from fecontact.fem.elements.cell_kinds import widths
+from fecontact.fem.von_mises import von_mises_of
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.contact_facets import contact_facets
 from fecontact.reduction.assembly.contact_faces import contact_directions
@@ -119,12 +120,9 @@ def von_mises(field: ModeShapes, q: Array) -> Array:
     unit = magnitude(factors)
     values = (factors / unit) @ components.T
     size = magnitude(values)
-    xx, yy, zz, *shears = np.moveaxis((values / size).reshape(len(q), count, nodes), 1, 0)
-    square = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
-    for shear in shears:
-        square = square + 3.0 * shear**2
+    parts = np.moveaxis((values / size).reshape(len(q), count, nodes), 1, 0)
     with np.errstate(over="ignore"):
-        return np.asarray(np.sqrt(square) * size * unit)
+        return von_mises_of(parts) * size * unit
 
 
 def cell_stress(field: ModeShapes, q: Array) -> Array:

@@ -1,6 +1,6 @@
 """Movies of modes, real and complex: the body over whole periods of free vibration."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from fecontact.core.checks import require_kind, require_scale
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ComplexArray
-from fecontact.output.render.canvas import canvas_of
 from fecontact.output.render.frames_data import body_labels
-from fecontact.output.render.movie import MOVING, Image, Progress, target, write_images
+from fecontact.output.render.movie import MOVING, Progress, images_of, target, write_images
 from fecontact.output.render.offscreen import require_rendering
-from fecontact.output.render.overlay import Strips, pixels
+from fecontact.output.render.overlay import Overlay
 from fecontact.output.render.scene import COLOUR_MAPS
-from fecontact.output.render.scenes import scene_of
 from fecontact.reduction.assembly.contact_faces import mode_names
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.mode_shapes import ModeShapes
@@ -86,27 +84,6 @@ class ModeMotion:
         """Drawn positions (N, d) [m] and displacements (N,) relative to the largest."""
         moved = self._moved(float(self.phases[frame])) / self._largest[0]
         return self.mode_shapes.nodes + self._reach * moved, np.linalg.norm(moved, axis=1)
-
-
-@dataclass(frozen=True, eq=False)
-class _ModeStrips(Strips):
-    """Title above the scene, colours and phase below."""
-
-    width: int
-    height: int
-    title: str
-
-    @cached_property
-    def _above(self) -> Image:
-        return self.header(self.title, "")
-
-    def around(self, scene: Image, phase: float) -> Image:
-        """The whole picture from that of the scene."""
-        figure, canvas = canvas_of(self.width, self.footer_height)
-        self.colour_scale(figure, "displacement, relative to the largest", 1.0,
-                          COLOUR_MAPS["displacement"])
-        self._text(figure, 0.97, 0.5, f"phase {np.degrees(phase) % 360.0:3.0f}°", ha="right")
-        return np.concatenate([self._above, scene, pixels(canvas)])
 
 
 def render_mode(
@@ -186,15 +163,19 @@ def write_motion(
     motion = replace(motion, phases=2.0 * np.pi * np.arange(count) / frames,
                      extent=_VISIBLE * scale)
     require_rendering(size, MOVING)
-    return write_images(_images(motion, size, title), count, path, fps, size, progress)
+    images = images_of(motion, _mode_overlay(motion, size, title), range(count))
+    return write_images(images, count, path, fps, size, progress)
 
 
-def _images(motion: ModeMotion, size: tuple[int, int], title: str) -> Iterator[Image]:
-    strips = _ModeStrips(*size, title)
-    height = size[1] - strips.header_height - strips.footer_height
-    with scene_of(motion, size[0], height, line=1.2 * strips.size, fineness=MOVING) as scene:
-        for frame, phase in enumerate(motion.phases.tolist()):
-            yield strips.around(scene.image(frame), phase)
+def _mode_overlay(motion: ModeMotion, size: tuple[int, int], title: str) -> Overlay:
+    """Title above the scene, colours and phase below."""
+    overlay = Overlay(*size, title)
+    overlay.colour_scale("displacement, relative to the largest", 1.0,
+                         COLOUR_MAPS["displacement"])
+    words = overlay.text(overlay.footer, 0.97, 0.5, "", ha="right")
+    degrees = np.degrees(motion.phases) % 360.0
+    overlay.changing(lambda frame: words.set_text(f"phase {degrees[frame]:3.0f}°"), words)
+    return overlay
 
 
 def _field(basis: ModalBasis) -> ModeShapes:

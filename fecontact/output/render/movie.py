@@ -19,14 +19,13 @@ from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.wear import WearLaw
 from fecontact.output.files.frames import frame_indices, require_drawable, require_field
 from fecontact.output.render.encoder import encoder
-from fecontact.output.render.frames_data import Colour, Motion
+from fecontact.output.render.frames_data import Colour, Motion, View
 from fecontact.output.render.offscreen import require_rendering
-from fecontact.output.render.overlay import Overlay
+from fecontact.output.render.overlay import Image, Overlay
+from fecontact.output.render.run_overlay import RunOverlay
+from fecontact.output.render.scene import Shown
 from fecontact.output.render.scenes import scene_of
-from fecontact.output.render.solid_motion import SolidMotion, View
-from fecontact.output.render.solid_overlay import SolidOverlay
 
-Image = NDArray[np.uint8]
 Progress = Callable[[int, int], None]
 
 _SMALLEST = (320, 180)
@@ -104,12 +103,13 @@ def render(
         indices = frame_indices(trajectory.time, frames, t_start, t_end)
     if not len(indices):
         raise InputError("frames = 0 makes no movie; give at least 1.")
-    motion = _motion(trajectory, indices, colour, scale, view, wear)
+    require_drawable(trajectory, indices)
+    motion = Motion(trajectory, indices, colour, scale, view, wear)
     lasting = float(motion.times[-1] - motion.times[0])
     slowness = (len(indices) - 1) / fps / lasting if movie and lasting > 0.0 else None
     require_rendering(size, MOVING)
-    return write_images(_images(motion, size, title, slowness), len(indices), path, fps, size,
-                        progress)
+    images = images_of(motion, RunOverlay(motion, *size, title, slowness), range(len(indices)))
+    return write_images(images, len(indices), path, fps, size, progress)
 
 
 def frames_of(
@@ -211,39 +211,25 @@ def picture(
     at = len(trajectory.time) - 1 if time is None else int(np.argmin(np.abs(trajectory.time
                                                                             - time)))
     chosen = frame_indices(trajectory.time, _STILL_FRAMES)
-    motion = _motion(trajectory, np.union1d(chosen, [at]), colour, scale, view, wear)
+    chosen = np.union1d(chosen, [at])
+    require_drawable(trajectory, chosen)
+    motion = Motion(trajectory, chosen, colour, scale, view, wear)
     require_rendering(size, _STILL)
-    frame = int(np.searchsorted(motion.indices, at))
-    (image,) = _images(motion, size, title, None, only=frame)
+    frame = int(np.searchsorted(chosen, at))
+    (image,) = images_of(motion, RunOverlay(motion, *size, title), [frame], _STILL)
     with replaced(path) as part:
         _save(part, image)
     return path
 
 
-def _motion(
-    trajectory: Trajectory, indices: NDArray[np.intp], colour: Colour, scale: float | None,
-    view: View, wear: WearLaw | None,
-) -> Motion:
-    require_drawable(trajectory, indices)
-    if trajectory.basis.dimension == 3:
-        return SolidMotion(trajectory, indices, colour, scale, view, wear)
-    for name, given, usual in (("view", view, "above"), ("wear", wear, None)):
-        if given != usual:
-            raise InputError(f"{name} = {given!r} is for solids, but this run has plane bodies; "
-                             f"leave it out.")
-    return Motion(trajectory, indices, colour, scale)
-
-
-def _images(motion: Motion, size: tuple[int, int], title: str | None, slowness: float | None,
-            only: int | None = None) -> Iterator[Image]:
-    """Pictures (height, width, 3) of all frames of a motion, or of one."""
-    fineness = MOVING if only is None else _STILL
-    kind = SolidOverlay if isinstance(motion, SolidMotion) else Overlay
-    furniture = kind(motion, *size, title, slowness)
-    with scene_of(motion, furniture.scene_width, furniture.scene_height,
-                  line=1.2 * furniture.size, fineness=fineness) as scene:
-        for frame in range(len(motion.indices)) if only is None else (only,):
-            yield furniture.around(scene.image(frame), frame)
+def images_of(
+    motion: Shown, overlay: Overlay, frames: Iterable[int], fineness: int = MOVING
+) -> Iterator[Image]:
+    """Pictures (height, width, 3) of some frames of a motion."""
+    with scene_of(motion, overlay.scene_width, overlay.scene_height,
+                  line=1.2 * overlay.size, fineness=fineness) as scene:
+        for frame in frames:
+            yield overlay.around(scene.image(frame), frame)
 
 
 @contextmanager

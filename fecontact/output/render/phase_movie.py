@@ -12,8 +12,9 @@ from fecontact.core.types import Array, ArrayLike
 from fecontact.output.diagrams.colours import distinct_colours
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.phase_space import Curve, Motion, phase_axis, phase_curves
-from fecontact.output.render.movie import Image, Progress, target, write_images
-from fecontact.output.render.overlay import pixels
+from fecontact.output.render.movie import Progress, target, write_images
+from fecontact.output.render.overlay import Image
+from fecontact.output.render.pixels import pixels
 
 _DPI = 100
 _PATH = "#d0ccc4"  # of the whole motion

@@ -1,25 +1,26 @@
 """Parts of a scene of plane bodies: the bodies, the ground, contact nodes with their forces."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.types import Array
 from fecontact.fem.faces.surface import as_triangles
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.pixels import DARK
 from fecontact.output.render.scene import (
-    COLOUR_MAPS,
     FORCE_COLOUR,
     MARGIN,
-    NODE_COLOURS,
+    Arrows,
+    Bodies,
     Camera,
+    Part,
     Scene,
     Shown,
+    arrow_corners,
     move,
     paint,
+    state_shades,
 )
 from fecontact.reduction.assembly.contact_faces import contact_faces
 
@@ -82,35 +83,24 @@ def _unit(scene: Scene) -> float:
     return scene.camera.height * float(np.clip(1.0, 0.25 * scene.aspect, 0.5 * scene.aspect))
 
 
-class PlaneBodies:
+class PlaneBodies(Bodies):
     """The bodies in their colours, their outlines, and these at rest."""
 
     def __init__(self, scene: Scene, motion: Shown) -> None:
-        self._motion, field = motion, motion.mode_shapes
-        self._body = scene.mesh(
-            _lifted(scene, "body", field.nodes), faces=as_triangles(field.cells),
-            scalars="colour",
-            point_data={"colour": np.zeros(len(field.nodes))}, cmap=COLOUR_MAPS[motion.colour],
-            clim=(0.0, motion.largest_colour or 1.0), interpolate_before_map=True, n_colors=256)
-        self._edges, _ = (
+        super().__init__(scene, motion)
+        field = motion.mode_shapes
+        self.surfaces.append((scene.mesh(
+            _lifted(scene, "body", field.nodes), faces=as_triangles(field.cells), scalars="colour",
+            point_data={"colour": np.zeros(len(field.nodes))}, **self.colours),
+            np.arange(len(field.nodes))))
+        outline, _ = (
             scene.mesh(_lifted(scene, layer, field.nodes), lines=field.outline, color=colour,
                        line_width=scene.line)
             for layer, colour in (("outline", DARK), ("reference", _OUTLINE)))
-        self._names = [(scene.name(name), node) for name, node in motion.labels]
-
-    def draw(self, frame: int) -> None:
-        """Bring everything to where it is at a frame."""
-        places, colours = self._motion.body(frame)
-        for mesh in (self._body, self._edges):
-            move(mesh, places)
-        paint(self._body.point_data, colours)
-
-    def names(self) -> Sequence[tuple[NDArray[np.float64], Array]]:
-        """Names and places of several bodies in the frame drawn last."""
-        return [(name, self._body.points[node, :2]) for name, node in self._names]
+        self.lines.append(outline)
 
 
-class PlaneGround:
+class PlaneGround(Part):
     """The ground in section, with marks that move with it."""
 
     def __init__(self, scene: Scene, motion: Motion) -> None:
@@ -140,7 +130,8 @@ class PlaneGround:
     def _place_marks(self, unit: float) -> None:
         """Slanted marks that move with the ground, spaced so that the eye can follow them."""
         view = self._x[1] - self._x[0]
-        step = np.abs(np.diff(self._motion.travel)).max(initial=0.0)
+        self._travel = self._motion.ground_pose[0][:, 0]
+        step = np.abs(np.diff(self._travel)).max(initial=0.0)
         spacing = view / np.clip(view / max(4.0 * step, 1e-300), 4, 36)
         count = 4 * int(np.ceil((np.ceil(view / spacing) + 4) / 4))
         self._spacing, self._period = spacing, count * spacing
@@ -151,22 +142,18 @@ class PlaneGround:
     def draw(self, frame: int) -> None:
         """Bring everything to where it is at a frame."""
         if self._motion.trajectory.system.ground.wavy:
-            top = self._motion.ground(frame, self._along)
+            top = self._motion.ground(frame, self._along[:, None])
             for mesh in (self._ground, self._surface):
                 mesh.points[: len(top), 1] = top
                 mesh.GetPoints().Modified()
-        shifted = np.mod(self._marks + self._motion.travel[frame], self._period)
+        shifted = np.mod(self._marks + self._travel[frame], self._period)
         x = self._x[0] - 2.0 * self._spacing + shifted
-        start = np.column_stack([x, self._motion.ground(frame, x)])
+        start = np.column_stack([x, self._motion.ground(frame, x[:, None])])
         end = start - self._mark_size[:, None] * np.array([0.7, 1.0])
         move(self._lines, np.stack([start, end], axis=1).reshape(-1, 2))
 
-    def names(self) -> Sequence[tuple[NDArray[np.float64], Array]]:
-        """None."""
-        return ()
 
-
-class ContactMarks:
+class ContactMarks(Part):
     """Contact nodes in the colours of their states, and their forces as arrows."""
 
     def __init__(self, scene: Scene, motion: Motion) -> None:
@@ -189,12 +176,8 @@ class ContactMarks:
             _lifted(scene, "node", places), faces=rings, scalars="colour", rgb=True,
             cell_data={"colour": np.zeros((n, 3), dtype=np.uint8)})
         self._rim = line * pixel
-        corners, first = _lifted(scene, "force", np.zeros((7 * n, 2))), np.arange(n)[:, None] * 7
-        self._arrows = [scene.mesh(corners, faces=first + cells, color=FORCE_COLOUR)
-                        for cells in (np.arange(4), np.arange(4, 7))]
-        colours = [NODE_COLOURS[name] for name in motion.state_names]
-        self._colours = np.array([[int(text[k : k + 2], 16) for k in (1, 3, 5)]
-                                  for text in colours], dtype=np.uint8)
+        self._arrows = Arrows(scene, _lifted(scene, "force", np.zeros((7 * n, 2))), FORCE_COLOUR)
+        self._colours = state_shades(motion.state_names)
 
     def draw(self, frame: int) -> None:
         """Bring everything to where it is at a frame."""
@@ -203,24 +186,13 @@ class ContactMarks:
             move(mesh, (centres[:, None] + radius[:, None] * self._circle).reshape(-1, 2))
         paint(self._nodes.cell_data, self._colours[self._motion.states[frame]])
         if self._motion.largest_force > 0.0:
-            corners = self.arrow_corners(centres, self._motion.forces[frame])
-            for mesh in self._arrows:
-                move(mesh, corners)
+            self._arrows.move(self.force_corners(centres, self._motion.forces[frame]))
 
-    def names(self) -> Sequence[tuple[NDArray[np.float64], Array]]:
-        """None."""
-        return ()
-
-    def arrow_corners(self, tips: Array, forces: Array) -> Array:
-        """Corners (7 k, 2) of arrows that end at k places: four of the shaft, then the head."""
+    def force_corners(self, nodes: Array, forces: Array) -> Array:
+        """Corners (7 k, 2) of the arrows of forces (k, 2) that end at nodes (k, 2)."""
         size = np.linalg.norm(forces, axis=1, keepdims=True)
         along = np.divide(forces, size, out=np.zeros_like(forces), where=size > 0.0)
-        across = np.column_stack([-along[:, 1], along[:, 0]])
         length = _ARROW * self._unit * size / self._motion.largest_force
         thick = self._slim * np.minimum(1.0, length / (0.05 * self._unit)) * self._unit
-        head = np.minimum(0.035 * thick, 0.6 * length)
-        tips = tips - self._radius * along
-        tail, neck = tips - length * along, tips - head * along
-        shaft, wing = 0.0045 * thick * across, 0.014 * thick * across
-        return np.stack([tail - shaft, neck - shaft, neck + shaft, tail + shaft,
-                         neck - wing, tips, neck + wing], axis=1).reshape(-1, 2)
+        return arrow_corners(nodes - self._radius * along, along, length,
+                             np.minimum(0.035 * thick, 0.6 * length), 0.0045 * thick, 0.014 * thick)

@@ -24,6 +24,14 @@ MARGIN = 0.05  # of the picture, around what is drawn
 _LABEL_SIZE = 13.0  # height of names, in thin lines
 
 
+def state_shades(names: Sequence[str]) -> NDArray[np.uint8]:
+    """Colours (k, 3) of contact states, from 0 to 255."""
+    from matplotlib.colors import to_rgba_array
+
+    return np.rint(255.0 * to_rgba_array([NODE_COLOURS[name] for name in names])[:, :3]).astype(
+        np.uint8)
+
+
 class Shown(Protocol):
     """Bodies that move: what every scene draws, of a run or of a mode."""
 
@@ -114,7 +122,7 @@ class Camera:
                           + (self.depth + 0.5 * self.height) * self.back)
 
 
-class Part(Protocol):
+class Part:
     """Part of a scene."""
 
     def draw(self, frame: int) -> None:
@@ -122,6 +130,7 @@ class Part(Protocol):
 
     def names(self) -> Sequence[tuple[NDArray[np.float64], Array]]:
         """Names, as pictures, and the places of their centres in the frame drawn last."""
+        return ()
 
 
 class Scene:
@@ -186,9 +195,9 @@ class Scene:
                 blend(image, label, *self.camera.pixel(place, image.shape))
         return image
 
-    def name(self, text: str) -> NDArray[np.float64]:
-        """A name as a picture."""
-        return label_image(text, self._name_size)
+    def name(self, text: str, size: float = 1.0) -> NDArray[np.float64]:
+        """A name as a picture; ``size`` is relative to that of names of bodies."""
+        return label_image(text, size * self._name_size)
 
     def mesh(
         self, places: Array, *, faces: Integers | None = None, lines: Integers | None = None,
@@ -241,3 +250,60 @@ def shade(mesh: Any, normals: Array) -> None:
     """Set the normals of the points of a mesh."""
     mesh.point_data["Normals"][:] = normals
     mesh.GetPointData().GetNormals().Modified()
+
+
+class Bodies(Part):
+    """Bodies in their colours, whose surfaces and lines move with their mesh nodes."""
+
+    def __init__(self, scene: Scene, motion: Shown) -> None:
+        self.motion, self.places = motion, motion.mode_shapes.nodes
+        # Meshes with the mesh nodes of their points; the last one has the colours of the bodies.
+        self.surfaces: list[tuple[Any, Integers]] = []
+        self.lines: list[Any] = []
+        self.labels = [(scene.name(name), node) for name, node in motion.labels]
+        self.colours: Any = {"cmap": COLOUR_MAPS[motion.colour], "n_colors": 256,
+                             "clim": (0.0, motion.largest_colour or 1.0),
+                             "interpolate_before_map": True}
+
+    def draw(self, frame: int) -> None:
+        """Bring everything to where it is at a frame."""
+        self.places, colours = self.motion.body(frame)
+        mesh, nodes = self.surfaces[-1]
+        paint(mesh.point_data, colours[nodes])
+        for mesh, nodes in self.surfaces:
+            move(mesh, self.places[nodes])
+        for mesh in self.lines:
+            move(mesh, self.places)
+
+    def names(self) -> Sequence[tuple[NDArray[np.float64], Array]]:
+        """Names and places of several bodies in the frame drawn last."""
+        return [(name, self.places[node]) for name, node in self.labels]
+
+
+class Arrows:
+    """Flat arrows of one colour, each a shaft and a head."""
+
+    def __init__(self, scene: Scene, places: Array, colour: str) -> None:
+        """``places`` (7 k, 3) are those of the corners to begin with."""
+        first = 7 * np.arange(len(places) // 7)[:, None]
+        self._meshes = [scene.mesh(places, faces=first + cells, color=colour)
+                        for cells in (np.arange(4), np.arange(4, 7))]
+
+    def move(self, corners: Array) -> None:
+        """Put the corners to places (7 k, 2 or 3)."""
+        for mesh in self._meshes:
+            move(mesh, corners)
+
+
+def arrow_corners(
+    tips: Array, along: Array, length: Array, head: Array, shaft: Array, wing: Array
+) -> Array:
+    """Corners (7 k, 2) of arrows that end at tips (k, 2), with directions ``along`` (k, 2).
+
+    Lengths (k, 1) of arrows and heads; half widths (k, 1) of shafts and heads.
+    """
+    across = np.column_stack([-along[:, 1], along[:, 0]])
+    tail, neck = tips - length * along, tips - head * along
+    shaft, wing = shaft * across, wing * across
+    return np.stack([tail - shaft, neck - shaft, neck + shaft, tail + shaft,
+                     neck - wing, tips, neck + wing], axis=1).reshape(-1, 2)

@@ -10,8 +10,7 @@ from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.plane_parts import ContactMarks, PlaneBodies, PlaneGround, plane_camera
 from fecontact.output.render.scene import Part, Scene, Shown
 from fecontact.output.render.solid_ground import SolidGround, ground_corners
-from fecontact.output.render.solid_motion import SolidMotion
-from fecontact.output.render.solid_parts import SolidBodies, Triad, solid_camera
+from fecontact.output.render.solid_parts import Corners, SolidBodies, solid_camera
 
 
 def scene_of(motion: Shown, width: int, height: int, **how: Any) -> Scene:
@@ -30,8 +29,8 @@ def scene_of(motion: Shown, width: int, height: int, **how: Any) -> Scene:
             parts.append(partial(ContactMarks, motion=motion))
         return Scene(camera, parts, width, height, **how)
     ground = np.zeros((0, 3))
-    if isinstance(motion, SolidMotion) and motion.has_ground:
+    if isinstance(motion, Motion) and motion.has_ground:
         ground = ground_corners(motion)
         parts.append(partial(SolidGround, motion=motion))
-    parts += [partial(SolidBodies, motion=motion), partial(Triad, motion=motion)]
+    parts += [partial(SolidBodies, motion=motion), partial(Corners, motion=motion)]
     return Scene(solid_camera(motion, ground, aspect), parts, width, height, **how)

@@ -1,14 +1,12 @@
 """The ground below solids: a slab with lines that move with it, waves, and arrows of its motion."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.types import Array
-from fecontact.output.render.scene import Scene, move, shade
-from fecontact.output.render.solid_motion import SolidMotion
+from fecontact.output.render.frames_data import Motion
+from fecontact.output.render.scene import Arrows, Part, Scene, arrow_corners, move, shade
 from fecontact.output.render.surfaces import ShadedSurface
 
 _BESIDE = 0.16  # ground drawn on either side of the bodies, of their extent
@@ -20,24 +18,24 @@ _FEWEST, _MOST = 4, 12  # lines over the longer side
 _SLOW = 1e-3  # of the largest speed, below which no arrow is drawn
 
 
-def _extents(motion: SolidMotion) -> tuple[float, Array, Array]:
+def _extents(motion: Motion) -> tuple[float, Array, Array]:
     """Size of the bodies, and lower and upper corner (2,) of the ground that is drawn [m]."""
     low, high = motion.bounds[:, :2]
     extent = float((high - low).max())
     return extent, low - _BESIDE * extent, high + _BESIDE * extent
 
 
-def ground_corners(motion: SolidMotion) -> Array:
+def ground_corners(motion: Motion) -> Array:
     """Corners (4, 3) of the part that is drawn [m]."""
     _, low, high = _extents(motion)
     x, y = np.meshgrid(*np.stack([low, high], axis=1))
     return np.column_stack([x.ravel(), y.ravel(), np.full(4, motion.ground_level)])
 
 
-class SolidGround:
+class SolidGround(Part):
     """The ground of a run of solids."""
 
-    def __init__(self, scene: Scene, motion: SolidMotion) -> None:
+    def __init__(self, scene: Scene, motion: Motion) -> None:
         self._scene, self._motion = scene, motion
         self._extent, self._low, self._high = _extents(motion)
         self._wavy = motion.trajectory.system.ground.wavy
@@ -46,14 +44,10 @@ class SolidGround:
         self._add_lines()
         self._add_arrows()
 
-    def names(self) -> Sequence[tuple[NDArray[np.float64], Array]]:
-        """None."""
-        return ()
-
     def draw(self, frame: int) -> None:
         """Bring everything to where it is at a frame."""
         if self._wavy:
-            heights = self._motion.ground_heights(frame, self._flat)
+            heights = self._motion.ground(frame, self._flat)
             self._top.points[:, 2] = heights
             self._top.GetPoints().Modified()
             shade(self._top, self._shaded.normals(np.column_stack([self._flat, heights])))
@@ -124,7 +118,7 @@ class SolidGround:
         ends = np.concatenate(found)
         part = np.linspace(0.0, 1.0, self._parts)[:, None]
         flat = ends[:, :1] * (1.0 - part) + ends[:, 1:] * part
-        heights = self._motion.ground_heights(frame, flat) + self._lift
+        heights = self._motion.ground(frame, flat) + self._lift
         move(self._lines, np.concatenate([flat, heights[..., None]], axis=-1).reshape(-1, 3))
 
     def _clipped(self, start: Array, along: Array) -> Array:
@@ -152,27 +146,19 @@ class SolidGround:
         speeds = [np.linalg.norm(self._motion.ground_velocity(frame, self._arrow_places), axis=1)
                   for frame in range(len(self._motion.times))]
         self._fastest = float(np.max(speeds))
-        first = 7 * np.arange(3)[:, None]
-        self._arrows = [] if self._fastest == 0.0 else [
-            self._scene.mesh(np.zeros((21, 3)), faces=first + cells, color=_ARROW)
-            for cells in (np.arange(4), np.arange(4, 7))]
+        self._arrows = Arrows(self._scene, np.zeros((21, 3)), _ARROW) if self._fastest else None
 
     def _draw_arrows(self, frame: int) -> None:
-        if not self._arrows:
+        if self._arrows is None:
             return
         velocity = self._motion.ground_velocity(frame, self._arrow_places)
         speed = np.linalg.norm(velocity, axis=1, keepdims=True)
         along = velocity / np.maximum(speed, np.finfo(float).tiny)
         shown = (speed > _SLOW * self._fastest) * self._extent
-        across = np.column_stack([-along[:, 1], along[:, 0]])
         half, head, shaft, wing = (part * shown for part in (0.07, 0.055, 0.009, 0.027))
-        tip, neck = self._arrow_places + half * along, self._arrow_places + (half - head) * along
-        tail = self._arrow_places - half * along
-        flat = np.stack([tail - shaft * across, neck - shaft * across, neck + shaft * across,
-                         tail + shaft * across, neck - wing * across, tip, neck + wing * across],
-                        axis=1).reshape(-1, 2)
-        heights = self._motion.ground_heights(frame, flat) + 4.0 * self._lift
+        tips = self._arrow_places + half * along
+        flat = arrow_corners(tips, along, 2.0 * half, head, shaft, wing)
+        heights = self._motion.ground(frame, flat) + 4.0 * self._lift
         if self._wavy:
             heights[:] = heights.max() + 4.0 * self._lift
-        for mesh in self._arrows:
-            move(mesh, np.column_stack([flat, heights]))
+        self._arrows.move(np.column_stack([flat, heights]))

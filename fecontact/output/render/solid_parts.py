@@ -1,18 +1,19 @@
 """Parts of a scene of solids: the bodies with the patches of their contact faces, and the axes."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
+from fecontact.fem.elements.cell_kinds import numbered_rows, unordered
 from fecontact.output.files.contact_facets import contact_facets
 from fecontact.output.render.face_maps import PRESSURE_MAP
+from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.pixels import DARK
-from fecontact.output.render.scene import COLOUR_MAPS, Camera, Scene, Shown, move, paint, shade
-from fecontact.output.render.solid_motion import SolidMotion
-from fecontact.output.render.surfaces import ShadedSurface, shaded_surface, sharp_edges
+from fecontact.output.render.scene import Bodies, Camera, Part, Scene, Shown, paint, shade
+from fecontact.output.render.surfaces import ShadedSurface, borders, shaded_surface, sharp_edges
 
 # From where bodies are seen, along t, t2 and n of their contact faces.
 _ABOVE, _BELOW = (0.46, -0.80, 0.42), (0.40, -0.62, -0.68)
@@ -25,15 +26,15 @@ _GLOSS = {"lighting": True, "ambient": 0.55, "diffuse": 0.58, "specular": 0.05,
 _LAMPS = ((-0.55, 0.85, 0.8, 0.72), (0.7, 0.1, 0.9, 0.38))
 
 
-def from_below(motion: Shown) -> bool:
+def from_below(motion: Shown) -> TypeGuard[Motion]:
     """True if the view is from below, onto the contact faces of a run."""
-    return isinstance(motion, SolidMotion) and motion.view == "below"
+    return isinstance(motion, Motion) and motion.view == "below"
 
 
 def seen_nodes(motion: Shown) -> Integers:
     """Nodes of the bodies that are drawn; from below without those under other ones' faces."""
     nodes = np.arange(len(motion.mode_shapes.nodes))
-    if not isinstance(motion, SolidMotion) or motion.view != "below":
+    if not from_below(motion):
         return nodes
     basis = motion.trajectory.basis
     patches = contact_facets(basis).patches.facets
@@ -56,7 +57,7 @@ def solid_camera(motion: Shown, ground: Array, aspect: float) -> Camera:
         low, high = drawn.min(axis=0) - out, drawn.max(axis=0) + out
     corners = np.stack(np.meshgrid(*np.stack([low, high], axis=1)), axis=-1).reshape(-1, 3)
     normal = np.array([0.0, 0.0, 1.0])
-    if isinstance(motion, SolidMotion) and from_below(motion):
+    if from_below(motion):
         basis = motion.trajectory.basis
         mean = basis.contact_areas @ basis.normals
         if np.linalg.norm(mean) > 0.1 * basis.contact_areas.sum():
@@ -67,75 +68,59 @@ def solid_camera(motion: Shown, ground: Array, aspect: float) -> Camera:
                          np.concatenate([corners, ground]), aspect)
 
 
-class SolidBodies:
+class SolidBodies(Bodies):
     """The bodies in their colours, shaded; from below their patches in those of the pressures."""
 
     def __init__(self, scene: Scene, motion: Shown) -> None:
-        self._motion, field, seen = motion, motion.mode_shapes, seen_nodes(motion)
-        camera = scene.camera
+        super().__init__(scene, motion)
+        field, seen, camera = motion.mode_shapes, seen_nodes(motion), scene.camera
+        self._shaded: list[ShadedSurface] = []
         scene.plotter.remove_all_lights()
         for right, up, back, strength in _LAMPS:
             scene.lamp(right * camera.right + up * camera.up + back * camera.back, strength)
-        whole = field.outline[np.isin(field.outline[:, 0], seen)]
-        facets = whole
-        self._surfaces: list[tuple[Any, ShadedSurface]] = []
-        self._painted, self._lines = None, []
-        if isinstance(motion, SolidMotion) and from_below(motion):
+        facets = whole = field.outline[np.isin(field.outline[:, 0], seen)]
+        if from_below(motion):
             patches = contact_facets(motion.trajectory.basis).patches
-            self._painted = self._surface(
-                scene, patches.facets, rgb=True,
-                cell_data={"colour": np.zeros((len(patches.facets), 3), np.uint8)},
-                **_GLOSS | {"lighting": False})
             self._owner = patches.owner
-            facets = whole[~np.isin(_keys(whole), _keys(patches.facets))]
-            self._lines.append(_lines(scene, field.nodes, _borders(patches), DARK, scene.line))
-        self._bodies = self._surface(
-            scene, facets, point_data={"colour": np.zeros(0)}, cmap=COLOUR_MAPS[motion.colour],
-            clim=(0.0, motion.largest_colour or 1.0), interpolate_before_map=True, n_colors=256,
-            **_GLOSS)
+            self._add(scene, patches.facets, rgb=True, lighting=False, cell_data={
+                "colour": np.zeros((len(patches.facets), 3), np.uint8)})
+            numbers = numbered_rows(unordered(np.concatenate([whole, patches.facets])))[1]
+            facets = whole[~np.isin(numbers[: len(whole)], numbers[len(whole) :])]
+            self.lines.append(_lines(scene, field.nodes, borders(patches.facets, patches.owner),
+                                     DARK, scene.line))
+        self._add(scene, facets, **self.colours)
         sharp = sharp_edges(field.nodes, whole)
-        self._lines.append(_lines(scene, field.nodes, sharp, DARK, 1.2 * scene.line))
+        self.lines.append(_lines(scene, field.nodes, sharp, DARK, 1.2 * scene.line))
         _lines(scene, field.nodes, sharp, _REFERENCE, scene.line)
-        self._names = [(scene.name(name), node) for name, node in motion.labels
-                       if np.isin(node, seen)]
-        self._places = field.nodes
+        self.labels = [(name, node) for name, node in self.labels if node in seen]
 
-    def _surface(self, scene: Scene, facets: Integers, **options: Any) -> Any:
-        """A shaded surface that moves with the mesh nodes: its mesh."""
-        surface = shaded_surface(self._motion.mode_shapes.nodes, facets)
-        places = self._motion.mode_shapes.nodes[surface.nodes]
-        data: dict[str, Array] = {"Normals": surface.normals(places)}
-        if "point_data" in options:
+    def _add(self, scene: Scene, facets: Integers, **options: Any) -> None:
+        """Add a shaded surface that moves with the mesh nodes."""
+        surface = shaded_surface(self.places, facets)
+        places = self.places[surface.nodes]
+        data = {"Normals": surface.normals(places)}
+        if "cell_data" not in options:
             data["colour"] = np.zeros(len(places))
         mesh = scene.mesh(places, faces=surface.facets, scalars="colour", behind=1.0, smooth=True,
-                          **options | {"point_data": data})
-        self._surfaces.append((mesh, surface))
-        return mesh
+                          point_data=data, **_GLOSS | options)
+        self.surfaces.append((mesh, surface.nodes))
+        self._shaded.append(surface)
 
     def draw(self, frame: int) -> None:
         """Bring everything to where it is at a frame."""
-        self._places, colours = self._motion.body(frame)
-        paint(self._bodies.point_data, colours[self._surfaces[-1][1].nodes])
-        if isinstance(self._motion, SolidMotion) and self._painted is not None:
+        super().draw(frame)
+        for (mesh, nodes), surface in zip(self.surfaces, self._shaded, strict=True):
+            shade(mesh, surface.normals(self.places[nodes]))
+        if from_below(self.motion):
             from matplotlib import colormaps
 
-            part = self._motion.pressures[frame] / (self._motion.largest_pressure or 1.0)
-            shades = (255.0 * colormaps[PRESSURE_MAP](part)[:, :3]).astype(np.uint8)
-            paint(self._painted.cell_data, shades[self._owner])
-        for mesh, surface in self._surfaces:
-            at = self._places[surface.nodes]
-            move(mesh, at)
-            shade(mesh, surface.normals(at))
-        for mesh in self._lines:
-            move(mesh, self._places)
-
-    def names(self) -> Sequence[tuple[NDArray[np.float64], Array]]:
-        """Names and places of several bodies in the frame drawn last."""
-        return [(name, self._places[node]) for name, node in self._names]
+            part = self.motion.pressures[frame] / (self.motion.largest_pressure or 1.0)
+            shades = colormaps[PRESSURE_MAP](part, bytes=True)[:, :3]
+            paint(self.surfaces[0][0].cell_data, shades[self._owner])
 
 
-class Triad:
-    """The axes in the lower left corner."""
+class Corners(Part):
+    """The axes in the lower left corner; in the right one words for what moves below the bodies."""
 
     def __init__(self, scene: Scene, motion: Shown) -> None:
         camera = scene.camera
@@ -146,29 +131,14 @@ class Triad:
             _lines(scene, np.stack([start, end]), np.array([[0, 1]]), colour, 2.0 * scene.line)
         self._names = [(scene.name(name), start + 1.45 * (end - start))
                        for name, end in zip("xyz", ends, strict=True)]
-
-    def draw(self, frame: int) -> None:
-        """Do nothing: the axes stand still."""
+        if isinstance(motion, Motion) and motion.moving:
+            self._names.append((scene.name(motion.moving, 0.9),
+                                camera.place(0.955, 1.0, scene.aspect)))
 
     def names(self) -> Sequence[tuple[NDArray[np.float64], Array]]:
-        """x, y and z at their ends."""
+        """x, y and z at the ends of the axes, and the words."""
         return self._names
 
 
 def _lines(scene: Scene, places: Array, edges: Integers, colour: str, width: float) -> Any:
     return scene.mesh(places, lines=edges, color=colour, line_width=width)
-
-
-def _borders(patches: Any) -> Integers:
-    """Edges between patches and around them."""
-    facets, owner = patches.facets, patches.owner
-    ends = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    rows = np.column_stack([ends, np.repeat(owner, facets.shape[1])])
-    once, times = np.unique(rows, axis=0, return_counts=True)
-    return np.unique(once[times == 1][:, :2], axis=0)
-
-
-def _keys(facets: Integers) -> Any:
-    """One value for each facet, the same for the same nodes."""
-    rows = np.ascontiguousarray(np.sort(facets, axis=1))
-    return rows.view([("", rows.dtype)] * rows.shape[1]).ravel()

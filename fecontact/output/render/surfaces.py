@@ -5,8 +5,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
+from fecontact.fem.elements.cell_kinds import edges_around, numbered_rows
 from fecontact.output.files.contact_facets import facet_vectors
 
 _SHARP = 0.85  # cosine of the angle of two facets whose common edge is drawn, about 30 degrees
@@ -49,9 +51,9 @@ def shaded_surface(nodes: Array, facets: Integers) -> ShadedSurface:
 
     f, c = facets.shape
     # Corners of facets on both sides of a smooth edge are one point.
-    first, second, smooth = _neighbours(nodes, facets)
+    _, _, sides, smooth = _bends(nodes, facets)
+    a, b = sides[:, smooth]
     corner = np.arange(f * c).reshape(f, c)
-    a, b = first[smooth], second[smooth]
     which, k, m = np.nonzero(facets[a][:, :, None] == facets[b][:, None, :])
     pairs = np.column_stack([corner[a[which], k], corner[b[which], m]])
     graph = sp.coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(f * c, f * c))
@@ -63,26 +65,31 @@ def shaded_surface(nodes: Array, facets: Integers) -> ShadedSurface:
 
 def sharp_edges(nodes: Array, facets: Integers) -> Integers:
     """Edges (e, 2) of a surface in space where it ends or bends by more than 30 degrees."""
-    ends, which, counts = _edges(facets)
-    smooth = _neighbours(nodes, facets, (ends, which, counts))[2]
-    sharp = counts != 2
-    sharp[counts == 2] = ~smooth
+    ends, inner, _, smooth = _bends(nodes, facets)
+    sharp = ~inner
+    sharp[inner] = ~smooth
     return ends[sharp]
 
 
-def _edges(facets: Integers) -> tuple[Integers, Integers, Integers]:
-    """Edges (e, 2), the edge of each side of the facets, and how many facets each has."""
-    pairs = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-    ends, which, counts = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
-    return ends, which.ravel(), counts
+def borders(facets: Integers, owner: Integers) -> Integers:
+    """Edges (e, 2) between the patches of facets, which have owners, and around them."""
+    ends, facet = edges_around(facets)
+    rows, _, count = numbered_rows(np.column_stack([ends, owner[facet]]))
+    return np.unique(rows[count == 1, :2], axis=0)
 
 
-def _neighbours(nodes: Array, facets: Integers, edges: Any = None) -> tuple[Any, Any, Any]:
-    """Facets on both sides of each inner edge, and True where the surface is smooth there."""
-    _, which, counts = _edges(facets) if edges is None else edges
+def _bends(
+    nodes: Array, facets: Integers
+) -> tuple[Integers, NDArray[np.bool_], Integers, NDArray[np.bool_]]:
+    """Edges (e, 2) of a surface, flags (e,) of those between two facets, and of these the facets
+    (2, i) and flags (i,): True where the surface is smooth.
+    """
+    pairs, facet = edges_around(facets)
+    ends, number, count = numbered_rows(pairs)
+    inner = count == 2
+    start = (np.cumsum(count) - count)[inner]
+    sides = facet[np.argsort(number, kind="stable")][np.stack([start, start + 1])]
     normals = facet_vectors(nodes, facets)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
-    of_side = np.argsort(which, kind="stable") // facets.shape[1]
-    start = np.concatenate([[0], np.cumsum(counts)[:-1]])[counts == 2]
-    first, second = of_side[start], of_side[start + 1]
-    return first, second, (normals[first] * normals[second]).sum(axis=1) >= _SHARP
+    first, second = normals[sides]
+    return ends, inner, sides, (first * second).sum(axis=1) >= _SHARP

@@ -1,13 +1,13 @@
 """Contact of a page: places, states and forces of the contact nodes, and the ground."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import to_rgba_array
 
 from fecontact.core.errors import AnalysisError
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.ground.height_map import HeightMap
@@ -15,9 +15,7 @@ from fecontact.output.diagrams.colours import STATE_COLOURS
 from fecontact.output.files.frames import contact_forces
 from fecontact.output.plots.solids.plans import FacePlan, face_plan
 from fecontact.output.plots.style import state_names
-from fecontact.output.render.frames_data import Motion
-from fecontact.output.report.bodies import PRESSURE, STATE
-from fecontact.output.report.drawing import DrawnContact, DrawnGround
+from fecontact.output.render.frames_data import Motion, ground_travel
 from fecontact.output.report.payload import SMALLEST, Payload
 from fecontact.reduction.assembly.contact_faces import (
     ContactFace,
@@ -35,60 +33,55 @@ _OPEN = "#dddddd"  # of open contact on the faces of solids
 _BESIDE = 0.6  # ground drawn on either side of the bodies, of their width
 
 
-def drawn_contact(run: Trajectory, motion: Motion | None) -> DrawnContact:
+def contact_of_run(run: Trajectory, motion: Motion | None, payload: Payload) -> dict[str, Any]:
     """Contact nodes of a run; with a motion to draw also where they and their feet are."""
     basis, names = run.basis, state_names(run)
     tangents, normals = contact_directions(basis)
     solid = basis.dimension == 3
     axes = (np.concatenate([tangents, normals[:, None]], axis=1) if solid
             else np.stack([tangents, normals], axis=1))
-    found = DrawnContact(
-        faces=[{"title": face.title or "contact", "label": face.label,
-                "first": face.nodes.start, "abscissa": face.abscissa.tolist(),
-                "sizes": face.tributary.tolist()}
-               | ({"plan": face_plan(basis, face)} if solid else {})
-               for face in _touching(run)],
-        axes=axes, forces=np.einsum("tnk,nik->tni", contact_forces(run), axes),
-        states=np.minimum(run.contact_state, len(names) - 1), names=names,
-        areas=basis.tributary if solid else None)
-    if motion is None:
-        return found
-    places, rows = motion.contact_rows
-    return replace(found, places=places, rows=rows, feet=motion.footed, sliding=motion.sliding)
+    faces = [{"title": face.title or "contact", "label": face.label, "first": face.nodes.start,
+              "abscissa": face.abscissa.tolist(), "sizes": face.tributary.tolist()}
+             | ({"plan": _plan_table(face_plan(basis, face), payload)} if solid else {})
+             for face in _touching(run)]
+    drawn: dict[str, Any] = {} if motion is None else {"placed": motion.contact_rows}
+    found = contact_table(axes, np.einsum("tnk,nik->tni", contact_forces(run), axes),
+                          np.minimum(run.contact_state, len(names) - 1), names, payload, **drawn)
+    found |= {"faces": faces}
+    if solid:
+        found["areas"] = basis.tributary.tolist()
+    if motion is not None:
+        found |= {"feet": motion.footed.tolist(), "slides": list(motion.sliding)}
+    return found
 
 
-def contact_table(contact: DrawnContact, payload: Payload) -> dict[str, Any]:
-    """Contact nodes with their states and forces at all times.
+def contact_table(
+    axes: Array, forces: Array, states: Integers, names: Sequence[str], payload: Payload,
+    placed: tuple[Array, Array] | None = None,
+) -> dict[str, Any]:
+    """Contact nodes with their states (N, n) and forces at all times.
 
-    ``forces`` (N, n, d) are those along the ``axes`` of the nodes [N]. Where bodies are drawn,
-    ``places`` and ``rows`` are where the nodes and their ``feet`` on other bodies are, and their
-    displacements per modal coordinate.
+    ``forces`` (N, n, d) are those along the ``axes`` (n, d, d) of the nodes [N]. Where bodies are
+    drawn, ``placed`` are where the nodes and their feet on other bodies are, (n + f, d) [m], and
+    their displacements per modal coordinate, (n + f, d, m).
     """
-    lengths = np.linalg.norm(contact.forces, axis=2)
-    largest = float(lengths.max(initial=0.0))
+    largest = float(np.linalg.norm(forces, axis=2).max(initial=0.0))
     # Errors of all components at once.
-    d = contact.forces.shape[2]
-    step = max(2.0 * _FORCE * largest / np.sqrt(d), SMALLEST)
+    step = max(2.0 * _FORCE * largest / np.sqrt(forces.shape[2]), SMALLEST)
+    near = [] if placed is None else _alike(axes, placed[0])
     found: dict[str, Any] = {
-        "faces": [face | ({"plan": _plan_table(face["plan"], payload)} if "plan" in face else {})
-                  for face in contact.faces],
-        "states": list(contact.names),
-        "colours": [STATE_COLOURS.get(name, "") for name in contact.names],
-        "state": payload.add(contact.states, later=True),
-        "forces": payload.add(contact.forces, step, later=True, near=_alike(contact)),
-        "largest": largest,
-        "axes": payload.add(contact.axes, 1e-9),
+        "states": list(names), "colours": [STATE_COLOURS.get(name, "") for name in names],
+        "state": payload.add(states, later=True),
+        "forces": payload.add(forces, step, later=True, near=near),
+        "largest": largest, "axes": payload.add(axes, 1e-9), "feet": [],
     }
-    if contact.areas is not None:
-        found["areas"] = contact.areas.tolist()
-    if contact.places is not None and contact.rows is not None:
-        sizes = np.abs(contact.rows).max(axis=(0, 1), initial=0.0)
+    if placed is not None:
+        places, rows = placed
+        sizes = np.abs(rows).max(axis=(0, 1), initial=0.0)
         steps = np.where(sizes > 0.0, _ROWS * sizes, 1.0)
-        extent = float(np.linalg.norm(np.ptp(contact.places, axis=0))) or 1.0
-        found |= {"feet": np.asarray(contact.feet, dtype=int).tolist(),
-                  "slides": list(contact.sliding),
-                  "places": payload.add(contact.places, 1e-7 * extent),
-                  "rows": payload.add(contact.rows, np.tile(steps, (contact.rows.shape[1], 1)))}
+        extent = float(np.linalg.norm(np.ptp(places, axis=0))) or 1.0
+        found |= {"places": payload.add(places, 1e-7 * extent),
+                  "rows": payload.add(rows, np.tile(steps, (rows.shape[1], 1)))}
     return found
 
 
@@ -100,12 +93,10 @@ def _plan_table(plan: FacePlan, payload: Payload) -> dict[str, Any]:
             "box": plan.box.T.ravel().tolist()}
 
 
-def _alike(contact: DrawnContact) -> list[int]:
+def _alike(axes: Array, places: Array) -> list[int]:
     """For each force (n d) that of the nearest earlier node, which is alike; -1 for the first."""
-    if contact.places is None:
-        return []
-    n, d = contact.axes.shape[:2]
-    nearest = [int(np.linalg.norm(contact.places[:node] - contact.places[node], axis=1).argmin())
+    n, d = axes.shape[:2]
+    nearest = [int(np.linalg.norm(places[:node] - places[node], axis=1).argmin())
                for node in range(1, n)]
     return [-1] * d + [node * d + k for node in nearest for k in range(d)]
 
@@ -118,98 +109,67 @@ def _touching(run: Trajectory) -> tuple[ContactFace, ...]:
         return ()
 
 
-def painted_ends(contact: DrawnContact) -> dict[str, list[float]]:
-    """Values at both ends of the colours of what the contact faces of solids are painted with."""
-    assert contact.areas is not None
-    largest = float((np.abs(contact.forces[:, :, -1]) / contact.areas).max(initial=0.0))
-    return {PRESSURE: [0.0, largest or 1.0], STATE: [-0.5, len(contact.names) - 0.5]}
-
-
-def state_colours(contact: DrawnContact, shades: int) -> list[list[int]]:
+def state_colours(contact: dict[str, Any], shades: int) -> list[list[int]]:
     """Colours of the states, from 0 to 255, as a map of so many shades."""
-    colours = [STATE_COLOURS.get(name, _OPEN) for name in contact.names]
-    rgb = [[int(colour[at : at + 2], 16) for at in (1, 3, 5)] for colour in colours]
-    return [rgb[k * len(rgb) // shades] for k in range(shades)]
+    rgb = to_rgba_array([colour or _OPEN for colour in contact["colours"]])[:, :3]
+    which = np.arange(shades) * len(rgb) // shades
+    return np.rint(255.0 * rgb[which]).astype(int).tolist()
 
 
-def drift_rows(motion: Motion) -> Array:
-    """Mean displacement (m,) along wavy ground of the contact nodes on it; zero on flat ground.
+def ground_table(motion: Motion, box: Array, payload: Payload) -> dict[str, Any] | None:
+    """The ground of a run under bodies in a box (2, d); None without it.
 
-    In space (2, m), along x and y.
-
-    A wavy ground is drawn in its true length, so that drift of the bodies along it, ``drift @ q``,
-    is not magnified either.
+    Its height is ``profile(x - travel)`` above its level, the lowest contact node at rest. In space
+    x is the distance along ``direction``, or a map has heights over x and y, and ``travel`` is
+    along x and y and about ``centre`` [rad].
     """
-    basis = motion.trajectory.basis
-    along = 0 if basis.dimension == 2 else slice(2)
-    rows = basis.contact_T[:, along]
-    if not (motion.has_ground and motion.trajectory.system.ground.wavy):
-        return np.zeros(rows.shape[1:])
-    return np.asarray(rows[basis.ground_nodes].mean(axis=0))
-
-
-def drawn_ground(motion: Motion, box: Sequence[float]) -> DrawnGround | None:
-    """The ground of a run under bodies in a box [x0, x1, y0, y1, ...]; None without it."""
     if not motion.has_ground:
         return None
-    ground, run = motion.trajectory.system.ground, motion.trajectory
-    basis, direction = run.basis, np.array(ground.wave_direction)
-    way = np.array([ground.travel(float(time)) for time in run.time])
-    ends, travel, along = box[:2], way, way
-    if basis.dimension == 3:
-        across = Ground(speed=ground.speed_y, motion=ground.motion_y)
-        travel = np.column_stack([way, [across.travel(float(time)) for time in run.time],
-                                  ground.rotation_speed * run.time])
-        along = travel[:, :2] @ direction
-        # Heights are stored along a direction over the box around the bodies.
-        corners = np.array([(x, y) for x in box[:2] for y in box[2:4]]) @ direction
-        ends = [float(corners.min()), float(corners.max())]
-    profile, first, spacing = np.zeros(1), 0.0, 1.0
-    if ground.wavy and ground.height_map is None:
-        sides = [] if basis.dimension == 2 else [box[1] - box[0], box[3] - box[2]]
-        reach = _BESIDE * max([ends[1] - ends[0], *sides])
-        first = ends[0] - reach - float(along.max())
-        last = ends[1] + reach - float(along.min())
-        wave = ground.shortest_wavelength or (last - first)
-        x = np.linspace(first, last, int(np.clip(_PROFILE * (last - first) / wave, 2,
-                                                 _MOST_POINTS)))
-        profile, spacing = ground.height(x + ground.travel(0.0), 0.0), float(x[1] - x[0])
-    places = basis.positions[2 : 2 + basis.contact_nodes]
-    found = DrawnGround(float(places[basis.ground_nodes, -1].min()), motion.gap, travel, profile,
-                        first, spacing, drift_rows(motion), ground.wave_direction, ground.centre)
-    if ground.height_map is None or not ground.wavy:
-        return found
-    return _with_map(found, ground.height_map, box)
-
-
-def _with_map(ground: DrawnGround, heights: HeightMap, box: Sequence[float]) -> DrawnGround:
-    """Add the part of a map of heights that comes below the bodies, at most one period."""
-    lines = []
-    beside = _BESIDE * max(box[1] - box[0], box[3] - box[2])
-    for axis, count in enumerate(np.shape(heights.heights)):
-        spacing = (heights.spacing_x, heights.spacing_y)[axis]
-        way = ground.travel[:, axis]
-        first = box[2 * axis] - beside - float(way.max())
-        size = box[2 * axis + 1] + beside - float(way.min()) - first
-        # The map repeats itself: one period is enough.
-        size = min(size, count * spacing)
-        points = int(np.clip(np.ceil(_MAP * size / spacing), 4, _MOST_OF_MAP))
-        lines.append((first, size / points, points))
-    x, y = (first + step * np.arange(points) for first, step, points in lines)
-    return replace(ground, heights=heights.shape(*np.meshgrid(x, y, indexing="ij"))[..., 0],
-                   origin=(lines[0][0], lines[1][0]), steps=(lines[0][1], lines[1][1]))
-
-
-def ground_table(ground: DrawnGround, payload: Payload) -> dict[str, Any]:
-    """The ground: its level, its profile over the travelled way, and its travel."""
-    profile, travel = ground.profile, ground.travel
-    return {
-        "wavy": ground.wavy, "level": ground.level, "gap": ground.gap,
-        "profile": payload.add(profile, max(1e-4 * float(np.ptp(profile)), SMALLEST)),
-        "first": ground.first, "spacing": ground.spacing,
+    ground, run, basis = motion.trajectory.system.ground, motion.trajectory, motion.trajectory.basis
+    d = basis.dimension
+    way = ground_travel(ground, run.time)
+    travel = np.column_stack([way, ground.rotation_speed * run.time]) if d == 3 else way[:, 0]
+    found: dict[str, Any] = {"profile": np.zeros(1), "heights": None, "first": 0.0, "spacing": 1.0,
+                             "origin": (0.0, 0.0), "steps": (1.0, 1.0)}
+    if ground.wavy and ground.height_map is not None:
+        found |= _height_map(ground.height_map, box, way)
+    elif ground.wavy:
+        found |= _profile(ground, box, way[:, : d - 1])
+    for name in ("profile", "heights"):
+        if (values := found[name]) is not None:
+            found[name] = payload.add(values, max(1e-4 * float(np.ptp(values)), SMALLEST))
+    return found | {
+        "wavy": ground.wavy, "gap": motion.gap, "direction": ground.wave_direction,
+        "level": float(basis.contact_places[basis.ground_nodes, -1].min()),
         "travel": payload.add(travel, max(1e-6 * float(np.abs(travel).max()), SMALLEST)),
-        "drift": ground.drift.ravel().tolist(), "direction": ground.direction,
-        "centre": ground.centre, "origin": ground.origin, "steps": ground.steps,
-        "heights": None if ground.heights is None else payload.add(
-            ground.heights, max(1e-4 * float(np.ptp(ground.heights)), SMALLEST)),
+        "drift": motion.drift.ravel().tolist(), "centre": ground.centre,
     }
+
+
+def _profile(ground: Ground, box: Array, way: Array) -> dict[str, Any]:
+    """Heights along the direction of the waves over the box around the bodies."""
+    direction = np.array(ground.wave_direction)[: way.shape[1]]
+    ends = np.stack(np.meshgrid(*box[:, : way.shape[1]].T), axis=-1) @ direction
+    along = way @ direction
+    reach = _BESIDE * max(float(np.ptp(ends)), *np.ptp(box[:, : way.shape[1]], axis=0))
+    first, last = ends.min() - reach - along.max(), ends.max() + reach - along.min()
+    wave = ground.shortest_wavelength or (last - first)
+    count = int(np.clip(_PROFILE * (last - first) / wave, 2, _MOST_POINTS))
+    x = np.linspace(first, last, count)
+    return {"profile": ground.height(x + ground.travel(0.0), 0.0), "first": float(first),
+            "spacing": float(x[1] - x[0])}
+
+
+def _height_map(heights: HeightMap, box: Array, way: Array) -> dict[str, Any]:
+    """The part of a map of heights that comes below the bodies, at most one period."""
+    spacing = np.array([heights.spacing_x, heights.spacing_y])
+    beside = _BESIDE * np.ptp(box[:, :2], axis=0).max()
+    first = box[0, :2] - beside - way.max(axis=0)
+    # The map repeats itself: one period is enough.
+    size = np.minimum(box[1, :2] + beside - way.min(axis=0) - first,
+                      np.shape(heights.heights) * spacing)
+    points = np.clip(np.ceil(_MAP * size / spacing), 4, _MOST_OF_MAP)
+    steps = size / points
+    x, y = (first[k] + steps[k] * np.arange(points[k]) for k in (0, 1))
+    return {"heights": heights.shape(*np.meshgrid(x, y, indexing="ij"))[..., 0],
+            "origin": first.tolist(), "steps": steps.tolist()}

@@ -98,9 +98,9 @@ def write_diagrams(
     if shown.basis.mode_shapes is not None:
         q = shown.basis.mode_shapes.stress_coordinates(q)
         seen = Motions(drawn_bodies(shown.basis), q)
-        scale = visible_scale(seen.bodies.extent, seen.largest_displacement)
+        scale = visible_scale(seen.bodies.extent, seen.ranges.largest_displacement)
         header |= {"bodies": bodies_table(seen, payload), "scale": scale, "maps": colour_maps(),
-                   "box": seen.box(scale)}
+                   "box": seen.ranges.box(scale).T.ravel().tolist()}
         if shown.alike:
             header["orbits"]["scales"] = _scales(seen, len(motions))
         header["orbits"]["coordinates"] = payload.add(q, seen.coordinate_steps())
@@ -109,7 +109,7 @@ def write_diagrams(
 
 def _scales(seen: Motions, count: int) -> list[float]:
     """Factor of each of the motions, with which its largest is as well visible."""
-    return [visible_scale(seen.bodies.extent, Motions(seen.bodies, q).largest_displacement)
+    return [visible_scale(seen.bodies.extent, Motions(seen.bodies, q).ranges.largest_displacement)
             for q in np.split(seen.coordinates, count)]
 
 

@@ -5,7 +5,6 @@ In space the axis z points away from the ground.
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -82,96 +81,6 @@ class DrawnBodies:
     def components(self) -> tuple[str, ...]:
         """Names of the stresses."""
         return COMPONENTS[self.stress.shape[1]]
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnContact:
-    """Contact nodes over N times; feet are their other sides on bodies.
-
-    Attributes
-    ----------
-    faces : list of dict
-        Title, label of the abscissa, first node, abscissae and tributary sizes of each face; in
-        space its ``plan``, a :class:`~fecontact.output.plots.solids.plans.FacePlan`.
-    axes : (n, d, d) array
-        Unit vectors of each node: one tangent or two, then the normal.
-    forces : (N, n, d) array
-        On the body along these axes [N].
-    states : (N, n) integer array
-        Numbers of ``names``.
-    names : tuple of str
-    places : (n + f, d) array or None
-        Places of contact nodes and feet [m]; None where no body is drawn.
-    rows : (n + f, d, m) array or None
-        Displacements of these places per modal coordinate.
-    feet : (f,) integer array
-        Contact nodes of the feet.
-    sliding : tuple of str
-        Bodies with prescribed sliding, and its direction.
-    areas : (n,) array or None
-        Areas of the patches of solids [m^2].
-    """
-
-    faces: list[dict[str, Any]]
-    axes: Array
-    forces: Array
-    states: NDArray[np.integer]
-    names: tuple[str, ...]
-    places: Array | None = None
-    rows: Array | None = None
-    feet: Integers | tuple[int, ...] = ()
-    sliding: tuple[str, ...] = ()
-    areas: Array | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnGround:
-    """The ground below the bodies: its height is ``profile(x - travel)`` above its level.
-
-    In space x is the distance along ``direction``; or a map gives the heights over x and y.
-
-    Attributes
-    ----------
-    level : float
-        Height of the lowest contact node at rest [m].
-    gap : float
-        Smallest gap below the contact nodes [m].
-    travel : (N,) or (N, 3) array
-        In +x at all times [m]; in space along x and y and about ``centre`` [rad].
-    profile : (k,) array
-        Heights [m] at equal distances; one zero for flat ground.
-    first, spacing : float
-        Abscissa of the first height, and distance [m].
-    drift : (m,) or (2, m) array
-        Mean displacement of the contact nodes in x (and y) per modal coordinate, which wavy ground,
-        drawn in its true length, does not magnify; zero on flat ground.
-    direction : (float, float)
-        Along which the height varies.
-    centre : (float, float)
-        About which it turns [m].
-    heights : (k, l) array or None
-        Heights of a map over x and y, which repeats itself [m].
-    origin, steps : (float, float)
-        Place of the first of these heights, and their distances [m].
-    """
-
-    level: float
-    gap: float
-    travel: Array
-    profile: Array
-    first: float
-    spacing: float
-    drift: Array
-    direction: tuple[float, float] = (1.0, 0.0)
-    centre: tuple[float, float] = (0.0, 0.0)
-    heights: Array | None = None
-    origin: tuple[float, float] = (0.0, 0.0)
-    steps: tuple[float, float] = (1.0, 1.0)
-
-    @property
-    def wavy(self) -> bool:
-        """True if the ground has waves."""
-        return len(self.profile) > 1 or self.heights is not None
 
 
 def drawn_bodies(basis: ModalBasis) -> DrawnBodies:

@@ -15,6 +15,7 @@ from fecontact.analysis.sampling import alias_message
 from fecontact.core.checks import as_path, require_kind, require_scale
 from fecontact.core.errors import InputError
 from fecontact.core.tables import parsed
+from fecontact.core.types import Array
 from fecontact.core.units import UNITS, quantity
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.files.frames import LARGEST_DRAWN, drawable
@@ -23,16 +24,8 @@ from fecontact.output.render.frames_data import Motion, visible_scale
 from fecontact.output.render.scene import COLOUR_MAPS
 from fecontact.output.report.bodies import PRESSURE, STATE, Motions, bodies_table
 from fecontact.output.report.charts import chart_tables, energy_charts, spectrum_tables
-from fecontact.output.report.contact import (
-    contact_table,
-    drawn_contact,
-    drawn_ground,
-    drift_rows,
-    ground_table,
-    painted_ends,
-    state_colours,
-)
-from fecontact.output.report.drawing import DrawnGround, drawn_bodies
+from fecontact.output.report.contact import contact_of_run, ground_table, state_colours
+from fecontact.output.report.drawing import drawn_bodies
 from fecontact.output.report.page import write_page
 from fecontact.output.report.payload import Payload
 
@@ -140,32 +133,31 @@ def run_block(
         "contact": None, "ground": None, "maps": colour_maps(),
     }
     if system.basis.contact_nodes:
-        contact = drawn_contact(found, motion)
-        header["contact"] = contact_table(contact, payload)
+        header["contact"] = contact_of_run(found, motion, payload)
     if motion is not None:
-        shapes = system.basis.mode_shapes
-        assert shapes is not None
-        motions = Motions(drawn_bodies(system.basis),
-                          shapes.stress_coordinates(found.modal_coordinates), drift_rows(motion))
+        q = motion.mode_shapes.stress_coordinates(found.modal_coordinates)
+        motions = Motions(drawn_bodies(system.basis), q, motion.drift)
         scale = float(scale or visible_scale(motions.bodies.extent, max(
-            motions.largest_magnified, motion.still_size)))
-        box = motions.box(scale)
-        header |= moving_tables(motions, scale, box, drawn_ground(motion, box), payload)
+            motions.ranges.largest_magnified, motion.still_size)))
+        box = motions.ranges.box(scale)
+        header |= moving_tables(motions, scale, box, payload)
+        header["ground"] = ground_table(motion, box, payload)
         if "owners" in header["bodies"]:
-            header["bodies"]["ends"] = painted_ends(contact)
-            header["maps"][STATE] = state_colours(contact, _SHADES)
+            states = header["contact"]["states"]
+            header["bodies"]["ends"] = {PRESSURE: [0.0, motion.largest_pressure or 1.0],
+                                        STATE: [-0.5, len(states) - 0.5]}
+            header["maps"][STATE] = state_colours(header["contact"], _SHADES)
     return payload.block(header)
 
 
 def moving_tables(
-    motions: Motions, scale: float, box: list[float], ground: DrawnGround | None, payload: Payload
+    motions: Motions, scale: float, box: Array, payload: Payload
 ) -> dict[str, Any]:
-    """Table of the data that the player needs, except for the contact."""
+    """The bodies in a box (2, d), magnified, and their coordinates."""
     return {
         "bodies": bodies_table(motions, payload),
         "coordinates": payload.add(motions.coordinates, motions.coordinate_steps()),
-        "ground": None if ground is None else ground_table(ground, payload),
-        "scale": scale, "box": box,
+        "scale": scale, "box": box.T.ravel().tolist(),
     }
 
 
