@@ -24,17 +24,18 @@ TURN = 2.0 * np.pi
 
 def section() -> str:
     """One table."""
-    rows = van_der_pol() + two_oscillators() + duffing() + friction()
+    rows = closed_form() + van_der_pol() + two_oscillators() + duffing() + friction()
     return f"""## Quasi-periodic motions
 
-Tori are followed by `torus_branch`. Averaged solutions have errors of the order of eps and of the
-force. Runs and the Neimark-Sacker point by collocation have only the errors of their tolerances.
+Tori are followed by `torus_branch`. The first one has a closed form. Averaged solutions have errors
+of the order of eps and of the force. Runs and the Neimark-Sacker point by collocation have only the
+errors of their tolerances.
 
 {comparisons(rows)}
 """
 
 
-def first(field: VectorField, start, name: str, H: int, **options) -> BranchPoint:
+def first(field: VectorField, start, name: str, H: int | tuple[int, int], **options) -> BranchPoint:
     """The torus near a start."""
     return torus_branch(field, start, name, method=TorusBalance(H),
                         options=ContinuationOptions(points=1), **options).points[0]
@@ -44,6 +45,32 @@ def settled(system, initial, begin: float, end: float, outputs: int):
     """The end of a run."""
     times = np.append(0.0, np.linspace(begin, end, outputs))
     return fc.simulate(system, end, initial=initial, outputs=times, rtol=1e-10).between(begin)
+
+
+def closed_form() -> list[Comparison]:
+    """A plane that turns, with r' = r + r^2 (cos w t - 1): 1 / r is linear.
+
+    The torus of the tutorial of COCO (H. Dankowicz, F. Schilder, Recipes for Continuation, SIAM
+    2013).
+    """
+
+    def rates(t, x, p, out):
+        grows = 1.0 + np.hypot(x[0], x[1]) * (np.cos(p[1] * t) - 1.0)
+        out[0] = grows * x[0] - p[0] * x[1]
+        out[1] = grows * x[1] + p[0] * x[0]
+
+    w = 1.5
+    field = vector_field(rates, {"turn": 1.0, "w": w}, 2, period=lambda p: TURN / p["w"])
+    point = first(field, settled(field, [1.0, 0.0], 60.0, 260.0, 4001), "w", (12, 1))
+    a = 1.0 / np.sqrt(1.0 + w**2)
+    root = np.sqrt(1.0 - a * a)
+    return [Comparison("torus of a plane that turns: first harmonic", 1.0 / root,
+                       abs(torus_motion(point).harmonic(0, 1)[0])),
+            Comparison("torus of a plane that turns: third harmonic beside it",
+                       ((1.0 - root) / a) ** 3 / root,
+                       abs(torus_motion(point).harmonic(3, 1)[0])),
+            Comparison("torus of a plane that turns: smaller multiplier", np.exp(-TURN / w),
+                       point.values["multipliers"].min())]
 
 
 def van_der_pol() -> list[Comparison]:

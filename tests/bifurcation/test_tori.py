@@ -240,6 +240,39 @@ def test_two_oscillators_that_do_not_feel_each_other(second, tmp_path):
     assert on.points[0].values["frequency_2"] == pytest.approx(last.values["frequency_2"], rel=1e-4)
 
 
+def turning(t, x, p, out):
+    grows = 1.0 + np.hypot(x[0], x[1]) * (np.cos(p[1] * t) - 1.0)
+    out[0] = grows * x[0] - p[0] * x[1]
+    out[1] = grows * x[1] + p[0] * x[0]
+
+
+@pytest.mark.parametrize(("turn", "w"), [(1.0, 1.5), (np.sqrt(2.0), 0.9)])
+def test_a_torus_in_closed_form(turn, w):
+    """The plane turns, and r' = r + r^2 (cos w t - 1), so that 1 / r is linear.
+
+    1 / r = 1 - a cos(w t - phase) with a^2 = 1 / (1 + w^2), and other values decay to it by
+    exp(-t). Harmonics of r fall by b = (1 - sqrt(1 - a^2)) / a. For turn = 1, w = 1.5 see the
+    tutorial on tori of COCO (H. Dankowicz, F. Schilder, Recipes for Continuation, SIAM 2013).
+    """
+    field = vector_field(turning, {"turn": turn, "w": w}, ["x", "y"], period=period_of_w)
+    run = settled(field, [1.0, 0.0], 60.0, 260.0, 4001)
+    a = 1.0 / np.sqrt(1.0 + w**2)
+    root = np.sqrt(1.0 - a * a)
+    b = (1.0 - root) / a
+    for H in (6, 12):
+        point = first_torus(field, run, "turn" if w < 1.0 else "w", method=TorusBalance((H, 1)))
+        motion = torus_motion(point)
+        bound = 3.0 * b**H
+        assert CIRCLE * motion.frequencies == pytest.approx([w, turn], abs=bound**2)
+        assert point.values["multipliers"] == pytest.approx(
+            [1.0, np.exp(-CIRCLE / w)], abs=bound)
+        # Extremes are those of a grid.
+        assert point.values["maximum"] == pytest.approx(2 * [1.0 / (1.0 - a)], rel=1e-3 + bound)
+        for k in (0, 1, -1, 2, -2, 3):
+            assert abs(motion.harmonic(k, 1)) == pytest.approx(
+                2 * [b ** abs(k) / root], rel=bound)
+
+
 def test_far_from_resonance_the_free_vibration_is_smaller():
     # Averaging about the forced vibration b: a^2 = 4 - 2 b^2.
     field = forced_van_der_pol(0.02, 0.3, 1.3)
