@@ -9,7 +9,6 @@ import numpy as np
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
-from fecontact.core.units import UNITS
 from fecontact.fitting.diagrams import (
     fit_diagrams,
     marginal_diagrams,
@@ -19,11 +18,10 @@ from fecontact.fitting.diagrams import (
 from fecontact.fitting.posterior import Posterior
 from fecontact.fitting.profile import ProfileLikelihood
 from fecontact.fitting.result import Fit
-from fecontact.output.files.stored_system import library_versions
 from fecontact.output.report.charts import diagram_table
-from fecontact.output.report.page import write_page
+from fecontact.output.report.page import page_block, write_page
 from fecontact.output.report.payload import Payload
-from fecontact.output.report.run_report import require_page, study_tables
+from fecontact.output.report.run_report import require_page
 
 _NAMED = 0.02  # least component of a combination that is written
 
@@ -84,7 +82,7 @@ def report_fit(
     notes = [*fit.notes, *(posterior.notes if posterior is not None else ())]
     converged = sum(not one.failed for one in fit.starts)
     header: dict[str, Any] = {
-        "format": 1, "title": title, "units": UNITS, "names": list(fit.names),
+        "names": list(fit.names),
         "status": f"chi square {fit.chi_square:.4g} for {fit.freedom} degrees of freedom, "
                   f"{converged} of {len(fit.starts)} starts",
         "good": not notes, "notes": notes,
@@ -105,8 +103,6 @@ def report_fit(
                       for a, b in zip(one.start, one.values, strict=True)),
                     f"{one.evaluations}", one.message] for one in fit.starts],
         "derivatives": [[*key.rsplit(": ", 1), kind] for key, kind in fit.derivatives.items()],
-        "study": study_tables(study, "fit"),
-        "versions": list(map(list, library_versions().items())),
     }
     if posterior is not None:
         rows = len(posterior.names)
@@ -117,7 +113,7 @@ def report_fit(
                              zip(tables(pairs.values()), pairs, strict=True)],
                    "sampled": [list(row) for row in posterior.summary()[rows:]
                                if row[0] != "note"]}
-    return write_page(path, title, payload.block(header), "fit")
+    return write_page(path, title, page_block(title, header, payload, study), "fit")
 
 
 def _parameters(

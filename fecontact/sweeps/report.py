@@ -10,10 +10,9 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.units import UNITS, quantity, suitable_unit
-from fecontact.output.files.stored_system import library_versions
-from fecontact.output.report.page import write_page
+from fecontact.output.report.page import page_block, write_page
 from fecontact.output.report.payload import Payload
-from fecontact.output.report.run_report import colour_maps, require_page, study_tables
+from fecontact.output.report.run_report import colour_maps, require_page
 from fecontact.sweeps.summaries import unit_of
 from fecontact.sweeps.table import SweepTable, is_numeric
 
@@ -63,7 +62,7 @@ def report_sweep(
     failed, missing = len(table.failed), len(table.missing)
     names = [column.get("labels") for column in columns]
     header: dict[str, Any] = {
-        "format": 1, "title": title, "units": UNITS, "cases": len(table),
+        "cases": len(table),
         "status": f"{len(table)} cases, {failed} failed, {missing} not computed",
         "good": not failed and not missing,
         "notes": [],
@@ -79,10 +78,8 @@ def report_sweep(
         "rows": [[*_row(table, case), "" if command is None else command(case)]
                  for case in range(len(table))],
         "shades": colour_maps()["displacement"],
-        "study": study_tables(study, "sweep"),
-        "versions": list(map(list, library_versions().items())),
     }
-    return write_page(path, title, payload.block(header), "sweep")
+    return write_page(path, title, page_block(title, header, payload, study, ["sweep"]), "sweep")
 
 
 def _parameter(label: str, values: Sequence[Any]) -> dict[str, Any]:

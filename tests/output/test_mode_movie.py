@@ -64,8 +64,8 @@ def test_movie_and_pictures_of_a_complex_mode(tmp_path):
 def test_what_cannot_be_drawn(tmp_path):
     body = basis()
     for options, words in (({"mode": 99}, "mode = 99 must be the number of one of"),
-                           ({"frames": 1}, "frames = 1 must be a whole number of at least 2"),
-                           ({"periods": 0}, "periods = 0 must be a whole number of at least 1"),
+                           ({"frames": 1}, "frames = 1 must be a whole number, 2 or above"),
+                           ({"periods": 0}, "periods = 0 must be a whole number, 1 or above"),
                            ({"modes": complex_modes(rotor(1.0))}, "complex modes have 4 states")):
         with pytest.raises(InputError, match=words):
             render_mode(body, tmp_path / "mode.mp4", **options)

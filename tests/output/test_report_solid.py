@@ -126,7 +126,7 @@ def test_views_are_right_handed_and_show_the_ground_from_the_side(browser, drawn
 def test_contact_nodes_have_their_states_and_arrows_their_forces(browser, drawn, path):
     """From below, where neither the body nor its nodes hide each other."""
     colours = {1: (0x00, 0x72, 0xb2), 2: (0xe6, 0x9f, 0x00)}
-    contact, motion = drawn.contact, drawn.motions
+    motion = drawn.motions
     met = set()
     with Opened(browser, path) as opened:
         opened.page.wait_for_selector("html[data-whole]", state="attached")
@@ -135,18 +135,18 @@ def test_contact_nodes_have_their_states_and_arrows_their_forces(browser, drawn,
         for index in range(1, 200, 17):
             at_instant(opened, drawn, index)
             q = motion.coordinates[index]
-            places = contact.places + SCALE * contact.rows @ q
-            places[:, 0] += (1.0 - SCALE) * q @ motion.drift
+            places = drawn.places + SCALE * drawn.rows @ q
+            places[:, 0] += (1.0 - SCALE) * q @ motion.drift[0]
             seen = opened.of_player(f"{places.tolist()}.map(p => player.project(...p))")
             picture = opened.picture()
-            for (x, y), state in zip(seen, contact.states[index], strict=True):
+            for (x, y), state in zip(seen, drawn.states[index], strict=True):
                 if state in colours:
                     around = picture[int(y) - 1 : int(y) + 2, int(x) - 1 : int(x) + 2]
                     assert np.abs(around.reshape(-1, 3) - colours[state]).max(axis=1).min() < 12.0
                     met.add(int(state))
         assert met == {1, 2}
         # The largest force is an arrow of a fifth of the height, in the direction of the force.
-        length = np.linalg.norm(contact.forces, axis=2)
+        length = np.linalg.norm(drawn.forces, axis=2)
         index, node = np.unravel_index(length.argmax(), length.shape)
         at_instant(opened, drawn, index)
         without = opened.picture()
@@ -154,10 +154,10 @@ def test_contact_nodes_have_their_states_and_arrows_their_forces(browser, drawn,
         changed = np.abs(opened.picture() - without).max(axis=2) > 40
         turn = np.reshape(opened.of_player("player.turn"), (3, 3)).T
         q = motion.coordinates[index]
-        place = contact.places[node] + SCALE * contact.rows[node] @ q
-        place[0] += (1.0 - SCALE) * q @ motion.drift
+        place = drawn.places[node] + SCALE * drawn.rows[node] @ q
+        place[0] += (1.0 - SCALE) * q @ motion.drift[0]
         tip = np.array(opened.of_player(f"player.project({', '.join(map(str, place))})"))
-        force = turn @ contact.forces[index, node] / length.max()
+        force = turn @ drawn.forces[index, node] / length.max()
         arrow = 0.2 * min(changed.shape) * np.array([force[0], -force[1]])
         for part in (0.2, 0.5, 0.9):
             x, y = np.round(tip - part * arrow).astype(int)
@@ -216,7 +216,7 @@ def test_a_large_solid_is_small_and_opens_soon(browser, tmp_path):
         places = np.reshape(opened.of_player("Array.from(player.places)"), (-1, 3))
         nodes, q = drawn.motions.bodies.nodes, drawn.motions.coordinates[index]
         error = (places - nodes) / SCALE - drawn.motions.bodies.shapes @ q
-        assert np.linalg.norm(error, axis=1).max() < 1e-4 * drawn.motions.largest_displacement
+        assert np.linalg.norm(error, axis=1).max() < 1e-4 * drawn.motions.ranges.largest_displacement
         cost = opened.of_player("(player.draw(), player.cost)")
         print(f"first picture after {ready} ms, all data after {whole} ms, a frame takes {cost} ms")
         # Many times what a quiet computer takes.

@@ -20,6 +20,8 @@ ENERGY_COLOURS = {
 }
 # Colour-blind safe; 'open' takes the colour of the background.
 STATE_COLOURS = {"stick": "#0072b2", "slip": "#e69f00", "contact": "#009e73"}
+# Colour maps of the pressure and of the depth worn off on faces of solids.
+PRESSURE_MAP, WEAR_MAP = "inferno", "copper_r"
 # Runs beneath branches, which have other colours.
 DOTS = {"up": "#b4b0a8", "down": "#e69f00"}
 # Frequencies beyond those up to which a basis is usable.

@@ -66,11 +66,15 @@ def frame_indices(
 def require_field(trajectory: Trajectory) -> ModeShapes:
     """The modes over the body; InputError if the modal basis holds none."""
     require_kind("A picture", Trajectory, trajectory=trajectory)
-    field = trajectory.basis.mode_shapes
-    if field is None:
-        raise InputError("This run cannot be drawn: its modal basis holds no shapes over the "
-                         "body; make the basis with modal_basis(body, ...).")
-    return field
+    return shapes_of(trajectory.basis, "This run")
+
+
+def shapes_of(basis: ModalBasis, what: str) -> ModeShapes:
+    """The modes of a basis over the body, needed to draw ``what``; InputError without them."""
+    if basis.mode_shapes is None:
+        raise InputError(f"{what} cannot be drawn: the modal basis holds no shapes over the body; "
+                         f"make the basis with modal_basis(body, ...).")
+    return basis.mode_shapes
 
 
 def drawable(trajectory: Trajectory, which: Any = slice(None)) -> NDArray[np.bool_]:

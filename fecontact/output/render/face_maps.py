@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from fecontact.core.types import Array
 from fecontact.core.units import quantity
+from fecontact.output.diagrams.colours import PRESSURE_MAP, WEAR_MAP
 from fecontact.output.plots.solids.plans import FacePlan, draw_arrows, draw_plan
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.overlay import FONT, Overlay
 from fecontact.output.render.pixels import DARK
 from fecontact.output.render.scene import NODE_COLOURS
 
-PRESSURE_MAP, WEAR_MAP = "inferno", "copper_r"
 _SIDE = 0.03  # free on the left and right, of the width
 _TITLE = 1.6  # height above each map, in sizes of text
 _GAP = 0.5  # between maps

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.checks import require_kind, require_scale
+from fecontact.core.checks import as_count, require_kind, require_scale
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ComplexArray
+from fecontact.output.files.frames import shapes_of
 from fecontact.output.render.frames_data import body_labels
 from fecontact.output.render.movie import MOVING, Progress, images_of, target, write_images
 from fecontact.output.render.offscreen import require_rendering
@@ -141,7 +142,7 @@ def render_mode(
     """
     require_kind("render_mode", ModalBasis, basis=basis)
     require_kind("render_mode", (ComplexModes, type(None)), modes=modes)
-    field, (q, words) = _field(basis), _chosen(basis, modes, mode)
+    field, (q, words) = shapes_of(basis, "These modes"), _chosen(basis, modes, mode)
     return write_motion(ModeMotion(field, {1: field.shapes @ q}, np.zeros(0),
                                    labels=body_labels(basis)),
                         path, words if title is None else title, frames=frames, periods=periods,
@@ -154,9 +155,7 @@ def write_motion(
 ) -> Path:
     """Write a periodic motion, whose phases are set here; arguments as of :func:`render_mode`."""
     path, movie = target(path, fps, size)
-    for name, value, least in (("frames", frames, 2), ("periods", periods, 1)):
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-            raise InputError(f"{name} = {value!r} must be a whole number of at least {least}.")
+    frames, periods = as_count(frames, "frames", 2), as_count(periods, "periods")
     require_scale("The mode", scale)
     # Numbered pictures of one period suffice for any number of them.
     count = frames * (periods if movie else 1)
@@ -176,13 +175,6 @@ def _mode_overlay(motion: ModeMotion, size: tuple[int, int], title: str) -> Over
     degrees = np.degrees(motion.phases) % 360.0
     overlay.changing(lambda frame: words.set_text(f"phase {degrees[frame]:3.0f}°"), words)
     return overlay
-
-
-def _field(basis: ModalBasis) -> ModeShapes:
-    if basis.mode_shapes is None:
-        raise InputError("These modes cannot be drawn: the modal basis holds no shapes over the "
-                         "body; make the basis with modal_basis(body, ...).")
-    return basis.mode_shapes
 
 
 def _chosen(

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.checks import is_numeric
+from fecontact.core.checks import as_count, is_numeric
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array, ArrayLike
 from fecontact.output.diagrams.colours import distinct_colours
@@ -67,14 +67,13 @@ def render_phase_space(
     """
     curves, names = phase_curves(motions, coordinates, labels)
     path, _ = target(path, fps, size)
-    if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or frames < 2:
-        raise InputError(f"frames = {frames!r} must be a whole number of at least 2.")
+    frames = as_count(frames, "frames", 2)
     if not (is_numeric([trail]) and 0.0 <= trail <= 1.0):
         raise InputError(f"trail = {trail!r} must be a part of the time, from 0 to 1.")
     if not (is_numeric([turn]) and np.isfinite(turn)):
         raise InputError(f"turn = {turn!r} must be a finite angle in degrees.")
-    images = _images(curves, names, int(frames), size, float(trail), float(turn), title)
-    return write_images(images, int(frames), path, fps, size, progress)
+    images = _images(curves, names, frames, size, float(trail), float(turn), title)
+    return write_images(images, frames, path, fps, size, progress)
 
 
 def _images(

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.units import quantity, suitable_unit
-from fecontact.output.render.face_maps import PRESSURE_MAP, draw_face_maps
+from fecontact.output.diagrams.colours import PRESSURE_MAP
+from fecontact.output.render.face_maps import draw_face_maps
 from fecontact.output.render.force_chart import draw_force_chart
 from fecontact.output.render.frames_data import COLOURS, Motion
 from fecontact.output.render.overlay import FONT, Overlay

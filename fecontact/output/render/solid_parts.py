@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elements.cell_kinds import numbered_rows, unordered
+from fecontact.output.diagrams.colours import PRESSURE_MAP
 from fecontact.output.files.contact_facets import contact_facets
-from fecontact.output.render.face_maps import PRESSURE_MAP
 from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.pixels import DARK
 from fecontact.output.render.scene import Bodies, Camera, Part, Scene, Shown, paint, shade

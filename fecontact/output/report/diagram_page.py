@@ -12,17 +12,16 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
-from fecontact.core.units import UNITS, count, suitable_unit
+from fecontact.core.units import count, suitable_unit
 from fecontact.output.diagrams.colours import distinct_colours
 from fecontact.output.diagrams.diagram import Diagram
-from fecontact.output.files.stored_system import library_versions
 from fecontact.output.render.frames_data import visible_scale
 from fecontact.output.report.bodies import Motions, bodies_table
 from fecontact.output.report.charts import diagram_table
 from fecontact.output.report.drawing import drawn_bodies
-from fecontact.output.report.page import write_page
+from fecontact.output.report.page import page_block, write_page
 from fecontact.output.report.payload import SMALLEST, Payload
-from fecontact.output.report.run_report import colour_maps, study_tables
+from fecontact.output.report.run_report import colour_maps
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.reduction.report import beyond_basis
 
@@ -81,7 +80,6 @@ def write_diagrams(
     payload, kept = Payload(), _kept(named)
     motions = [shown.motion(named[name].points[index]) for name, index in kept]
     header: dict[str, Any] = {
-        "format": 1, "title": title, "units": UNITS,
         "status": _status(named),
         "good": all(branch.status.name != "STALLED" for branch in named.values()),
         "notes": [f"{name}: {branch.message}" for name, branch in named.items() if branch.message],
@@ -90,8 +88,6 @@ def write_diagrams(
         "branches": _branch_tables(named, kept, shown.texts),
         "samples": SAMPLES,
         "observed": shown.observed,
-        "study": study_tables(study, "branch", "response"),
-        "versions": list(map(list, library_versions().items())),
         "contact": None, "ground": None,
     }
     header["orbits"], q = _orbit_tables(motions, shown.row, payload)
@@ -104,7 +100,8 @@ def write_diagrams(
         if shown.alike:
             header["orbits"]["scales"] = _scales(seen, len(motions))
         header["orbits"]["coordinates"] = payload.add(q, seen.coordinate_steps())
-    return write_page(path, title, payload.block(header), "branches")
+    return write_page(path, title, page_block(title, header, payload, study, (
+        "branch", "response")), "branches")
 
 
 def _scales(seen: Motions, count: int) -> list[float]:

@@ -5,16 +5,19 @@ import hashlib
 import os
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from html import escape
 from importlib.resources import files
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from fecontact.core.errors import InputError, ModelWarning
 from fecontact.core.files.atomic_write import write_text
-from fecontact.output.report.payload import as_text
+from fecontact.core.tables import parsed
+from fecontact.core.units import UNITS
+from fecontact.output.files.stored_system import library_versions
+from fecontact.output.report.payload import Payload, as_text
 
 Kind = Literal["run", "runs", "branches", "sweep", "fit", "widget"]
 # In the order in which they need each other; together one script.
@@ -27,6 +30,8 @@ SCRIPTS: Mapping[Kind, tuple[str, ...]] = {
     "fit": (*_COMMON, "fit.js", "start.js"),
     "widget": (*_COMMON, "spectrum.js", "map.js", "player.js", "run.js", "widget.js"),
 }
+# Sections of a study that do not change the motion of a run.
+_NOT_OF_RUNS = ("branch", "response", "sweep", "wear", "preload", "render", "output")
 LARGE = 20e6  # bytes of a file that mail and browsers take without complaint
 
 _PAGE = """<!doctype html>
@@ -72,6 +77,19 @@ def page(title: str, block: bytes, kind: Kind = "run") -> str:
                         seal=_seal(code), style_seal=_seal(style))
 
 
+def page_block(
+    title: str, header: Mapping[str, Any], payload: Payload, study: str | None = None,
+    sections: Sequence[str] = (), versions: Mapping[str, str] | None = None,
+) -> bytes:
+    """The data of a page: its header, to which what all pages have is added, and its arrays.
+
+    ``sections`` are those of the study that are shown although they do not change a run.
+    """
+    return payload.block({
+        "format": 1, "title": title, "units": UNITS, "study": _study_tables(study, sections),
+        "versions": list(map(list, (versions or library_versions()).items())), **header})
+
+
 def write_page(path: Path, title: str, block: bytes, kind: Kind = "run") -> Path:
     """Write a page, whole or not at all; a ModelWarning says if the file is large."""
     text = page(title, block, kind)
@@ -96,6 +114,41 @@ def require_own_page(path: Path) -> None:
     if not own:
         raise InputError(f"{path} exists and is no page of fecontact; move it, or choose another "
                          f"name by fecontact report -o NAME.html.")
+
+
+def _study_tables(study: str | None, sections: Sequence[str]) -> list[dict[str, Any]]:
+    """Sections of a study with their keys and values as text; those of runs, and other ones.
+
+    Sections of sections have dotted names; keys without a value are left out.
+    """
+    found: list[dict[str, Any]] = []
+
+    def collect(name: str, table: Mapping[str, Any]) -> None:
+        rows = [[key, text] for key, value in table.items()
+                if not isinstance(value, dict) and (text := _text(value))]
+        if rows:
+            found.append({"name": name, "rows": rows})
+        for key, value in table.items():
+            if isinstance(value, dict):
+                collect(f"{name}.{key}" if name else key, value)
+
+    tables = parsed(study or "", "report: study")
+    collect("", {name: table for name, table in tables.items()
+                 if name in sections or name not in _NOT_OF_RUNS})
+    found.sort(key=lambda section: not section["name"])
+    return found
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return f"{value:.10g}"
+    if isinstance(value, list):
+        return ", ".join(map(_text, value))
+    if isinstance(value, dict):
+        return ", ".join(f"{key} = {_text(one)}" for key, one in value.items())
+    return str(value)
 
 
 def _plain(text: str) -> str:

@@ -10,13 +10,11 @@ import numpy as np
 from fecontact.analysis.comparison import compare_runs
 from fecontact.analysis.histories import Point, component_of, history
 from fecontact.analysis.summaries import usual_point
-from fecontact.core.units import UNITS
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.diagrams.colours import distinct_colours
 from fecontact.output.diagrams.diagram import Curve, Diagram
-from fecontact.output.files.stored_system import library_versions
 from fecontact.output.report.charts import diagram_table, spectrum_table
-from fecontact.output.report.page import write_page
+from fecontact.output.report.page import page_block, write_page
 from fecontact.output.report.payload import Payload
 from fecontact.output.report.run_report import require_page
 
@@ -94,7 +92,7 @@ def report_runs(
         notes.append("The runs have no time in common; their histories are left out.")
     title = " and ".join(runs) if title is None else title
     header: dict[str, Any] = {
-        "format": 1, "title": title, "units": UNITS, "names": list(found.names),
+        "names": list(found.names),
         "status": f"{len(runs)} runs; changes are relative to {found.names[0]}",
         "good": len(notes) == 0, "notes": notes,
         "numbers": [list(row) for row in found.number_rows()],
@@ -102,6 +100,5 @@ def report_runs(
         "same": "All parameters that the files hold are equal.",
         "time": None if time is None else payload.add(time, 1e-9 * (end - begin)),
         "charts": charts, "spectra": spectra,
-        "versions": list(map(list, library_versions().items())),
     }
-    return write_page(path, title, payload.block(header), "runs")
+    return write_page(path, title, page_block(title, header, payload), "runs")

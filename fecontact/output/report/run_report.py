@@ -14,25 +14,21 @@ from fecontact.analysis.run_facts import notes, run_facts
 from fecontact.analysis.sampling import alias_message
 from fecontact.core.checks import as_path, require_kind, require_scale
 from fecontact.core.errors import InputError
-from fecontact.core.tables import parsed
 from fecontact.core.types import Array
-from fecontact.core.units import UNITS, quantity
+from fecontact.core.units import quantity
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.files.frames import LARGEST_DRAWN, drawable
-from fecontact.output.files.stored_system import library_versions
 from fecontact.output.render.frames_data import Motion, visible_scale
 from fecontact.output.render.scene import COLOUR_MAPS
 from fecontact.output.report.bodies import PRESSURE, STATE, Motions, bodies_table
 from fecontact.output.report.charts import chart_tables, energy_charts, spectrum_tables
 from fecontact.output.report.contact import contact_of_run, ground_table, state_colours
 from fecontact.output.report.drawing import drawn_bodies
-from fecontact.output.report.page import write_page
+from fecontact.output.report.page import page_block, write_page
 from fecontact.output.report.payload import Payload
 
 _SHADES = 64  # of a colour map
 _PAINTS = {"von_mises": "von Mises stress"}
-# Sections of a study that do not change the motion.
-_NOT_OF_RUNS = ("branch", "response", "sweep", "wear", "preload", "render", "output")
 
 
 def report(
@@ -114,22 +110,17 @@ def run_block(
     motion = Motion(found, np.arange(len(found.time))) if drawn else None
     charts, phases = chart_tables(found, points, payload)
     header: dict[str, Any] = {
-        "format": 1,
-        "title": title,
         "status": found.status.value,
         "good": found.status in (Status.FINISHED, Status.EVENT),
         "notes": remarks,
-        "facts": [list(row) for row in _facts(run, found)],
+        "facts": [list(row) for row in run_facts(replace(found, statistics=run.statistics))],
         **_key_numbers(found, points),
         "system": [list(row) for row in system.summary()],
-        "study": study_tables(study),
-        "versions": list(map(list, (versions or library_versions()).items())),
         "time": payload.add(found.time, 1e-9 * float(np.ptp(found.time) or 1.0)),
         "charts": charts, "spectra": spectrum_tables(found, points, payload), "phases": phases,
         "energies": energy_charts(found, payload),
         "balance": f"error of the energy balance: {found.energies.imbalance:.1e} of the largest "
                    f"term",
-        "units": UNITS,
         "contact": None, "ground": None, "maps": colour_maps(),
     }
     if system.basis.contact_nodes:
@@ -147,7 +138,7 @@ def run_block(
             header["bodies"]["ends"] = {PRESSURE: [0.0, motion.largest_pressure or 1.0],
                                         STATE: [-0.5, len(states) - 0.5]}
             header["maps"][STATE] = state_colours(header["contact"], _SHADES)
-    return payload.block(header)
+    return page_block(title, header, payload, study, versions=versions)
 
 
 def moving_tables(
@@ -161,42 +152,6 @@ def moving_tables(
     }
 
 
-def study_tables(study: str | None, *also: str) -> list[dict[str, Any]]:
-    """Sections of a study that matter for a run, with their keys and values as text.
-
-    ``also`` names further sections that matter. Sections of sections have dotted names; keys
-    without a value are left out.
-    """
-    found: list[dict[str, Any]] = []
-
-    def collect(name: str, table: Mapping[str, Any]) -> None:
-        rows = [[key, text] for key, value in table.items()
-                if not isinstance(value, dict) and (text := _text(value))]
-        if rows:
-            found.append({"name": name, "rows": rows})
-        for key, value in table.items():
-            if isinstance(value, dict):
-                collect(f"{name}.{key}" if name else key, value)
-
-    tables = parsed(study or "", "report: study")
-    collect("", {name: table for name, table in tables.items()
-                 if name in also or name not in _NOT_OF_RUNS})
-    found.sort(key=lambda section: not section["name"])
-    return found
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, float):
-        return f"{value:.10g}"
-    if isinstance(value, list):
-        return ", ".join(map(_text, value))
-    if isinstance(value, dict):
-        return ", ".join(f"{key} = {_text(one)}" for key, one in value.items())
-    return str(value)
-
-
 def _finite(run: Trajectory) -> Trajectory:
     """The run up to its last output time that can be drawn."""
     bad = np.flatnonzero(~(drawable(run) & np.isfinite(run.work).all(axis=1)))
@@ -207,10 +162,6 @@ def _finite(run: Trajectory) -> Trajectory:
         raise InputError(f"The run has no motion to report: its numbers are not finite, or beyond "
                          f"{LARGEST_DRAWN:g}; check loads, stiffnesses and supports.")
     return run.between(None, float(run.time[end - 1]))
-
-
-def _facts(run: Trajectory, found: Trajectory) -> list[tuple[str, str]]:
-    return run_facts(replace(found, statistics=run.statistics))
 
 
 def _key_numbers(run: Trajectory, points: Sequence[Point]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from fecontact.core.units import quantity, suitable_unit
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.integrate.wear import WearHistory
 from fecontact.laws.wear import WearLaw
-from fecontact.output.diagrams.colours import COLOURS, STATE_COLOURS
+from fecontact.output.diagrams.colours import COLOURS, PRESSURE_MAP, STATE_COLOURS, WEAR_MAP
 from fecontact.output.diagrams.diagram import thinned
 from fecontact.output.plots.figure import new_figure
 from fecontact.output.plots.solids.plans import FacePlan, draw_arrows, draw_plan, face_plans
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PRESSURE_MAP, WEAR_MAP, WORK_MAP = "inferno", "copper_r", "viridis"
+WORK_MAP = "viridis"
 OPEN = "#e3e0da"
 _TIMES = 4  # shown without being asked for
 _MOST_TIMES = 8
