@@ -216,7 +216,8 @@ def test_a_large_solid_is_small_and_opens_soon(browser, tmp_path):
         places = np.reshape(opened.of_player("Array.from(player.places)"), (-1, 3))
         nodes, q = drawn.motions.bodies.nodes, drawn.motions.coordinates[index]
         error = (places - nodes) / SCALE - drawn.motions.bodies.shapes @ q
-        assert np.linalg.norm(error, axis=1).max() < 1e-4 * drawn.motions.ranges.largest_displacement
+        largest = drawn.motions.ranges.largest_displacement
+        assert np.linalg.norm(error, axis=1).max() < 1e-4 * largest
         cost = opened.of_player("(player.draw(), player.cost)")
         print(f"first picture after {ready} ms, all data after {whole} ms, a frame takes {cost} ms")
         # Many times what a quiet computer takes.

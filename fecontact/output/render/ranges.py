@@ -1,4 +1,4 @@
-"""What motions reach over time: largest displacements and stresses, and the box around bodies."""
+"""Ranges of motions over time: largest displacements and stresses, and the box around bodies."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
