@@ -64,6 +64,18 @@ class FitData:
         """Numbers (n,) that a model gives in place of the measured ones; FecontactError if none."""
         raise NotImplementedError
 
+    def whitened(self, values: Array) -> Array:
+        """Changes (n, ...) of the numbers as independent ones, in standard deviations."""
+        return values if self.deviations is None else (values.T / self.deviations).T
+
+    def coloured(self, values: Array) -> Array:
+        """Changes (n, ...) of the numbers from independent ones, the inverse of whitening."""
+        return values if self.deviations is None else (values.T * self.deviations).T
+
+    def weighted_by(self, system: ContactSystem) -> "FitData":
+        """Copy whose deviations are those at a model, where they depend on it; else the data."""
+        return self
+
     def rescaled(self, factor: float) -> "FitData | None":
         """Copy whose given motion is a factor times as large; None for data without one."""
         return None

@@ -24,6 +24,7 @@ from fecontact.system.quasistatic.path import LoadPath
 _SAMPLES = 24.0  # outputs of a decay in a period of its highest frequency
 _OVERLAP = 0.95  # of the windows along the run of a model
 _SLOPE = 0.1  # of log amplitude, over which the slope at the end of a curve is taken
+_STEP = 0.02  # of log amplitude, over which slopes of a model are taken
 _MOVED = ("displacement", "velocity")
 
 
@@ -117,7 +118,16 @@ class HistoryData(FitData):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CurveData(FitData):
-    """Base class of data that are a curve of frequency and damping over amplitude."""
+    """Base class of data that are a curve of frequency and damping over amplitude.
+
+    Parameters
+    ----------
+    slopes : (2, N) array, optional
+        Slopes of frequency [Hz] and damping ratio over log amplitude, by which errors of the
+        amplitude count. A fit takes those of its model; until then they are those of the curve.
+    """
+
+    slopes: Array | None = None
 
     @property
     def _curve(self) -> AmplitudeCurve:
@@ -129,11 +139,45 @@ class CurveData(FitData):
         """Frequencies [Hz], then damping ratios."""
         return np.concatenate([self._curve.frequency_hz, self._curve.damping_ratio])
 
+    def at(self, system: ContactSystem, amplitude: Array) -> Array:
+        """Frequencies [Hz], then damping ratios of a model, over amplitudes."""
+        raise NotImplementedError
+
+    def predicted(self, system: ContactSystem) -> Array:
+        """Frequencies and damping ratios of a model, at the measured amplitudes."""
+        return self.at(system, self._curve.amplitude)
+
+    @property
+    def _covariance(self) -> Array | None:
+        """Covariances (N, 2, 2) of frequency and damping ratio at the measured amplitudes."""
+        return self._curve.covariance_at_amplitude(self.slopes)
+
     @property
     def deviations(self) -> Array | None:
         """Standard deviations of both at the measured amplitudes; None without any."""
-        found = self._curve.deviations_at_amplitude()
-        return None if found is None else np.concatenate(found)
+        found = self._covariance
+        return None if found is None else np.sqrt(np.concatenate([found[:, 0, 0], found[:, 1, 1]]))
+
+    def whitened(self, values: Array) -> Array:
+        """Changes of frequencies in deviations, then what damping changes besides them."""
+        found = self._covariance
+        return values if found is None else _unpaired(np.linalg.solve(
+            np.linalg.cholesky(found), _paired(values)), values.shape)
+
+    def coloured(self, values: Array) -> Array:
+        """Changes of frequencies and damping ratios, the inverse of whitening."""
+        found = self._covariance
+        return values if found is None else _unpaired(
+            np.linalg.cholesky(found) @ _paired(values), values.shape)
+
+    def weighted_by(self, system: ContactSystem) -> "FitData":
+        """Copy in which errors of the amplitude count by the slopes of a model."""
+        A = self._curve.amplitude
+        if self._curve.amplitude_deviation is None:
+            return self
+        ends = self.at(system, np.concatenate([A * np.exp(-_STEP), A * np.exp(_STEP)]))
+        low, high = np.moveaxis(ends.reshape(2, 2, len(A)), 1, 0)
+        return replace(self, slopes=(high - low) / (2.0 * _STEP))
 
     @property
     def deviation_freedom(self) -> float:
@@ -146,6 +190,16 @@ class CurveData(FitData):
         n, label = len(curve), f"amplitude [{curve.unit}]"
         return [Curve(label, curve.amplitude, "frequency [Hz]", slice(0, n), True),
                 Curve(label, curve.amplitude, "damping ratio", slice(n, 2 * n), True)]
+
+
+def _paired(values: Array) -> Array:
+    """Values (2 N, ...) of two quantities as (N, 2, m)."""
+    return np.moveaxis(values.reshape(2, len(values) // 2, -1), 0, 1)
+
+
+def _unpaired(values: Array, shape: tuple[int, ...]) -> Array:
+    """Inverse of :func:`_paired`."""
+    return np.moveaxis(values, 1, 0).reshape(shape)
 
 
 @read_only_arrays
@@ -192,8 +246,8 @@ class DecayData(CurveData):
         if not (isinstance(self.t_end, int | float) and 0.0 < self.t_end < np.inf):
             raise InputError(f"DecayData: t_end = {self.t_end!r} must be a time above zero.")
 
-    def predicted(self, system: ContactSystem) -> Array:
-        """Frequencies and damping ratios of a run, at the measured amplitudes."""
+    def at(self, system: ContactSystem, amplitude: Array) -> Array:
+        """Frequencies [Hz], then damping ratios of a run, over amplitudes."""
         highest = float(self.curve.frequency_hz.max())
         count = max(64, int(np.ceil(self.t_end * highest * _SAMPLES)) + 1)
         run = _run(system, self.initial, np.linspace(0.0, self.t_end, count), self.rtol)
@@ -203,7 +257,7 @@ class DecayData(CurveData):
         found = ring_down(run.time, values.values, derivative=order, **{
             "frequency_hz": float(np.median(self.curve.frequency_hz)), **self.options,
             "overlap": _OVERLAP})
-        return _extended(found, self.curve.amplitude)
+        return _extended(found, amplitude)
 
 
 def _extended(curve: AmplitudeCurve, amplitude: Array) -> Array:

@@ -153,9 +153,9 @@ class BackboneData(CurveData):
         require_kind("BackboneData", AmplitudeCurve, curve=self.curve)
         require_kind("BackboneData", (HarmonicBalance, type(None)), method=self.method)
 
-    def predicted(self, system: ContactSystem) -> Array:
-        """Frequencies and damping ratios of the mode at the measured amplitudes."""
-        A = self.curve.amplitude
+    def at(self, system: ContactSystem, amplitude: Array) -> Array:
+        """Frequencies [Hz], then damping ratios of the mode, over amplitudes."""
+        A = amplitude
         mode = nonlinear_mode(system, (float(A.min()) / _MARGIN, float(A.max()) * _MARGIN),
                               self.mode, observe=(self.point, self.component), method=self.method,
                               options=self.options)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +22,12 @@ from fecontact.core.progress import counting_bar, shown
 from fecontact.core.tables import from_table
 from fecontact.core.types import Array
 from fecontact.fitting.data import FitData
-from fecontact.fitting.problem import LOSSES, Evaluator, Problem, require_picklable
+from fecontact.fitting.evaluations import Evaluator, searched
+from fecontact.fitting.problem import LOSSES, Problem
 from fecontact.fitting.result import Fit, FitStart
-from fecontact.fitting.search import Found, SearchOptions, search
+from fecontact.fitting.search import Found, SearchOptions, fitted
 from fecontact.study.fit_section import FitParameter, values_of
 from fecontact.study.study import Study
-from fecontact.sweeps.executors import opened
 from fecontact.system.contact_system import ContactSystem
 
 # Ratio of the sum of squares to its expectation from which on units are doubted, and part of it
@@ -65,7 +66,7 @@ def fit(
     exact : bool
         Whether derivatives are exact where the data have some, else differences.
     workers : int or None
-        Processes for the starts; None for one per core.
+        Processes for starts and differences; None for one per core. The result is the same.
     executor : concurrent.futures.Executor, optional
         In place of processes.
     folder : path, optional
@@ -90,18 +91,10 @@ def fit(
     files = _files(folder, starts, overwrite)
     begins = _starts(problem.parameters, starts, seed)
     with shown(progress, lambda: counting_bar("Fitting")) as tell:
-        if executor is None and workers == 1:
-            found = []
-            known = [Evaluator(problem, file) for file in files]
-            for start, evaluator in zip(begins, known, strict=True):
-                found.append(search(problem, start, options, evaluator=evaluator))
-                if tell is not None:
-                    tell(len(found), starts)
-        else:
-            require_picklable(problem)
-            found = _on_workers(problem, begins, options, files, executor, workers, tell)
-            known = [Evaluator(problem, file) for file in files]
-    return _result(problem, options, found, known)
+        known = [Evaluator(problem, file) for file in files]
+        found = searched(known, [partial(fitted, one, start, options) for one, start in zip(
+            known, begins, strict=True)], executor, workers, tell)
+    return _result(options, found, known)
 
 
 def _problem(model: Any, parameters: Any, data: Any, exact: bool) -> Problem:
@@ -176,34 +169,7 @@ def _files(folder: Any, starts: int, overwrite: bool) -> list[Path | None]:
     return list(files)
 
 
-def _one(job: tuple[Problem, Array, SearchOptions, Path | None]) -> Found:
-    return search(*job)
-
-
-def _on_workers(
-    problem: Problem, begins: list[Array], options: SearchOptions, files: list[Path | None],
-    executor: Executor | None, workers: int | None, tell: Progress | None,
-) -> list[Found]:
-    from concurrent.futures import as_completed
-
-    with opened(executor, workers) as pool:
-        flying = {pool.submit(_one, (problem, start, options, file)): k
-                  for k, (start, file) in enumerate(zip(begins, files, strict=True))}
-        found: dict[int, Found] = {}
-        try:
-            for future in as_completed(flying):
-                found[flying[future]] = future.result()
-                if tell is not None:
-                    tell(len(found), len(begins))
-        except BaseException:
-            pool.cancel(flying)
-            raise
-    return [found[k] for k in range(len(begins))]
-
-
-def _result(
-    problem: Problem, options: SearchOptions, found: list[Found], evaluators: list[Evaluator]
-) -> Fit:
+def _result(options: SearchOptions, found: list[Found], evaluators: list[Evaluator]) -> Fit:
     order = sorted(range(len(found)), key=lambda k: found[k].cost)
     best = found[order[0]]
     if best.failed:
@@ -211,6 +177,7 @@ def _result(
                             if len(found) > 1 else
                             f"fit: the model fails at the start: {best.message}")
     known = evaluators[order[0]]
+    problem = known.problem
     jacobian = known.jacobian(best.places)
     residual = known.residual(best.places)
     starts = tuple(FitStart(

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,8 @@ from fecontact.core.progress import counting_bar, shown
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised
-from fecontact.fitting.problem import Problem, require_picklable
+from fecontact.fitting.evaluations import require_picklable, unpacked
+from fecontact.fitting.problem import Problem
 from fecontact.fitting.result import Fit
 from fecontact.study.fit_section import values_of
 from fecontact.sweeps.executors import opened
@@ -282,7 +282,7 @@ class _Density:
         if (u < 0.0).any() or (u > 1.0).any():
             return -np.inf
         try:
-            off = (self.problem.predicted(u) - self.problem.measured) / self.problem.deviations
+            off = self.problem.whitened(self.problem.predicted(u) - self.problem.measured)
         except FecontactError:
             return -np.inf
         rise = (float(off @ off) - self.least) / self.scale / self.scale
@@ -298,12 +298,7 @@ class _Sent:
     body: bytes
 
     def __call__(self, u: Array) -> float:
-        return float(_unpacked(self.body)(u))
-
-
-@lru_cache(maxsize=1)
-def _unpacked(body: bytes) -> Any:
-    return pickle.loads(body)
+        return float(unpacked(self.body)(u))
 
 
 def _first(emcee: Any, fit: Fit, sampler: Any, seed: int) -> Any:

@@ -1,6 +1,8 @@
 """Profile likelihood of one parameter: the others are fitted anew at each of its values."""
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised
-from fecontact.fitting.problem import Evaluator
+from fecontact.fitting.evaluations import Evaluator, searched
 from fecontact.fitting.result import Fit
 from fecontact.fitting.search import search
 
@@ -85,6 +87,7 @@ class ProfileLikelihood(Summarised):
 
 def profile_likelihood(
     fit: Fit, name: str, *, points: int = 11, level: float = 0.95,
+    workers: int | None = 1, executor: Executor | None = None,
     folder: str | Path | None = None,
 ) -> ProfileLikelihood:
     """Profile likelihood of a parameter: an interval that needs no linear model.
@@ -99,6 +102,8 @@ def profile_likelihood(
         Number of its values, over 1.5 times the linear interval within the range.
     level : float
         Probability of the interval.
+    workers, executor
+        Processes for both directions and for differences; see :func:`fecontact.fit`.
     folder : path, optional
         Folder that stores evaluations, that of the fit: a profile that was cancelled goes on there.
 
@@ -125,16 +130,20 @@ def profile_likelihood(
     scale = fit.deviation_scale
     found = np.full(len(places), np.nan)
     middle = int(np.argmin(np.abs(places - here)))
-    # From the best value outwards, each from the end of the search before it.
-    for order in (range(middle, len(places)), range(middle, -1, -1)):
+
+    def outwards(order: range) -> None:
+        """Search from the best value outwards, each time from the end of the search before."""
         u = np.array(fit.places)
         for j in order:
             u[k] = places[j]
-            done = search(fit.problem, u, fit.options, free=free, evaluator=evaluator)
+            done = search(evaluator, u, fit.options, free)
             if done.failed:
                 continue
             u = np.array(done.places)
             found[j] = 2.0 * done.cost / scale / scale
+
+    searched([evaluator], [partial(outwards, order) for order in (
+        range(middle, len(places)), range(middle, -1, -1))], executor, workers)
     one = fit.problem.parameters[k]
     return ProfileLikelihood(name, np.array([one.value(float(u)) for u in places]), found,
                    float(np.nanmin(found)), fit.reach(level) ** 2, float(level))

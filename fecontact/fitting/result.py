@@ -135,8 +135,8 @@ class Fit(Summarised):
 
     @property
     def residuals(self) -> Array:
-        """Weighted residuals (n,)."""
-        return np.asarray((self.predicted - self.problem.measured) / self.problem.deviations)
+        """Residuals (n,) in standard deviations, of correlated numbers in independent ones."""
+        return self.problem.whitened(self.predicted - self.problem.measured)
 
     @property
     def singular_values(self) -> Array:
@@ -260,7 +260,7 @@ class Fit(Summarised):
         """
         s, directions = self._decomposed()
         kept = s > _RANK * max(float(s[0]), 1e-300)
-        moved = (self.jacobian * self.problem.deviations[:, None]) @ (
+        moved = self.problem.coloured(self.jacobian) @ (
             directions[kept].T / s[kept])
         reach = self.reach(level) * np.linalg.norm(moved, axis=1)
         return [(self.predicted[part] - reach[part], self.predicted[part] + reach[part])

@@ -1,16 +1,17 @@
 """Search for the least squares from one start."""
 
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
-from fecontact.fitting.problem import Evaluator, Problem
+from fecontact.fitting.evaluations import Evaluator
 
 _TOLERANCE, _EVALUATIONS = 1e-9, 200
+# Searches with deviations that depend on the model, and change of places at which they end.
+_PASSES, _SETTLED = 10, 1e-5
 
 
 @dataclass(frozen=True)
@@ -45,9 +46,29 @@ class Found:
     evaluations: int
 
 
+def fitted(known: Evaluator, start: Array, options: SearchOptions) -> Found:
+    """Search from a start, again while deviations change that depend on the model.
+
+    The evaluator then has the problem with the last deviations.
+    """
+    found = search(known, start, options)
+    for _ in range(_PASSES):
+        if found.failed:
+            break
+        weighted = known.problem.weighted_at(found.places)
+        if weighted is known.problem:
+            break
+        known.problem, before = weighted, found
+        found = search(known, before.places, options)
+        found = replace(found, start=start,
+                        trials_failed=before.trials_failed + found.trials_failed)
+        if np.abs(found.places - before.places).max() < _SETTLED:
+            break
+    return found
+
+
 def search(
-    problem: Problem, start: Array, options: SearchOptions, file: Path | None = None,
-    free: Array | None = None, evaluator: Evaluator | None = None,
+    known: Evaluator, start: Array, options: SearchOptions, free: Array | None = None,
 ) -> Found:
     """Search from a start; parameters that are not ``free`` keep their places.
 
@@ -56,7 +77,6 @@ def search(
     """
     from scipy.optimize import least_squares
 
-    known = evaluator or Evaluator(problem, file)
     moving = np.ones(len(start), dtype=bool) if free is None else free
     failures = 0
 
@@ -72,7 +92,7 @@ def search(
         except FecontactError:
             failures += 1
             # The search shortens its step where residuals are not finite.
-            return np.full(len(problem.measured), np.nan)
+            return np.full(len(known.problem.measured), np.nan)
 
     def jacobian(part: Array) -> Array:
         return known.jacobian(whole(part), moving)[:, moving]

@@ -54,6 +54,9 @@ class AmplitudeCurve(Summarised):
         known.
     amplitude_deviation : (N,) array or None
         Standard deviations of the amplitudes; None if the amplitudes are exact.
+    correlation : (N, 3, 3) array or None
+        Correlations of the errors of log amplitude, frequency and damping ratio; None if they are
+        independent.
 
     Raises
     ------
@@ -73,6 +76,7 @@ class AmplitudeCurve(Summarised):
     note: str = ""
     deviation_freedom: float = float("inf")
     amplitude_deviation: Array | None = None
+    correlation: Array | None = None
 
     def __post_init__(self) -> None:
         amplitude = as_floats(self.amplitude, "AmplitudeCurve: amplitude")
@@ -87,6 +91,12 @@ class AmplitudeCurve(Summarised):
                 raise InputError(f"AmplitudeCurve: {name} has the shape {values.shape}; it must "
                                  f"have one value for each of the {len(amplitude)} amplitudes.")
             object.__setattr__(self, name, values)
+        if self.correlation is not None:
+            known = as_floats(self.correlation, "AmplitudeCurve: correlation")
+            if known.shape != (len(amplitude), 3, 3):
+                raise InputError(f"AmplitudeCurve: correlation has the shape {known.shape}; it "
+                                 f"must be ({len(amplitude)}, 3, 3).")
+            object.__setattr__(self, "correlation", known)
         for name in ("amplitude", "frequency_hz"):
             if not (getattr(self, name) > 0.0).all():
                 raise InputError(f"AmplitudeCurve: every {name} must be above zero.")
@@ -116,38 +126,57 @@ class AmplitudeCurve(Summarised):
             [self.frequency_hz[order], self.damping_ratio[order]], axis=1))(np.log(wanted))
         return np.asarray(found[..., 0]), np.asarray(found[..., 1])
 
-    def deviations_at_amplitude(self) -> tuple[Array, Array] | None:
-        r"""Standard deviations of frequency and damping ratio at the stated amplitudes.
+    def covariance_at_amplitude(self, slopes: Array | None = None) -> Array | None:
+        r"""Covariance of the errors of frequency and damping ratio at the stated amplitudes.
 
-        To first order an error of the amplitude moves both along their slopes:
-        :math:`\sigma^2 = \sigma_f^2 + (A\,f'(A))^2 (\sigma_A / A)^2`. The slopes are those of
-        polynomials in log A, cubic ones for four points or more; of their squares the part that
-        the deviations alone would give is left out.
+        To first order an error of the amplitude moves both along their slopes: with the errors e
+        of log amplitude, frequency and damping ratio,
+
+        .. math:: C = B \, \mathrm{Cov}(e) \, B^T, \qquad B = \begin{pmatrix}
+            -df / d \ln A & 1 & 0 \\ -d \zeta / d \ln A & 0 & 1 \end{pmatrix}
+
+        Parameters
+        ----------
+        slopes : (2, N) array, optional
+            Slopes of frequency [Hz] and damping ratio over log A, such as those of a model; by
+            default those of the curve itself, by polynomials in log A, cubic ones for four points
+            or more. Of their squares the part that the deviations alone would give is left out.
 
         Returns
         -------
-        (N,) array, (N,) array or None
-            In Hz and without unit; None if the deviations of frequency or damping are not known.
+        (N, 2, 2) array or None
+            Covariances, with frequencies in Hz; None if the deviations of frequency or damping are
+            not known.
         """
         if self.frequency_deviation_hz is None or self.damping_deviation is None:
             return None
-        both = self.frequency_deviation_hz, self.damping_deviation
-        if self.amplitude_deviation is None or len(self) < 2:
-            return both
+        moved = (np.zeros(len(self)) if self.amplitude_deviation is None
+                 else self.amplitude_deviation / self.amplitude)
+        deviation = np.stack([moved, self.frequency_deviation_hz, self.damping_deviation], axis=1)
+        covariance = deviation[:, :, None] * deviation[:, None, :] * (
+            np.eye(3) if self.correlation is None else self.correlation)
+        turned = np.zeros((len(self), 2, 3))
+        turned[:, :, 0] = -(self._slopes() if slopes is None else np.asarray(slopes)).T
+        turned[:, 0, 1] = turned[:, 1, 2] = 1.0
+        return np.asarray(turned @ covariance @ np.swapaxes(turned, 1, 2))
+
+    def _slopes(self) -> Array:
+        """Slopes (2, N) of frequency and damping ratio over log amplitude."""
         level = np.log(self.amplitude)
         level -= level.mean()
-        degree = min(_DEGREE, len(self) - 1)
-        powers = np.vander(level, degree + 1, increasing=True)
+        powers = np.vander(level, min(_DEGREE, len(self) - 1) + 1, increasing=True)
         rates = np.zeros(powers.shape)
-        rates[:, 1:] = powers[:, :-1] * np.arange(1.0, degree + 1.0)
-        moved = self.amplitude_deviation / self.amplitude
+        rates[:, 1:] = powers[:, :-1] * np.arange(1.0, powers.shape[1])
         found = []
-        for values, deviation in zip((self.frequency_hz, self.damping_ratio), both, strict=True):
+        for values, deviation in ((self.frequency_hz, self.frequency_deviation_hz),
+                                  (self.damping_ratio, self.damping_deviation)):
+            assert deviation is not None
             # Slopes are the weighted values times these rows.
-            slopes = rates @ np.linalg.pinv(powers / deviation[:, None])
-            squares = (slopes @ (values / deviation)) ** 2 - (slopes**2).sum(axis=1)
-            found.append(np.sqrt(deviation**2 + np.maximum(squares, 0.0) * moved**2))
-        return found[0], found[1]
+            rows = rates @ np.linalg.pinv(powers / deviation[:, None])
+            slopes = rows @ (values / deviation)
+            squares = np.maximum(slopes**2 - (rows**2).sum(axis=1), 0.0)
+            found.append(np.copysign(np.sqrt(squares), slopes))
+        return np.stack(found)
 
     def summary(self) -> list[tuple[str, str]]:
         """Amplitudes, frequencies, damping ratios, and the note."""

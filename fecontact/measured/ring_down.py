@@ -43,7 +43,8 @@ def ring_down(
     lie. Linear decays are found exactly; where the rate bends, the bias is ``s'' <tau^4> / (6
     <tau^2>)``, about 0.0088 L^2 s''. Half a window at both ends has no points. The damping ratio is
     that of the action A^2 w, ``-(A'/A + w'/(2 w)) / |s|``, for which a frequency that changes with
-    the amplitude is no damping.
+    the amplitude is no damping. Deviations are those of the linearised fit under white noise; they
+    correlate where the vibration falls much within a window.
 
     Parameters
     ----------
@@ -92,25 +93,46 @@ def ring_down(
     scale = float(np.abs(x).max())
     if not scale > 0.0:
         raise AnalysisError("ring_down: all values are zero; there is no vibration to follow.")
-    amplitude, rate, bend, deviation = _local_fits(x / scale, middles, half, step, f)
+    amplitude, rate, bend, covariance = _local_fits(x / scale, middles, half, step, f)
     size = np.abs(rate)
     with np.errstate(invalid="ignore"):
-        kept = (np.isfinite(size) & (deviation[0] < _WEAK)
+        kept = (np.isfinite(size) & (covariance[:, 0, 0] < _WEAK**2)
                 & (np.abs(rate.imag / (2.0 * np.pi * f) - 1.0) < _LOBE / (2.0 * half * step * f)))
     if not kept.any():
         raise AnalysisError(f"ring_down: no window holds a vibration near {f:.5g} Hz that stands "
                             f"out from the rest; give its frequency, or a longer window.")
-    size, rate = size[kept], rate[kept]
-    ratio = -(rate.real + bend.imag[kept] / (2.0 * rate.imag)) / size
-    # Deviations of |s| and -Re s / |s| for equal and independent errors of both parts of s.
-    error = deviation[1][kept]
+    size, rate, bend = size[kept], rate[kept], bend[kept]
+    ratio = -(rate.real + bend.imag / (2.0 * rate.imag)) / size
+    covariance = _of_curve(covariance[kept], rate, bend, ratio, order)
+    deviation = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    found = scale * amplitude[kept] / size**order
     return AmplitudeCurve(
-        scale * amplitude[kept] / size**order, size / (2.0 * np.pi), ratio,
-        error / (2.0 * np.pi), error * np.sqrt(np.maximum(1.0 - ratio**2, 0.0)) / size,
-        t[middles[kept]], _displacement(series.unit, order), series.title,
+        found, size / (2.0 * np.pi), ratio, deviation[:, 1], deviation[:, 2], t[middles[kept]],
+        _displacement(series.unit, order), series.title,
         _note(half * step, int(np.count_nonzero(~kept)), len(kept)),
-        _noise_freedom(half, step, f, apart, len(middles)),
-        scale * amplitude[kept] / size**order * deviation[0][kept])
+        _noise_freedom(half, step, f, apart, len(middles)), found * deviation[:, 0],
+        covariance / (deviation[:, :, None] * deviation[:, None, :]))
+
+
+def _of_curve(
+    covariance: Array, rate: ComplexArray, bend: ComplexArray, ratio: Array, order: int
+) -> Array:
+    """Covariances (P, 3, 3) of log amplitude, frequency [Hz] and damping ratio.
+
+    They follow from those (P, 4, 4) of log |a|, both parts of s and the imaginary part of s_2.
+    """
+    size = np.abs(rate)
+    of_size = np.zeros((len(size), 4))  # change of log |s|
+    of_size[:, 1], of_size[:, 2] = rate.real / size**2, rate.imag / size**2
+    turned = np.zeros((len(size), 3, 4))
+    turned[:, 0] = -order * of_size
+    turned[:, 0, 0] += 1.0
+    turned[:, 1] = (size / (2.0 * np.pi))[:, None] * of_size
+    turned[:, 2] = -ratio[:, None] * of_size
+    turned[:, 2, 1] -= 1.0 / size
+    turned[:, 2, 2] += bend.imag / (2.0 * rate.imag**2 * size)
+    turned[:, 2, 3] -= 1.0 / (2.0 * rate.imag * size)
+    return np.asarray(turned @ covariance @ np.swapaxes(turned, 1, 2))
 
 
 def _displacement(unit: str, order: int) -> str:
@@ -163,7 +185,10 @@ def _half_window(t: Array, step: float, f: float, window: float) -> int:
 def _local_fits(
     x: Array, middles: Sequence[int] | Array, half: int, step: float, f: float
 ) -> tuple[Array, ComplexArray, ComplexArray, Array]:
-    """Amplitudes, rates s and s_2, and deviations (2, P) of log amplitude and both parts of s."""
+    """Amplitudes, rates s and s_2, and the covariance of their errors.
+
+    Covariances (P, 4, 4) are those of log amplitude, both parts of s, the imaginary part of s_2.
+    """
     from scipy.signal import windows as shapes
 
     tau = np.asarray(step * np.arange(-half, half + 1), dtype=np.float64)
@@ -171,12 +196,12 @@ def _local_fits(
     found = [_fits(np.stack([x[k - half : k + half + 1] for k in part]), tau, weights, f)
              for part in np.array_split(np.asarray(middles),
                                         max(1, len(middles) * len(tau) // _CHUNK))]
-    amplitude, rate, bend, unit, noise = (np.concatenate(parts, axis=-1) for parts in zip(
+    amplitude, rate, bend, unit, noise = (np.concatenate(parts) for parts in zip(
         *found, strict=True))
     count = min(_AVERAGED, len(noise))
     near = np.convolve(noise, np.ones(count), "same") / np.convolve(
         np.ones(len(noise)), np.ones(count), "same")
-    return amplitude, rate, bend, unit * np.sqrt(near)
+    return amplitude, rate, bend, unit * near[:, None, None]
 
 
 def _fits(
@@ -184,7 +209,7 @@ def _fits(
 ) -> tuple[Array, ComplexArray, ComplexArray, Array, Array]:
     """Results of :func:`_local_fits` for windows x (P, L).
 
-    Deviations are those for white noise of variance one; last comes the variance of the noise.
+    Covariances are those for white noise of variance one; last comes the variance of the noise.
     """
     length = float(tau[-1])
     u = tau / length
@@ -214,10 +239,16 @@ def _fits(
     inverse = np.linalg.pinv(normal)
     spread = inverse @ np.einsum("pkl,l,pjl->pkj", basis, weights**2, basis) @ inverse
     amplitude = np.asarray(np.abs(c[:, 0]), dtype=np.float64)
+    # Changes of log a, s and s_2 are those of c_0, c_1 and 2 c_2 over c_0.
     with np.errstate(all="ignore"):
-        of_a = np.sqrt(0.5 * (spread[:, 0, 0] + spread[:, 3, 3])) / amplitude
-        of_s = np.sqrt(0.5 * (spread[:, 1, 1] + spread[:, 4, 4])) / amplitude / length
-    return (amplitude, s / length, bend / length**2, np.stack([of_a, of_s]),
+        over = np.array([1.0, 1.0 / length, 2.0 / length**2]) / c[:, :1]
+    turned = np.zeros((count, 4, 6))
+    for row, power, part in ((0, 0, "real"), (1, 1, "real"), (2, 1, "imag"), (3, 2, "imag")):
+        turned[:, row, power] = getattr(over[:, power], part)
+        turned[:, row, 3 + power] = getattr(1j * over[:, power], part)
+    with np.errstate(all="ignore"):
+        covariance = turned @ spread @ np.swapaxes(turned, 1, 2)
+    return (amplitude, s / length, bend / length**2, covariance,
             _noise(residual * weights, tau, f) / float(weights @ weights))
 
 

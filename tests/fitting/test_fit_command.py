@@ -1,13 +1,21 @@
 """Fits that a study describes: its section, the command, and what goes wrong."""
 
 import json
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
 from report_reading import Shown
 
 import fecontact as fc
-from fecontact.fitting import FrequencyData, LoopData, fit_study, study_data
+from fecontact.fitting import (
+    FrequencyData,
+    LoopData,
+    fit_study,
+    profile_likelihood,
+    study_data,
+)
 from fecontact.study import FitParameter
 
 STUDY = """
@@ -156,11 +164,20 @@ def test_material_and_support_from_frequencies(tmp_path):
 
 
 @pytest.mark.long
-def test_two_processes_give_the_same(study):
+def test_several_processes_give_the_same(study, tmp_path):
     read = fc.Study.read(study)
-    alone, both = fit_study(read), fit_study(read, workers=2)
+    alone, both = fit_study(read), fit_study(read, workers=2, folder=tmp_path / "both")
     assert both.estimates.tolist() == alone.estimates.tolist()
     assert both.covariance.tolist() == alone.covariance.tolist()
+    assert [one.evaluations for one in both.starts] == [one.evaluations for one in alone.starts]
+    # What other processes evaluated is stored: nothing is left to evaluate.
+    again = fit_study(read, folder=tmp_path / "both")
+    assert [one.evaluations for one in again.starts] == [0, 0]
+    name = "friction.stiffness"
+    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
+        profiles = [profile_likelihood(alone, name, points=5),
+                    profile_likelihood(alone, name, points=5, executor=pool)]
+    assert profiles[0].chi_square.tolist() == profiles[1].chi_square.tolist()
 
 
 def test_kinds_of_data_of_a_study(study, tmp_path):

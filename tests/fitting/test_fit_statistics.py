@@ -5,8 +5,9 @@ import pytest
 from scipy.stats import binom, chi2, f, norm, t
 
 import fecontact as fc
-from fecontact.fitting import FunctionData, profile_likelihood
+from fecontact.fitting import DecayData, FunctionData, profile_likelihood
 from fecontact.laws import ConstantFriction, PrescribedForce
+from fecontact.measured import AmplitudeCurve
 from fecontact.plot import plot_fit, plot_profile
 from fecontact.study import FitParameter
 
@@ -64,6 +65,60 @@ def test_a_straight_line_has_the_covariance_of_linear_regression():
     assert found.system.ground.speed == pytest.approx(best[0])
     assert found.not_found == found.on_bounds == found.kinks == found.notes == ()
     assert set(found.derivatives.values()) == {"differences"}
+
+
+class Linear(DecayData):
+    """Frequency a + b ln A and damping ratio b / 10 - a ln A / 10 over the amplitude A."""
+
+    def at(self, system, amplitude):
+        a, b, level = (system.ground.speed, system.friction.friction_coefficient,
+                       np.log(amplitude))
+        return np.concatenate([a + b * level, 0.1 * b - 0.1 * a * level])
+
+
+def linear_curve(rng, truth=(0.3, 1.2)):
+    """A curve with correlated errors of log amplitude, frequency and damping ratio."""
+    level = np.linspace(1.0, 3.0, 30)
+    deviation = np.array([0.05, 0.03, 0.01])
+    correlation = np.array([[1.0, 0.5, -0.4], [0.5, 1.0, 0.3], [-0.4, 0.3, 1.0]])
+    e = deviation * (rng.standard_normal((30, 3)) @ np.linalg.cholesky(correlation).T)
+    A = np.exp(level + e[:, 0])
+    return AmplitudeCurve(
+        A, truth[0] + truth[1] * level + e[:, 1], 0.1 * truth[1] - 0.1 * truth[0] * level + e[:, 2],
+        np.full(30, 0.03), np.full(30, 0.01), amplitude_deviation=0.05 * A,
+        correlation=np.tile(correlation, (30, 1, 1))), correlation * np.outer(deviation, deviation)
+
+
+def test_errors_of_the_amplitude_count_by_the_slopes_of_the_model():
+    """Generalised least squares with the covariance of both errors at the fitted slopes."""
+    measured, errors = linear_curve(np.random.default_rng(8))
+    found = fc.fit(system(), RANGES, Linear(measured, None, 1.0))
+    a, b = found.estimates
+    turned = np.array([[-b, 1.0, 0.0], [0.1 * a, 0.0, 1.0]])
+    weight = np.linalg.inv(turned @ errors @ turned.T)
+    X = np.array([[[1.0, level], [-0.1 * level, 0.1]] for level in np.log(measured.amplitude)])
+    y = np.stack([measured.frequency_hz, measured.damping_ratio], axis=1)
+    covariance = np.linalg.inv(np.einsum("nki,kl,nlj->ij", X, weight, X))
+    best = covariance @ np.einsum("nki,kl,nl->i", X, weight, y)
+    assert (a, b) == pytest.approx(best, rel=1e-5)
+    assert found.covariance == pytest.approx(covariance, rel=1e-5)
+    r = y - X @ best
+    assert found.chi_square == pytest.approx(np.einsum("nk,kl,nl->", r, weight, r), rel=1e-5)
+    below, above = found.bands()[0]
+    rows = np.concatenate([X[:, 0], X[:, 1]])
+    half = 1.959964 * np.sqrt(np.einsum("ni,ij,nj->n", rows, covariance, rows))
+    assert 0.5 * (above - below) == pytest.approx(half, rel=1e-4)
+
+
+def test_intervals_of_correlated_curves_cover_the_truth():
+    inside = []
+    for seed in range(60):
+        found = fc.fit(system(), RANGES, Linear(
+            linear_curve(np.random.default_rng(seed))[0], None, 1.0))
+        inside += [low <= value <= high for (low, high), value in zip(
+            found.intervals().values(), (0.3, 1.2), strict=True)]
+    assert binom.cdf(sum(inside), 120, 0.95) > 1e-3
+    assert binom.sf(sum(inside) - 1, 120, 0.95) > 1e-3
 
 
 def test_without_deviations_they_follow_from_the_residuals():

@@ -68,10 +68,10 @@ def test_errors_of_the_amplitude_count_where_the_frequency_depends_on_it():
     for _ in range(200):
         found = ring_down(t, x + 0.03 * rng.standard_normal(len(t)), frequency_hz=36.0)
         error = found.frequency_hz - np.hypot(40.0 + 5.0 * np.log(found.amplitude), 1.0 / np.pi)
-        both = found.deviations_at_amplitude()
-        off.extend(error / both[0])
+        both = found.covariance_at_amplitude()
+        off.extend(error / np.sqrt(both[:, 0, 0]))
         alone.extend(error / found.frequency_deviation_hz)
-        assert both[1] == pytest.approx(found.damping_deviation, rel=0.05)
+        assert np.sqrt(both[:, 1, 1]) == pytest.approx(found.damping_deviation, rel=0.05)
     # Some 1400 values, between whose neighbours there is a correlation.
     assert np.std(off) == pytest.approx(1.0, abs=0.1)
     assert np.std(alone) > 1.3

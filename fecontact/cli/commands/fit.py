@@ -21,7 +21,7 @@ def fit(
     overwrite: Annotated[bool, Parameter(
         negative=(), help="Begin anew; otherwise a fit that was cancelled goes on.")] = False,
     workers: Annotated[int | None, Parameter(
-        help="Processes for the starts and walkers.")] = 1,
+        help="Processes that evaluate the model.")] = 1,
     posterior: Annotated[int | None, Parameter(
         help="Sample the posterior distribution by this number of steps, in place of those of "
              "[fit.posterior]; a larger number goes on.")] = None,
@@ -60,7 +60,8 @@ def fit(
         try:
             found = fit_study(described, workers=workers, folder=folder, overwrite=overwrite,
                               progress=True)
-            profiles = [profile_likelihood(found, name, points=settings.profile, folder=folder)
+            profiles = [profile_likelihood(found, name, points=settings.profile,
+                                           workers=workers, folder=folder)
                         for name in found.names if settings.profile]
             chains = None if settings.posterior is None else sampled(
                 found, **vars(settings.posterior), workers=workers, folder=folder,
