@@ -174,7 +174,8 @@ def _curve(study: Study, one: FitDataSettings) -> tuple[Any, dict[str, Any]]:
     if one.t_start is not None:
         options["t_start"] = one.t_start
     test = _measurement(study, one, "time", one.channel, even=True)
-    return ring_down(test, channel=test.index(one.channel), **options), options
+    return ring_down(test, channel=test.index(one.channel), resample=one.resample,
+                     **options), options
 
 
 def _frequencies(study: Study, one: FitDataSettings) -> FitData:

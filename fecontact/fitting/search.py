@@ -11,7 +11,7 @@ from fecontact.fitting.evaluations import Evaluator
 
 _TOLERANCE, _EVALUATIONS = 1e-9, 200
 # Searches with deviations that depend on the model, and change of places at which they end.
-_PASSES, _SETTLED = 10, 1e-5
+_PASSES, _SETTLED = 10, 1e-4
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from fecontact.measured.uff_functions import read_functions
 
 _SUFFIXES = (".csv", ".txt", ".dat", ".mat", ".h5", ".hdf5", ".tdms", ".uff", ".unv")
 _MOST = 10_000  # columns of a two-dimensional array of channels
+_MISSING = ("", "na", "n/a", "null", "none", "-", "--")  # texts for a number that is missing
 
 
 def read_measurements(
@@ -30,7 +31,7 @@ def read_measurements(
 
     - Text (.csv, .txt, .dat): a line of titles such as ``time [s], x [mm]``, columns below; the
       first column is the axis. ``H re`` and ``H im`` are one complex channel, ``H coherence`` is
-      the coherence of H.
+      the coherence of H. Empty cells and ``n/a`` are NaN.
     - MATLAB (.mat) and HDF5 (.h5): vectors, or columns of matrices, of the length of a vector
       called ``time``, ``t``, ``frequency`` or ``f``, at the top or in one structure or group; units
       from titles, from HDF5 attributes ``unit``, or from a structure ``units``.
@@ -112,7 +113,7 @@ def _read_text(path: Path, units: Mapping[str, str]) -> list[Measurement]:
     titles: list[str] = []
     rows: list[list[float]] = []
     for place, line in enumerate(lines, start=1):
-        words = cells(line) if line else []
+        words = _cells(line)
         values = [_value(word) for word in words]
         if not words or (not rows and None in values):
             titles = _titles(line) if words else titles
@@ -141,9 +142,16 @@ def _titles(line: str) -> list[str]:
     return re.findall(r"[^\s\[(]+(?:\s*[\[(][^\[\]()]*[\])])?", line)
 
 
+def _cells(line: str) -> list[str]:
+    """Cells of a line; those between commas may be empty."""
+    if re.search(r",\s*(,|$)", line) and not re.search(r'[;\t"]', line):
+        return [word.strip() for word in line.split(",")]
+    return cells(line) if line else []
+
+
 def _value(word: str) -> float | None:
-    """Number of a cell; NaN for an empty one."""
-    return float("nan") if not word else number(word)
+    """Number of a cell; NaN for an empty one, and for one that says that it has none."""
+    return float("nan") if word.lower() in _MISSING else number(word)
 
 
 def _read_mat(path: Path, units: Mapping[str, str]) -> list[Measurement]:

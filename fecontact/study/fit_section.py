@@ -146,6 +146,8 @@ class FitDataSettings:
         Frequency of the mode of a decay [Hz]; by default that of the highest peak.
     window : float
         Length of the windows of a decay, in periods.
+    resample : bool
+        Whether to interpolate a decay with uneven times by splines.
     mode : int
         Number of the linear mode of a backbone, from 1.
     harmonics : int
@@ -182,6 +184,7 @@ class FitDataSettings:
     about: Literal["none", "rest", "sliding"] = "none"
     frequency_hz: Annotated[float | None, Unit("Hz")] = None
     window: float = 10.0
+    resample: bool = False
     mode: int = 1
     harmonics: int = 5
     excitation: str | int = "B"

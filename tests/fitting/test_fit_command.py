@@ -308,6 +308,41 @@ def test_rows_without_numbers_are_left_out(study, cli):
     assert "chi square" in out
 
 
+def test_cells_without_numbers_are_left_out(study, cli):
+    """A channel that ends early, and a cell that says that it has none."""
+    def broken(lines):
+        return [lines[0], *(
+            line.rpartition(",")[0] + end for line, end in zip(
+                lines[1:], [", n/a", *(f",{line.rpartition(',')[2]}" for line in lines[2:30]),
+                            *[","] * 5], strict=True))]
+
+    changed_table(study, broken)
+    code, out, said = cli("fit", str(study), "--set", "fit.starts=1")
+    assert code == 0
+    assert "In 6 of 34 rows there is no number for 'force', 'pull'; the other rows" in said
+    assert "chi square" in out
+
+
+def test_decays_with_uneven_times_are_resampled(study, cli):
+    time = np.arange(0.0, 0.6, 2e-3) + 2e-4 * np.random.default_rng(1).random(300)
+    x = np.exp(-9.0 * time) * np.cos(250.0 * time)
+    (study.parent / "decay.csv").write_text("time [s], tip [m]\n" + "\n".join(
+        f"{t:.9f}, {v:.9g}" for t, v in zip(time, x, strict=True)))
+    study.write_text(STUDY.partition("[[fit.data]]")[0] + """
+[[fit.data]]
+kind = "ring-down"
+file = "decay.csv"
+t_end = 0.4
+""")
+    code, _, said = cli("fit", str(study))
+    assert code == 1
+    assert "or give resample = True" in said
+    study.write_text(study.read_text() + "resample = true\n")
+    (decay,) = study_data(fc.Study.read(study))
+    assert decay.curve.frequency_hz == pytest.approx(
+        np.full(len(decay.curve), np.hypot(250.0, 9.0) / (2.0 * np.pi)), rel=1e-4)
+
+
 def test_displacements_in_another_unit_are_asked_about(study, cli):
     changed_table(study, lambda lines: [lines[0].replace("[mm]", "[m]"), *lines[1:]])
     code, _, said = cli("fit", str(study), "--set", "fit.starts=1")

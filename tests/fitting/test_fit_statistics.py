@@ -100,10 +100,10 @@ def test_errors_of_the_amplitude_count_by_the_slopes_of_the_model():
     y = np.stack([measured.frequency_hz, measured.damping_ratio], axis=1)
     covariance = np.linalg.inv(np.einsum("nki,kl,nlj->ij", X, weight, X))
     best = covariance @ np.einsum("nki,kl,nl->i", X, weight, y)
-    assert (a, b) == pytest.approx(best, rel=1e-5)
-    assert found.covariance == pytest.approx(covariance, rel=1e-5)
+    assert (a, b) == pytest.approx(best, rel=1e-4)
+    assert found.covariance == pytest.approx(covariance, rel=1e-4)
     r = y - X @ best
-    assert found.chi_square == pytest.approx(np.einsum("nk,kl,nl->", r, weight, r), rel=1e-5)
+    assert found.chi_square == pytest.approx(np.einsum("nk,kl,nl->", r, weight, r), rel=1e-4)
     below, above = found.bands()[0]
     rows = np.concatenate([X[:, 0], X[:, 1]])
     half = 1.959964 * np.sqrt(np.einsum("ni,ij,nj->n", rows, covariance, rows))
