@@ -43,8 +43,7 @@ def ring_down(
     lie. Linear decays are found exactly; where the rate bends, the bias is ``s'' <tau^4> / (6
     <tau^2>)``, about 0.0088 L^2 s''. Half a window at both ends has no points. The damping ratio is
     that of the action A^2 w, ``-(A'/A + w'/(2 w)) / |s|``, for which a frequency that changes with
-    the amplitude is no damping. Deviations are those of the linearised fit under white noise; they
-    correlate where the vibration falls much within a window.
+    the amplitude is no damping.
 
     Parameters
     ----------
@@ -69,7 +68,7 @@ def ring_down(
     Returns
     -------
     AmplitudeCurve
-        One point for each window, with standard deviations by the noise beside the mode.
+        One point for each window, with deviations and correlations by the noise beside the mode.
 
     Raises
     ------
