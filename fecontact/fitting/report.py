@@ -19,9 +19,8 @@ from fecontact.fitting.posterior import Posterior
 from fecontact.fitting.profile import ProfileLikelihood
 from fecontact.fitting.result import Fit
 from fecontact.output.report.charts import diagram_table
-from fecontact.output.report.page import page_block, write_page
+from fecontact.output.report.page import page_block, require_page, write_page
 from fecontact.output.report.payload import Payload
-from fecontact.output.report.run_report import require_page
 
 _NAMED = 0.02  # least component of a combination that is written
 

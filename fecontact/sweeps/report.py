@@ -10,9 +10,9 @@ import numpy as np
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.units import UNITS, quantity, suitable_unit
-from fecontact.output.report.page import page_block, write_page
+from fecontact.output.report.page import page_block, require_page, write_page
 from fecontact.output.report.payload import Payload
-from fecontact.output.report.run_report import colour_maps, require_page
+from fecontact.output.report.run_report import colour_maps
 from fecontact.sweeps.summaries import unit_of
 from fecontact.sweeps.table import SweepTable, is_numeric
 

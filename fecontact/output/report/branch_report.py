@@ -21,7 +21,7 @@ from fecontact.output.report.diagram_page import (
     sampled,
     write_diagrams,
 )
-from fecontact.output.report.run_report import require_page
+from fecontact.output.report.page import require_page
 
 COLUMNS = ("point", "parameter", "period", "frequency", "stability", "note")
 

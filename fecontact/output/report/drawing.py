@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from fecontact.core.types import Array, Integers
+from fecontact.fem.elements.cell_kinds import numbered_rows, unordered
 from fecontact.fem.faces.surface import as_triangles
 from fecontact.output.files.contact_facets import contact_facets
 from fecontact.output.render.frames_data import body_labels
@@ -110,8 +111,7 @@ def _drawn_solids(
     facets, n = field.outline, basis.contact_nodes
     patches = contact_facets(basis)
     # Places of the facets of patches in the outline, by their nodes.
-    known = np.sort(np.concatenate([facets, patches.facets]), axis=1)
-    number = np.unique(known, axis=0, return_inverse=True)[1].ravel()
+    number = numbered_rows(unordered(np.concatenate([facets, patches.facets])))[1]
     found = np.full(number.max() + 1, -1)
     found[number[len(facets):]] = patches.owner
     owner = found[number[: len(facets)]]

@@ -13,7 +13,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.units import quantity
 from fecontact.output.diagrams.branches import mode_diagrams
 from fecontact.output.report.diagram_page import SAMPLES, Shown, sampled, write_diagrams
-from fecontact.output.report.run_report import require_page
+from fecontact.output.report.page import require_page
 from fecontact.system.contact_system import ContactSystem
 
 

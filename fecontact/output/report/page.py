@@ -12,6 +12,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal
 
+from fecontact.core.checks import as_path
 from fecontact.core.errors import InputError, ModelWarning
 from fecontact.core.files.atomic_write import write_text
 from fecontact.core.tables import parsed
@@ -98,6 +99,14 @@ def write_page(path: Path, title: str, block: bytes, kind: Kind = "run") -> Path
                       f"fewer outputs of the run, or report a part of it.", ModelWarning,
                       stacklevel=3)
     write_text(path, text)
+    return path
+
+
+def require_page(path: str | Path) -> Path:
+    """The path of a page; InputError for another suffix."""
+    path = as_path(path, "a report")
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{path} must end in .html: a report is a page.")
     return path
 
 

@@ -13,7 +13,7 @@ from fecontact.core.units import quantity
 from fecontact.output.diagrams.branches import level_texts, response_diagrams
 from fecontact.output.report.branch_report import COLUMNS, shown_of
 from fecontact.output.report.diagram_page import point_texts, write_diagrams
-from fecontact.output.report.run_report import require_page
+from fecontact.output.report.page import require_page
 from fecontact.system.contact_system import ContactSystem
 
 

@@ -14,9 +14,8 @@ from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.diagrams.colours import distinct_colours
 from fecontact.output.diagrams.diagram import Curve, Diagram
 from fecontact.output.report.charts import diagram_table, spectrum_table
-from fecontact.output.report.page import page_block, write_page
+from fecontact.output.report.page import page_block, require_page, write_page
 from fecontact.output.report.payload import Payload
-from fecontact.output.report.run_report import require_page
 
 _OUTPUTS = 4000  # of the common time of all runs
 

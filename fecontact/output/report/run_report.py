@@ -12,7 +12,7 @@ from fecontact.analysis.histories import Point
 from fecontact.analysis.key_numbers import key_numbers
 from fecontact.analysis.run_facts import notes, run_facts
 from fecontact.analysis.sampling import alias_message
-from fecontact.core.checks import as_path, require_kind, require_scale
+from fecontact.core.checks import require_kind, require_scale
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.core.units import quantity
@@ -24,11 +24,10 @@ from fecontact.output.report.bodies import PRESSURE, STATE, Motions, bodies_tabl
 from fecontact.output.report.charts import chart_tables, energy_charts, spectrum_tables
 from fecontact.output.report.contact import contact_of_run, ground_table, state_colours
 from fecontact.output.report.drawing import drawn_bodies
-from fecontact.output.report.page import page_block, write_page
+from fecontact.output.report.page import page_block, require_page, write_page
 from fecontact.output.report.payload import Payload
 
 _SHADES = 64  # of a colour map
-_PAINTS = {"von_mises": "von Mises stress"}
 
 
 def report(
@@ -178,16 +177,9 @@ def colour_maps() -> dict[str, list[list[int]]]:
     """Colours of displacement, von Mises stress, pressure and signed components, 0 to 255."""
     from matplotlib import colormaps
 
+    names = {"displacement": COLOUR_MAPS["displacement"],
+             "von Mises stress": COLOUR_MAPS["von_mises"], PRESSURE: "viridis",
+             "component": "coolwarm"}
     at = np.linspace(0.0, 1.0, _SHADES)
     return {what: np.asarray(colormaps[name](at, bytes=True))[:, :3].astype(int).tolist()
-            for what, name in {**{_PAINTS.get(what, what): name
-                                  for what, name in COLOUR_MAPS.items()},
-                               PRESSURE: "viridis", "component": "coolwarm"}.items()}
-
-
-def require_page(path: str | Path) -> Path:
-    """The path of a page; InputError for another suffix."""
-    path = as_path(path, "a report")
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{path} must end in .html: a report is a page.")
-    return path
+            for what, name in names.items()}
