@@ -1,6 +1,6 @@
 """Stiffness and mass of elastic bodies, assembled by compiled loops over the cells.
 
-Cells that are images of the reference cell under an affine map need no quadrature of their own:
+Cells that are images of the reference cell under an affine map share its quadrature:
 with the inverse Jacobian J of the map and the integrals over the reference cell
 
     G_ij,ab = int d_a phi_i d_b phi_j,      H_ij,pq = |det| sum_ab J_ap J_bq G_ij,ab
@@ -38,7 +38,6 @@ from fecontact.core.records import (
 from fecontact.core.types import Array, Integers
 from fecontact.fem.element_block import ElementBlock
 from fecontact.fem.elements.cell_kinds import CellKind, padded, shape_functions
-from fecontact.fem.elements.quadrature import rule
 
 # Largest difference between the edges of a cell whose map counts as affine, relative to them.
 _AFFINE = 1e-13
@@ -56,8 +55,8 @@ def assembled(
     Parameters
     ----------
     blocks : sequence of ElementBlock
-        Elements of each kind with N nodes in all, straight or curved. Their quadrature is used in
-        cells whose map is not affine; the others are exact.
+        Elements of each kind with N nodes in all, straight or curved. Those with mean strain get
+        no stiffness, see :mod:`fecontact.fem.mean_strain`.
     lateral, shear : float or (c,) array
         Lame's constants lambda and mu of a solid or in plane strain [Pa]; in plane stress
         ``nu E / (1 - nu^2)`` and mu; of all cells or of each.
@@ -102,10 +101,8 @@ def assembled(
             inverse, scale = _inverse_jacobians(places, corners[which], block.kind)
             _add_affine(which, inverse, scale, *_reference_integrals(block), material, out)
         if not affine.all():
-            values, slopes = _shapes(dimension, block.nodes.shape[1], block.local)
-            stretch = _shapes(dimension, block.geometry, block.local)[1]
-            _add_quadrature(np.flatnonzero(~affine), places, corners, Quadrature(
-                np.array(block.weights), stretch, values, slopes), material, out)
+            _add_quadrature(np.flatnonzero(~affine), places, corners, _quadrature(block), material,
+                            out)
     return (sp.bsr_array((entries, indices, indptr), shape=(dimension * size,) * 2),
             sp.csr_array((mass, indices, indptr), shape=(size, size)))
 
@@ -263,12 +260,24 @@ def _shapes(dimension: int, count: int, at: Array) -> tuple[Array, Array]:
 
 def _reference_integrals(block: ElementBlock) -> tuple[Array, Array]:
     """Integrals of the products of slopes (k, k, 3, 3) and values (k, k) of shape functions."""
-    kind = block.kind
-    # Exact for quadratic functions; per direction where the cell is no simplex.
-    at, weights = rule(kind.dimension, kind.corners, 4)
-    values, slopes = _shapes(kind.dimension, block.nodes.shape[1], at)
-    return (np.einsum("q,qia,qjb->ijab", weights, slopes, slopes),
-            np.einsum("q,qi,qj->ij", weights, values, values))
+    rule = _quadrature(block)
+    return (np.einsum("q,qia,qjb->ijab", rule.weights, rule.slopes, rule.slopes),
+            np.einsum("q,qi,qj->ij", rule.masses, rule.values, rule.values))
+
+
+def _quadrature(block: ElementBlock) -> "Quadrature":
+    """Points of stiffness and of mass, each with the weight zero in the other integral."""
+    local, masses = block.mass_rule
+    weights = np.zeros(len(masses))
+    if np.array_equal(local, block.local):
+        weights = np.array(block.weights)
+    elif not block.has_mean_strain:
+        local = np.concatenate([block.local, local])
+        weights = np.append(block.weights, weights)
+        masses = np.append(np.zeros(len(block.weights)), masses)
+    values, slopes = _shapes(block.kind.dimension, block.nodes.shape[1], local)
+    stretch = _shapes(block.kind.dimension, block.geometry, local)[1]
+    return Quadrature(weights, np.array(masses), stretch, values, slopes)
 
 
 @helper
@@ -305,11 +314,12 @@ class Entries(NamedTuple):
 class Quadrature(NamedTuple):
     """Rule of q points in a reference cell.
 
-    ``weights`` (q,), slopes ``stretch`` (q, g, 3) of the map of the cell, and ``values`` (q, k) and
-    ``slopes`` (q, k, 3) of the shape functions.
+    ``weights`` and ``masses`` (q,) for stiffness and mass, slopes ``stretch`` (q, g, 3) of the map
+    of the cell, and ``values`` (q, k) and ``slopes`` (q, k, 3) of the shape functions.
     """
 
     weights: Vector
+    masses: Vector
     stretch: Block
     values: Matrix
     slopes: Block
@@ -395,10 +405,11 @@ def _add_quadrature(
                 for p in range(3):
                     slope[i, p] = (slopes[point, i, 0] * I[0, p] + slopes[point, i, 1] * I[1, p]
                                    + slopes[point, i, 2] * I[2, p]) / volume
+            size = abs(volume) * rule.masses[point]
             volume = abs(volume) * weights[point]
             for i in range(width):
                 for j in range(i, width):
-                    own[i, j] += volume * values[point, i] * values[point, j]
+                    own[i, j] += size * values[point, i] * values[point, j]
                     for p in range(3):
                         along = volume * slope[i, p]
                         for q in range(3):

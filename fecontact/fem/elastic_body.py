@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import (
@@ -46,12 +47,13 @@ from fecontact.fem.elements.cell_kinds import (
     padded,
     row_numbers,
 )
-from fecontact.fem.elements.quadrature import rule_of
+from fecontact.fem.elements.quadrature import Integration, rule_of, stiffness_rule
 from fecontact.fem.elimination import Elimination, eliminated
 from fecontact.fem.equations import Unknowns
 from fecontact.fem.incompatible_modes import reductions
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
-from fecontact.fem.mesh import Bricks, Mesh
+from fecontact.fem.mean_strain import stiffness as mean_strain_stiffness
+from fecontact.fem.mesh import Bricks, Mesh, check_integration
 from fecontact.fem.reference_motions import displacement_rows, reference_motions
 from fecontact.fem.supports import HingeSupport, check_supports, fixed_dofs, hinges
 
@@ -98,9 +100,18 @@ class ElasticBody(Summarised):
         ``'incompatible'`` lets hexahedra with ``degree = 1`` bend without locking, see
         :mod:`fecontact.fem.incompatible_modes`. ``'serendipity'`` with ``degree = 2`` are elements
         of 8, 20, 15 and 13 nodes, without those in the middles of faces and cells.
+    integration : 'exact', 'full', 'reduced' or mapping of name to these, optional
+        Points of quadrature of the stiffness, see :mod:`fecontact.fem.elements.quadrature`; by
+        default those of the mesh. ``'full'`` and ``'reduced'`` are those of the elements of Abaqus,
+        CalculiX and Ansys. Reduced elements of degree 1 have a mean strain and hourglass stiffness,
+        see :mod:`fecontact.fem.mean_strain`. A mapping gives the rule of groups of cells; others
+        are integrated fully.
     attachments : sequence of PointMass or PointSpring, optional
         Masses, springs and dashpots at points, see :mod:`fecontact.fem.attachments`; by default
         those of the mesh, which a file may hold.
+    hourglass : float
+        Stiffness of hourglasses over the shear modulus, above zero, see
+        :mod:`fecontact.fem.mean_strain`.
 
     Raises
     ------
@@ -118,7 +129,9 @@ class ElasticBody(Summarised):
     fixed: Mapping[str, str] = field(default_factory=dict)
     constraints: Sequence[Constraint] | None = None
     bricks: Bricks | None = None
+    integration: Integration | Mapping[str, Integration] | None = None
     attachments: Sequence[Attachment] | None = None
+    hourglass: float = 0.005
 
     def __post_init__(self) -> None:
         require_kind("ElasticBody", Mesh, mesh=self.mesh)
@@ -128,7 +141,7 @@ class ElasticBody(Summarised):
         require_kind("ElasticBody", Mapping, fixed=self.fixed)
         for name, directions in self.fixed.items():
             require_kind("ElasticBody: fixed", str, name=name, directions=directions)
-        require_positive("ElasticBody", thickness=self.thickness)
+        require_positive("ElasticBody", thickness=self.thickness, hourglass=self.hourglass)
         if self.plane not in ("stress", "strain"):
             raise InputError(f"ElasticBody: plane = {self.plane!r} must be 'stress' or 'strain'.")
         if self.degree not in (1, 2) or type(self.degree) is not int:
@@ -139,6 +152,9 @@ class ElasticBody(Summarised):
         if self.bricks is None:
             object.__setattr__(self, "bricks", self.mesh.bricks)
         require_choice("ElasticBody", "bricks", self.bricks, get_args(Bricks))
+        if self.integration is None:
+            object.__setattr__(self, "integration", self.mesh.integration)
+        check_integration("ElasticBody", self.integration, self.mesh.cell_groups)
         _ = self.anisotropic
         if self.constraints is not None:
             require_kind("ElasticBody", Sequence, constraints=self.constraints)
@@ -162,7 +178,7 @@ class ElasticBody(Summarised):
         return [
             ("mesh", f"{mesh.cells_in_words}{curved}, {len(mesh.nodes)} nodes, degree "
              f"{self.degree}{', incompatible modes' if self.has_incompatible_modes else ''}"
-             f"{', serendipity' if self.serendipity else ''}"),
+             f"{', serendipity' if self.serendipity else ''}{self._integration_in_words}"),
             *((axis, span(values, "m")) for axis, values in zip("xyz", mesh.nodes.T, strict=False)),
             ("thickness", f"{self.thickness:.4g} m, plane {self.plane}") if self.dimension == 2
             else ("volume", f"{mesh.volume:.4g} m³"),
@@ -173,10 +189,25 @@ class ElasticBody(Summarised):
         ]
 
     @property
+    def _integration_in_words(self) -> str:
+        some = len(set(self._integrations.tolist())) > 1
+        return f", reduced integration{' of some' * some}" * (
+            "reduced" in self._integrations)
+
+    @property
     def has_incompatible_modes(self) -> bool:
-        """True for eight-node bricks with incompatible modes."""
-        return (self.dimension, self.degree, self.bricks) == (3, 1, "incompatible") and (
-            HEXAHEDRON.name in self.mesh.cell_counts)
+        """True if some bricks of eight nodes have incompatible modes."""
+        return any(block.incompatible for block in self.blocks)
+
+    @property
+    def has_reduced_integration(self) -> bool:
+        """True if some elements of degree 2 have fewer points than full integration has."""
+        return self.degree == 2 and "reduced" in self._integrations
+
+    @property
+    def has_mean_strain(self) -> bool:
+        """True if some elements of degree 1 have a mean strain and hourglass stiffness."""
+        return any(block.has_mean_strain for block in self.blocks)
 
     @property
     def serendipity(self) -> bool:
@@ -246,14 +277,32 @@ class ElasticBody(Summarised):
         """Elements of each kind, with their rule of quadrature."""
         found = []
         for number, block in enumerate(self.mesh.blocks):
-            kind = block.kind
+            kind, own = block.kind, self._integrations[block.numbers]
             members = (block.ordered if self.degree == 1 else self.mesh._second_order.members[
                 number][:, : kind.count(2, self.serendipity)])
-            found.append(ElementBlock(
-                kind, block.numbers, np.ascontiguousarray(members), self.nodes,
-                members.shape[1] if self.curved else kind.corners,
-                *rule_of(kind, self.degree, self.curved)))
+            count = members.shape[1]
+            for integration in get_args(Integration):
+                rows = np.flatnonzero(own == integration)
+                if len(rows):
+                    found.append(ElementBlock(
+                        kind, block.numbers[rows], np.ascontiguousarray(members[rows]), self.nodes,
+                        count if self.curved else kind.corners,
+                        *stiffness_rule(kind, count, self.curved, integration),
+                        rule_of(kind, self.degree, self.curved),
+                        self.bricks == "incompatible" and integration != "reduced"
+                        and (kind, self.degree) == (HEXAHEDRON, 1)))
         return tuple(found)
+
+    @property
+    def _integrations(self) -> NDArray[np.str_]:
+        """Rule (M,) of each cell, by its name."""
+        given = self.integration
+        if not isinstance(given, Mapping):
+            return np.full(len(self.mesh.cells), given)
+        found = np.full(len(self.mesh.cells), "full", dtype="<U8")
+        for name, integration in given.items():
+            found[self.mesh.cell_groups[name]] = integration
+        return found
 
     def parts(self, cells: Integers | None = None) -> Iterator[ElementBlock]:
         """Elements of all or the given cells, in parts of one kind whose matrices fit in memory."""
@@ -320,11 +369,13 @@ class ElasticBody(Summarised):
                        f", by a larger element_size, or {plain} or degree = 1")
         _, lateral, shear = self.elasticity.T
         K, M = assembled(self.blocks, lateral, shear, self.densities, self.anisotropic)
-        if self.has_incompatible_modes:
-            for part in self.parts():
-                if part.kind == HEXAHEDRON:
+        for block in self.blocks:
+            for part in block.parts() if block.incompatible or block.has_mean_strain else ():
+                if part.incompatible:
                     lower = reductions(self, part)
                     subtract(K, part.nodes, np.swapaxes(lower, 1, 2) @ lower)
+                else:
+                    subtract(K, part.nodes, -mean_strain_stiffness(self, part))
         return K, M
 
     @cached_property
@@ -599,7 +650,7 @@ def _nodal_gradients(blocks: Sequence[ElementBlock], chosen: Any = None) -> tupl
         size = nodes.shape[1]
         around += np.bincount(nodes.ravel(), np.repeat(volumes, size), minlength=count)
         own = volumes if chosen is None else volumes * chosen[block.numbers]
-        gradients = block.gradients_at(block.at_nodes)[0] * own[:, None, None, None]
+        gradients = block.nodal_gradients() * own[:, None, None, None]
         slopes.append(gradients.reshape(-1, d))
         rows.append(np.repeat(nodes, size, axis=1).ravel())
         columns.append(np.tile(nodes, size).ravel())

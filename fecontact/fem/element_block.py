@@ -9,6 +9,7 @@ import numpy as np
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elements.cell_kinds import CellKind, shape_functions
+from fecontact.fem.elements.quadrature import extrapolation
 
 # Directions of the components of a strain, by dimension.
 PAIRS = {2: ((0, 0), (1, 1), (0, 1)), 3: ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))}
@@ -35,7 +36,11 @@ class ElementBlock:
         Number of the leading nodes whose shape functions map the reference cell: the corners, or
         all of elements that follow curved edges.
     local, weights : (q, d) and (q,) arrays
-        Rule of quadrature over the reference cell.
+        Rule of quadrature of the stiffness over the reference cell.
+    mass_rule : (p, d) and (p,) arrays
+        Rule of quadrature of the mass.
+    incompatible : bool
+        True for bricks with incompatible modes, see :mod:`fecontact.fem.incompatible_modes`.
     """
 
     kind: CellKind
@@ -45,6 +50,8 @@ class ElementBlock:
     geometry: int
     local: Array
     weights: Array
+    mass_rule: tuple[Array, Array]
+    incompatible: bool = False
 
     def only(self, rows: Any) -> "ElementBlock":
         """Some of the elements, by their rows."""
@@ -65,9 +72,38 @@ class ElementBlock:
 
         The volumes of a plane body are areas [m^d].
         """
+        if self.has_mean_strain:
+            gradients, volumes = self.exact.gradients()
+            volume = volumes.sum(axis=1, keepdims=True)
+            return np.einsum("eqkd,eq->ekd", gradients, volumes / volume)[:, None], volume
         gradients, determinants = self.gradients_at(self.local)
         # Rules of tetrahedra have negative weights.
         return gradients, np.abs(determinants) * self.weights
+
+    @property
+    def exact(self) -> "ElementBlock":
+        """The elements with the rule of their mass for all integrals."""
+        local, weights = self.mass_rule
+        return replace(self, local=local, weights=weights)
+
+    @property
+    def has_mean_strain(self) -> bool:
+        """True for quadrilaterals and hexahedra that have one strain, the mean over the element.
+
+        They get a stiffness against hourglasses, see :mod:`fecontact.fem.mean_strain`.
+        """
+        return len(self.weights) == 1 and self.kind.has_centre
+
+    def nodal_gradients(self) -> Array:
+        """Gradients (e, k, k, d), at each node, of shape functions.
+
+        Elements with fewer points of quadrature than the exact rule has get those extrapolated
+        from these points, where strains are most accurate.
+        """
+        if self.incompatible or len(self.weights) == len(self.mass_rule[1]):
+            return self.gradients_at(self.at_nodes)[0]
+        weights = extrapolation(self.kind, self.nodes.shape[1], self.local)
+        return np.einsum("nq,eqkd->enkd", weights, self.gradients()[0])
 
     def gradients_at(self, local: Array) -> tuple[Array, Array]:
         """Gradients (e, q, k, d) and determinants (e, q) of the map at local coordinates (q, d)."""
@@ -89,3 +125,4 @@ class ElementBlock:
         """Volume (e,) of each element, in the plane its area [m^d]."""
         return np.concatenate([np.empty(0), *(part.gradients()[1].sum(axis=1)
                                               for part in self.parts())])
+

@@ -16,7 +16,6 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.element_block import PAIRS
 from fecontact.fem.elements.cell_geometry import oriented, sides_of
 from fecontact.fem.elements.cell_kinds import (
-    HEXAHEDRON,
     blocks_of,
     numbered_rows,
     padded,
@@ -231,8 +230,8 @@ def _stress_by_cells(
         for some in np.array_split(rows, parts):
             part = block.only(some)
             # grad (e, n, i, j, m): derivative of displacement i in direction j at node n
-            grad = np.einsum("enkj,ekim->enijm", part.gradients_at(local)[0], fields[part.nodes])
-            if body.has_incompatible_modes and block.kind == HEXAHEDRON:
+            grad = np.einsum("enkj,ekim->enijm", part.nodal_gradients(), fields[part.nodes])
+            if part.incompatible:
                 grad += mode_gradients(body, part, displacements, local, factors)
             strains = np.stack([_strain(grad, i, j, finite) for i, j in PAIRS[d]], axis=2)
             of_strain = body.cell_stiffness(part.numbers)[:, :components, used]

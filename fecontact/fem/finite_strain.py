@@ -29,11 +29,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import kernel
+from fecontact.core.errors import InputError
 from fecontact.core.records import Array4, Block, IntegerMatrix, Matrix, ShortBlock
 from fecontact.core.types import Array
 from fecontact.fem.assembly import pattern
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.elements.cell_kinds import HEXAHEDRON
 from fecontact.fem.elimination import selects
 from fecontact.fem.fields import stress_of
 from fecontact.fem.finite_rotations import FiniteRotations
@@ -105,6 +105,12 @@ class FiniteStrainModel:
     body: ElasticBody
     geometric: Any = None
 
+    def __post_init__(self) -> None:
+        if self.body.has_mean_strain:
+            raise InputError("Large deflections are for elements without hourglass stiffness; give "
+                             "the body integration = 'full', with bricks = 'incompatible' where "
+                             "cells of degree 1 lock.")
+
     @cached_property
     def _blocks(self) -> list[Cells]:
         """Cells by kind."""
@@ -112,7 +118,7 @@ class FiniteStrainModel:
         used, found = USED[body.dimension], []
         for block in body.blocks:
             (gradients, volumes), members = block.gradients(), block.nodes
-            if body.has_incompatible_modes and block.kind == HEXAHEDRON:
+            if block.incompatible:
                 count = len(members)
                 gradients = np.ascontiguousarray(np.concatenate(
                     [gradients, bubble_gradients(block)], axis=2))
@@ -126,9 +132,8 @@ class FiniteStrainModel:
     @property
     def nodes(self) -> int:
         """Number of nodes, those of incompatible modes included."""
-        bricks = self.body.mesh.cell_counts.get(HEXAHEDRON.name, 0)
-        extra = 3 * bricks if self.body.has_incompatible_modes else 0
-        return len(self.body.nodes) + extra
+        return len(self.body.nodes) + sum(3 * len(block.nodes) for block in self.body.blocks
+                                          if block.incompatible)
 
     @cached_property
     def expansion(self) -> Any:

@@ -19,7 +19,7 @@ import numpy as np
 
 from fecontact.core.types import Array
 from fecontact.fem.element_block import ElementBlock
-from fecontact.fem.elements.cell_kinds import HEXAHEDRON, shape_functions
+from fecontact.fem.elements.cell_kinds import shape_functions
 
 # Rows of the strains xx, yy, zz, xy, yz, xz to which a derivative (first) of a component (second)
 # belongs.
@@ -47,7 +47,7 @@ def mode_gradients(
         fields = (fields - fields[:, :1]).reshape(len(part.nodes), 24, -1)
         given = -np.linalg.solve(own, coupling @ fields).reshape(len(part.nodes), 3, 3, -1)
     else:
-        bricks = next(block for block in body.blocks if block.kind == HEXAHEDRON)
+        bricks = next(block for block in body.blocks if block.incompatible)
         rows = np.searchsorted(bricks.numbers, part.numbers)
         given = factors.reshape(-1, 3, 3, factors.shape[1])[rows]
     _, bubbles, _ = _slopes(part, local)

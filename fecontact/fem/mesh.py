@@ -36,6 +36,7 @@ from fecontact.fem.elements.cell_kinds import (
     unordered,
     widths,
 )
+from fecontact.fem.elements.quadrature import Integration
 from fecontact.fem.elements.refinement import (
     SecondOrder,
     at_second_order,
@@ -48,6 +49,17 @@ from fecontact.fem.material import AnyMaterial
 # Elements that are no triangles and tetrahedra: with all their nodes; with incompatible modes, of
 # degree 1; without nodes in the middles of faces and cells, of degree 2.
 Bricks = Literal["full", "incompatible", "serendipity"]
+
+
+def check_integration(owner: str, given: Any, groups: Mapping[str, Integers]) -> None:
+    """InputError unless ``given`` is a rule of quadrature, or such of groups of cells."""
+    require_kind(owner, (str, Mapping), integration=given)
+    for name, rule in given.items() if isinstance(given, Mapping) else [("", given)]:
+        if name and name not in groups:
+            raise InputError(f"{owner}: integration names '{name}', which is no group of cells of "
+                             f"the mesh{nearest(name, groups)}; its groups of cells are: "
+                             f"{choices(groups)}.")
+        require_choice(owner, "integration", rule, get_args(Integration))
 
 
 class _Checked:
@@ -164,6 +176,9 @@ class Mesh(Summarised):
         Materials of groups of cells that a file holds, for bodies of this mesh; none by default.
     bricks : 'full', 'incompatible' or 'serendipity'
         Kind of the elements of a file, for bodies of this mesh, see :class:`fecontact.ElasticBody`.
+    integration : 'exact', 'full', 'reduced', or mapping of name to these
+        Points of quadrature of the elements of a file, for bodies of this mesh, see
+        :class:`fecontact.ElasticBody`; a mapping names groups of cells.
     attachments : sequence of PointMass or PointSpring
         Masses and springs at points that a file holds, for bodies of this mesh; none by default.
     temperature : (N,) or (N + E,) array
@@ -190,6 +205,7 @@ class Mesh(Summarised):
     cell_groups: Mapping[str, Integers] = field(default_factory=dict)
     materials: Mapping[str, AnyMaterial] = field(default_factory=dict)
     bricks: Bricks = "full"
+    integration: Integration | Mapping[str, Integration] = "exact"
     attachments: Sequence[Attachment] = ()
     temperature: Array | None = None
     node_numbers: Integers | None = None
@@ -292,6 +308,7 @@ class Mesh(Summarised):
                                 f"{len(cells) - 1}, at least one.")
             group.setflags(write=False)
         object.__setattr__(self, "cell_groups", groups)
+        check_integration("Mesh", self.integration, groups)
 
     @property
     def dimension(self) -> int:
@@ -459,7 +476,7 @@ class Mesh(Summarised):
                   for name, group in self.cell_groups.items()}
         constraints = [one.refined(self.middle_node) for one in self.constraints]
         return Mesh(nodes, cells, boundaries, self.points, curved, middles, constraints, groups,
-                    self.materials, self.bricks,
+                    self.materials, self.bricks, self.integration,
                     [one.refined(self.middle_node) for one in self.attachments],
                     None if self.temperature is None else at_second_order(self, self.temperature))
 
@@ -521,7 +538,8 @@ class Mesh(Summarised):
         return Mesh(nodes, self.cells, self.boundaries, self.points, self.curved_edges, middles,
                     [one.turned(turn * signs, by) for one in self.constraints], self.cell_groups,
                     {name: one.moved(whole, arm) for name, one in self.materials.items()},
-                    self.bricks, [one.turned(turn * signs, by) for one in self.attachments],
+                    self.bricks, self.integration,
+                    [one.turned(turn * signs, by) for one in self.attachments],
                     self.temperature, self.node_numbers)
 
     def part(self, cells: Any) -> "Mesh":
@@ -568,12 +586,15 @@ class Mesh(Summarised):
         place[kept] = np.arange(len(kept))
         groups = {name: place[members] for name, members in self.cell_groups.items()}
         points = {name: number[np.atleast_1d(nodes)] for name, nodes in self.points.items()}
+        groups = _left(groups, lambda members: members >= 0)
+        rules = self.integration if isinstance(self.integration, str) else {
+            name: rule for name, rule in self.integration.items() if name in groups}
         return replace(
-            made, bricks=self.bricks, materials=self.materials,
+            made, bricks=self.bricks, integration=rules, materials=self.materials,
             boundaries=_left(on_outline, lambda sides: (sides >= 0).all(axis=1) & (
                 row_numbers(unordered(made.outline), unordered(sides)) >= 0)),
             points=_left(points, lambda nodes: nodes >= 0),
-            cell_groups=_left(groups, lambda members: members >= 0),
+            cell_groups=groups,
             node_numbers=None if self.node_numbers is None else self.node_numbers[used])
 
     def mapped(self, place: Callable[[Array], ArrayLike]) -> "Mesh":

@@ -140,6 +140,7 @@ def cut_along(
               direction=tuple((-along).tolist()))
     made = Mesh(np.concatenate([mesh.nodes, mesh.nodes[nodes]]), cells, boundaries, points, curved,
                 middles, (), mesh.cell_groups, mesh.materials, mesh.bricks,
+                mesh.integration,
                 temperature=None if mesh.temperature is None else np.append(
                     mesh.temperature[: len(mesh.nodes)], mesh.temperature[nodes]))
     return replace(made, constraints=(*mesh.constraints, tie), attachments=mesh.attachments)

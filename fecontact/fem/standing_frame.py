@@ -39,6 +39,7 @@ def convective_matrices(body: ElasticBody, S: Array, centre: Array) -> tuple[Any
     size = len(body.nodes)
     found = [sp.csr_array((size, size)), sp.csr_array((size, size))]
     for part in body.parts():
+        part = part.exact
         (gradients, volumes), values, nodes = part.gradients(), part.values, part.nodes
         flow = (np.einsum("qk,ekd->eqd", values, body.nodes[nodes]) - centre) @ S.T
         along = np.einsum("eqkd,eqd->eqk", gradients, flow)

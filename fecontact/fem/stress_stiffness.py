@@ -19,7 +19,6 @@ from fecontact.core.types import Array
 from fecontact.fem.assembly import pattern
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.element_block import PAIRS, ElementBlock
-from fecontact.fem.elements.cell_kinds import HEXAHEDRON
 from fecontact.fem.incompatible_modes import mode_gradients
 from fecontact.fem.thermal import thermal_stress
 
@@ -63,7 +62,7 @@ def cell_stress(
     moved = displacement.reshape(-1, d)[part.nodes]
     # Subtract a node: rigid displacements may be much larger than differences.
     slopes = np.einsum("eki,eqkj->eqij", moved - moved[:, :1], gradients)
-    if body.has_incompatible_modes and part.kind == HEXAHEDRON:
+    if part.incompatible:
         slopes += mode_gradients(body, part, displacement, part.local)[..., 0]
     strain = np.stack([slopes[..., i, j] if i == j else slopes[..., i, j] + slopes[..., j, i]
                        for i, j in PAIRS[d]], axis=-1)

@@ -14,6 +14,7 @@ from fecontact.core.records import Block, IntegerMatrix, IntegerVector, Matrix, 
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.elimination import least_squares, selects
+from fecontact.fem.mean_strain import hourglass_energies
 from fecontact.reduction.solid_motions import allowed_motions, solid_strain_energies
 from fecontact.reduction.solvers.block_rows import BlockRows
 from fecontact.reduction.solvers.congruence import Congruence, as_matrix, largest_column_sum
@@ -26,6 +27,13 @@ _BUCKLED = ("The stress takes the stiffness of the body: its load is beyond the 
 _DENSE = 600
 # Size, relative to forces, of what is left of them beside inertia that is rounding.
 _BALANCED = 1e-12
+
+# Smallest pivot of a stiffness, relative to the largest, and frequency in shear speeds over the
+# extent, of motions that are not free of strain.
+_PIVOT, _STANDSTILL = 1e-13, 1e-9
+_MECHANISM = ("Reduced integration leaves motions of the body without strain (a mechanism), as "
+              "where bricks stand in a row that is one brick wide; give it integration = 'full', "
+              "or cells side by side.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +125,15 @@ class FreeSystem:
         if self.body is None:
             return factorised(K, trouble=trouble)
         E = self.body.expansion
-        return factorised(K, E.indices[E.indptr[:-1]][self.held] // 3, trouble=trouble)
+        found = factorised(K, E.indices[E.indptr[:-1]][self.held] // 3, trouble=trouble)
+        if self.body.has_reduced_integration:
+            try:
+                pivots = np.abs(found.triangle()[1])
+            except AnalysisError:
+                raise AnalysisError(_MECHANISM) from None
+            if (pivots <= _PIVOT * pivots.max()).any():
+                raise AnalysisError(_MECHANISM)
+        return found
 
     @cached_property
     def iterative(self) -> SolidSolver | None:
@@ -266,7 +282,8 @@ def eigenmodes(
     InputError
         For less than one mode, or more modes than unknowns, or an unknown or unsuited eigensolver.
     AnalysisError
-        If a mode of the direct solver violates ``|K s - w^2 M s| < 1e-10 |K| |s|``.
+        If a mode of the direct solver violates ``|K s - w^2 M s| < 1e-10 |K| |s|``, or elements of
+        reduced integration leave motions without strain.
 
     Warns
     -----
@@ -277,6 +294,10 @@ def eigenmodes(
     shapes = body.expansion @ free_shapes
     elastic = w > 0.0
     w[elastic] = frequencies_of(body, shapes[:, elastic])
+    if body.has_reduced_integration:
+        speed = float(np.sqrt((body.shear_moduli / body.densities).max()))
+        if (w[elastic] < _STANDSTILL * speed / body.mesh.extent).any():
+            raise AnalysisError(_MECHANISM)
     return w, shapes
 
 
@@ -350,6 +371,8 @@ def strain_energies(body: ElasticBody, shapes: Array, cells: Integers | None = N
         slopes = np.ascontiguousarray(np.moveaxis(gradients, (2, 3), (0, 1)))
         _strain_energies(slopes.reshape(-1, *areas.shape), areas, np.array(part.nodes), fields,
                          elasticity[part.numbers], tensors, which_tensor[part.numbers], energies)
+        if part.has_mean_strain:
+            energies += hourglass_energies(body, part, shapes.reshape(len(body.nodes), 2, -1))
     return energies * body.thickness
 
 
@@ -434,6 +457,8 @@ def elastic_modes(system: FreeSystem, count: int) -> tuple[Array, Array]:
     squares, shapes = squares[order], shapes[:, order]
     error = backward_error(K, M, squares, shapes).max()
     if not error < 1e-10 or squares[0] <= 0.0:
+        if error < 1e-10 and system.body is not None and system.body.has_reduced_integration:
+            raise AnalysisError(_MECHANISM)
         raise AnalysisError(
             f"The eigenmodes are not accurate: the residual is {error:.1e} of |K| |mode|, and the "
             f"lowest squared frequency {squares[0]:.3g}; look for nearly degenerate cells or parts "

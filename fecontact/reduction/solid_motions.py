@@ -14,9 +14,9 @@ from fecontact.core.records import (
 )
 from fecontact.core.types import Array, Integers
 from fecontact.fem.elastic_body import ElasticBody
-from fecontact.fem.elements.cell_kinds import HEXAHEDRON
 from fecontact.fem.elimination import least_squares
 from fecontact.fem.incompatible_modes import reductions
+from fecontact.fem.mean_strain import hourglass_energies
 
 # Motions of supports, relative to that of the body, that count as none.
 _STILL = 1e-9
@@ -95,11 +95,13 @@ def solid_strain_energies(
         _add_strain_energies(*part.gradients(), np.array(part.nodes), fields,
                              constants[part.numbers], tensors, which_tensor[part.numbers],
                              energies)
-        if body.has_incompatible_modes and part.kind == HEXAHEDRON:
+        if part.incompatible:
             moved = fields[part.nodes]
             # Subtract a node: rigid displacements may be much larger than differences.
             moved = (moved - moved[:, :1]).reshape(len(part.nodes), 24, -1)
             energies -= 0.5 * ((reductions(body, part) @ moved) ** 2).sum(axis=(0, 1))
+        elif part.has_mean_strain:
+            energies += hourglass_energies(body, part, fields)
     return energies
 
 

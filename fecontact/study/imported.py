@@ -34,14 +34,15 @@ _CONSTRAINTS: Mapping[str, type] = {
 _MOST_NODES = 16  # of a proposed interface
 # Elements that are read as others, with the effect on frequencies (benchmarks/calculix.py).
 _OTHERWISE = {
-    r"C3D8R\w*": "bricks {} (one point) become second-order hexahedra. With degree = 1 they "
-                 "become bricks with incompatible modes, which are stiffer than hourglass control "
-                 "on coarse meshes: by 2 % in frequency for the Brake-Reuss beam.",
+    r"C3D8R\w*": "bricks {} (one point) become second-order hexahedra. With degree = 1 in [body] "
+                 "they are as in the deck, with a mean strain and Abaqus' hourglass stiffness.",
     r"C3D8I\w*": "bricks {} become second-order hexahedra, with nearly the same frequencies on "
                  "fine meshes. With degree = 1 in [body] they keep their incompatible modes.",
-    r"C3D20R\w*": "bricks {} (reduced integration) are integrated fully. Frequencies of a block "
-                  "with three bricks through the thickness agree to 0.1 %.",
-    r"C3D6\w*": "wedges {} become second-order wedges. With degree = 1 they stay first-order ones.",
+    r"C3D20R\w*": "bricks {} have reduced integration as in the deck, and the mass of full "
+                  "integration as in Abaqus. With integration = \"full\" in [body] the stiffness "
+                  "has all points.",
+    r"C3D6\w*": "wedges {} become second-order wedges. With degree = 1 they stay first-order ones "
+                "with two points of quadrature as in the deck.",
     r"C3D5\w*": "pyramids {} become second-order pyramids. With degree = 1 they stay first-order "
                 "ones.",
 }

@@ -16,6 +16,7 @@ from fecontact.core.tables import convert_fields, located, plain, shown
 from fecontact.core.types import Coordinates
 from fecontact.core.units import Unit
 from fecontact.fem.elastic_body import ElasticBody
+from fecontact.fem.elements.quadrature import Integration
 from fecontact.fem.material import AnyMaterial, Material
 from fecontact.fem.mesh import Bricks, Mesh
 from fecontact.fem.points import Patch
@@ -64,6 +65,13 @@ class BodySettings:
         Kind of the elements, by default as in the mesh file. Hexahedra with ``degree = 1`` may have
         incompatible modes. With ``degree = 2``, serendipity elements have 8, 20, 15 or 13 nodes,
         others nodes in the middles of faces and cells too.
+    integration : 'exact', 'full' or 'reduced', optional
+        Points of quadrature of the stiffness, by default as in the mesh file: enough for straight
+        cells, or those of the elements of Abaqus, CalculiX and Ansys. Reduced elements with
+        ``degree = 1`` have a mean strain and hourglass stiffness.
+    hourglass : float
+        Stiffness of hourglasses over the shear modulus: 0.005 in Abaqus, 0.001 (1 + nu) in CalculiX
+        with Poisson's ratio nu.
     fixed : mapping of name to 'x', 'y', 'xy', of solids also 'z', 'xz', 'yz', 'xyz', or 'hinge'
         Supports on boundaries and points of the mesh: held directions, or 'hinge' for a hole that
         turns about its centre. In a solid 'hinge_x', 'hinge_y', 'hinge_z' give the axis. At
@@ -82,11 +90,14 @@ class BodySettings:
     plane: Literal["stress", "strain"] = "stress"
     degree: Literal[1, 2] = 2
     bricks: Bricks | None = None
+    integration: Integration | None = None
+    hourglass: float = 0.005
     fixed: Mapping[str, str] = field(default_factory=dict)
     rotation: Rotation | None = None
 
     def __post_init__(self) -> None:
         convert_fields(self)
+        require_positive("BodySettings", hourglass=self.hourglass)
         if self.thickness is not None:
             require_positive("BodySettings", thickness=self.thickness)
         with located("BodySettings:", "Material"):
@@ -148,7 +159,8 @@ class BodySettings:
             getattr(self, key) is None for key in _MATERIAL_KEYS)
         return ElasticBody(mesh, None if of_mesh else self.elastic_material, thickness=self.depth,
                            plane=self.plane, degree=self.degree, fixed=self.fixed,
-                           bricks=self.bricks)
+                           bricks=self.bricks, integration=self.integration,
+                           hourglass=self.hourglass)
 
 
 @dataclass(frozen=True)

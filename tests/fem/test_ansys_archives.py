@@ -55,6 +55,24 @@ def test_bricks_with_their_material_have_the_frequencies_of_a_grid(tmp_path):
     assert (mesh.bricks, scaled.bricks) == ("full", "incompatible")
 
 
+@pytest.mark.parametrize(("kind", "option", "rule"), [
+    (185, 0, "full"), (185, 1, "reduced"), (185, 3, "full"), (186, 0, "reduced"), (186, 1, "full"),
+    (45, 1, "reduced"), (95, None, "full")])
+def test_key_options_choose_the_rule_of_integration(tmp_path, kind, option, rule):
+    path = archive(tmp_path / "a.cdb", kind, *box((2, 1, 1)), option=option)
+    mesh = fc.read_mesh(path)
+    assert mesh.integration == rule
+    assert mesh.bricks == ("incompatible" if (kind, option) == (185, 3) else "full")
+    # The second brick of another type.
+    text = path.read_text().replace(f"ET,        1,{kind}", f"ET,        1,{kind}\nET,2,185")
+    lines = text.splitlines()
+    at = next(k for k, line in enumerate(lines) if line == "       -1") - 1
+    lines[at] = f"{1:9d}{2:9d}{lines[at][18:]}"
+    path.write_text("\n".join(lines))
+    expected = {"reduced integration": "reduced"} if rule == "reduced" else "full"
+    assert fc.read_mesh(path).integration == expected
+
+
 def second_order(nodes, shapes):
     """Bricks of twenty nodes of cells by their corners I to P, and all nodes."""
     places, edges, rows = [*nodes], {}, []
@@ -215,6 +233,7 @@ def test_archives_that_ansys_wrote():
     places = (np.linspace(0.0, 1.0, 3), np.linspace(0.0, 1.0, 3), np.linspace(0.0, 5.0, 11))
     assert found["HexBeam"].bricks == "serendipity"
     hertz, wanted = (
-        eigenfrequencies_hz(fc.ElasticBody(mesh, material, bricks="serendipity"), 10)
+        eigenfrequencies_hz(fc.ElasticBody(mesh, material, bricks="serendipity",
+                                           integration="full"), 10)
         for mesh in (found["HexBeam"], fc.Mesh.grid(*places)))
     assert hertz[6:] == pytest.approx(wanted[6:], rel=1e-9)

@@ -7,11 +7,8 @@ from itertools import combinations
 import meshio
 import numpy as np
 import pytest
-from scipy.sparse.linalg import eigsh
 from solid_blocks import block_mesh, mixed_mesh
 
-import fecontact.fem.assembly as assembly
-import fecontact.fem.elastic_body as elastic_body
 from fecontact import (
     BoundaryLoad,
     ElasticBody,
@@ -19,7 +16,6 @@ from fecontact import (
     Material,
     Mesh,
     MeshError,
-    PointLoad,
     modal_basis,
     read_mesh,
     static_solution,
@@ -205,7 +201,8 @@ def test_rules_of_wedges_and_pyramids_are_exact(powers):
 
 @pytest.mark.parametrize("elements", [
     {"degree": 1, "bricks": "full"}, {"degree": 1, "bricks": "incompatible"}, {"degree": 2},
-    SERENDIPITY])
+    SERENDIPITY, {"degree": 1, "integration": "full"}, {"degree": 1, "integration": "reduced"},
+    SERENDIPITY | {"integration": "full"}, SERENDIPITY | {"integration": "reduced"}])
 def test_constant_strain_in_a_distorted_mixed_mesh(elements):
     """Patch test: no forces inside, the exact work, and the exact stress at all nodes."""
     mesh = mixed_mesh((2, 3, 3), bend=bend)
@@ -452,35 +449,6 @@ def test_faces_of_four_sides_do_not_meet_triangles():
         Mesh(cube, padded([np.arange(8)[None], np.array([[4, 5, 6, 8], [4, 6, 7, 8]])]))
 
 
-# Free bars of 8 x 2 x 1 cells in CalculiX 2.20, steel: elastic modes of *FREQUENCY [Hz].
-@pytest.mark.parametrize(("kind", "exact", "expected", "tolerance"), [
-    (HEXAHEDRON, True, (2577.442, 3711.188, 6770.945, 7049.612, 9205.158, 12526.93), 4e-7),
-    (WEDGE, True, (2576.396, 3710.544, 6762.117, 7166.114, 9199.550, 12498.97), 2e-3),
-    (WEDGE, False, (2576.396, 3710.544, 6762.117, 7166.114, 9199.550, 12498.97), 4e-7)])
-def test_frequencies_of_second_order_decks_are_those_of_calculix(
-    tmp_path, monkeypatch, kind, exact, expected, tolerance
-):
-    """CalculiX integrates C3D15 at nine points; with these the wedges here are the same."""
-    if not exact:
-        (flat, first), (along, second) = (np.array([[1, 1], [4, 1], [1, 4]]) / 6.0, 1.0 / 6.0), (
-            np.polynomial.legendre.leggauss(3))
-        points = np.column_stack([np.tile(flat, (3, 1)), np.repeat(0.5 + 0.5 * along, 3)])
-        monkeypatch.setattr(elastic_body, "rule_of", lambda *_: (
-            points, first * np.repeat(0.5 * second, 3)))
-        monkeypatch.setattr(assembly, "_AFFINE", -1.0)
-    block = block_mesh((8, 2, 1), SIZE)
-    corners = wedges((8, 2, 1)) if kind == WEDGE else (block.nodes, block.cells)
-    mesh = read_mesh(deck(tmp_path / "a.inp", *second_order(*corners, kind)))
-    assert (mesh.cell_counts, mesh.bricks) == ({kind.name: 32 if kind == WEDGE else 16},
-                                               "serendipity")
-    body = ElasticBody(mesh)
-    assert body.elements.shape[1] == kind.count(2, serendipity=True)
-    # The mass at nine points is singular.
-    squares = eigsh(body.stiffness, 12, M=body.mass, sigma=-1e6, return_eigenvectors=False)
-    assert np.sqrt(np.sort(squares)[6:]) == pytest.approx(2.0 * np.pi * np.array(expected),
-                                                          rel=tolerance)
-
-
 def test_pressure_on_bricks_of_twenty_nodes_bends_as_in_calculix(tmp_path):
     """A bar of 8 x 2 x 1 cells C3D20, clamped, 3e4 Pa on its top; CalculiX 2.20 by *DLOAD."""
     block = block_mesh((8, 2, 1), SIZE)
@@ -494,25 +462,6 @@ def test_pressure_on_bricks_of_twenty_nodes_bends_as_in_calculix(tmp_path):
     tip = int(np.linalg.norm(mesh.nodes - SIZE, axis=1).argmin())
     assert moved.displacement[tip] == pytest.approx(
         [2.795006e-06, 4.039742e-10, -4.184652e-05], rel=1e-6, abs=1e-13)
-
-
-def test_wedges_at_two_points_bend_as_those_of_calculix(tmp_path, monkeypatch):
-    """The bar of 32 wedges C3D6, clamped, in CalculiX 2.20, with two points of quadrature."""
-    nodes, cells = wedges((8, 2, 1))
-    mesh = read_mesh(deck(tmp_path / "a.inp", nodes, cells))
-    line = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
-    points = np.column_stack([np.full((2, 2), 1.0 / 3.0), line])
-    monkeypatch.setattr(elastic_body, "rule_of", lambda *_: (points, np.full(2, 0.25)))
-    monkeypatch.setattr(assembly, "_AFFINE", -1.0)
-    mesh = Mesh(mesh.nodes, mesh.cells, points={
-        "left": np.flatnonzero(mesh.nodes[:, 0] == 0.0),
-        "tip": int(np.linalg.norm(mesh.nodes - SIZE, axis=1).argmin())})
-    body = ElasticBody(mesh, degree=1, fixed={"left": "xyz"})
-    moved = static_solution(body, Load(forces=[
-        PointLoad("tip", way, signal=value) for way, value in zip("xyz", (300.0, 100.0, -200.0),
-                                                                 strict=True)]))
-    assert moved.displacement[mesh.points["tip"][0]] == pytest.approx(
-        [1.205412e-05, 4.407443e-06, -1.479856e-04], rel=1e-6)
 
 
 def test_second_order_wedges_follow_curved_faces(tmp_path):

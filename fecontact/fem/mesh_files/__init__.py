@@ -195,7 +195,7 @@ def _mesh(
     made = Mesh(mesh.nodes, mesh.cells, named_boundaries(mesh, groups, boundaries),
                 named_points(mesh, groups, points), mesh.curved_edges, mesh.curved_middles,
                 named_constraints(groups.constraints, boundaries, points), mesh.cell_groups,
-                groups.materials, mesh.bricks, temperature=mesh.temperature,
+                groups.materials, mesh.bricks, mesh.integration, temperature=mesh.temperature,
                 node_numbers=mesh.node_numbers)
     for surface, control, direction in raw.sections:
         if surface in groups.inner:

@@ -6,7 +6,6 @@ sets named on *ELEMENT, surfaces, local coordinate systems, displaced instances 
 
 import re
 import warnings
-from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -29,6 +28,7 @@ from fecontact.core.errors import (
 )
 from fecontact.core.types import Array, Integers
 from fecontact.fem.constraints import Constraint, LinearEquation
+from fecontact.fem.elements.quadrature import Integration
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial
 from fecontact.fem.mesh_files.abaqus_attachments import (
     TYPES,
@@ -75,6 +75,9 @@ _UNREAD = ("DISTRIBUTING COUPLING", "SHELL TO SOLID COUPLING", "EMBEDDED ELEMENT
 _STRUCTURAL = ("SHELL SECTION", "SHELL GENERAL SECTION", "MEMBRANE SECTION", "BEAM SECTION",
                "BEAM GENERAL SECTION", "FRAME SECTION")
 # Letters behind the number of nodes of solid elements.
+# Types with a full and a reduced rule of quadrature, and those that have the reduced one.
+_REDUCIBLE = re.compile(r"C3D(?:8|20)|C(?:PS|PE|PEG|GPE)[48]")
+_REDUCED = re.compile(rf"(?:{_REDUCIBLE.pattern})[HMPT]*R")
 _VARIANT = re.compile(r"[EHIMPRSTV]*(?:OF|CO)?$")
 _GENERATING = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY")
 _KINDS = {"NSET": "nodes", "ELSET": "elements"}
@@ -153,6 +156,7 @@ def read_inp(path: Path) -> RawMesh:
                 more = f", as are {len(found) - 1} others" if len(found) > 1 else ""
                 warnings.warn(f"{path}: {what} {found[0]}{of} is given a second time, {last}{more};"
                               f" the last one counts.", ModelWarning, stacklevel=4)
+    integration = _integration(bodies)
     joined, unread, without = _constrained(assembly, bodies)
     count = sum(len(body.numbered.places) for body in bodies)
     unused = sum(body.part.unused_nodes for body in bodies) if deck.ends_with_elements else 0
@@ -170,13 +174,32 @@ def read_inp(path: Path) -> RawMesh:
         warnings.warn(f"{path}: the file holds {without}, which is not read, so that no "
                       f"temperature of the file is taken; give it beside the mesh.", ModelWarning,
                       stacklevel=4)
-    if any(re.match("C3D8[IR]", name) for body in bodies for name in body.part.element_types):
+    if any("C3D8I" in name for body in bodies for name in body.part.element_types):
         joined.bricks = "incompatible"
+    joined.integration = integration
     joined.materials, unread = assembly.section_materials(bodies)
     for one in unread:
         warnings.warn(f"{path}: {one}, so that no material of the file is taken; give material to "
                       f"the body.", ModelWarning, stacklevel=4)
     return joined
+
+
+def _integration(bodies: list["_Instance"]) -> Integration | dict[str, Integration]:
+    """Rules of quadrature of the types of elements.
+
+    Where some quadrilaterals or hexahedra have a reduced rule and others have not, those of each
+    such type become a set of elements.
+    """
+    types = {name for body in bodies for name in body.part.element_types
+             if _REDUCIBLE.match(name)}
+    reduced = {name for name in types if _REDUCED.match(name)}
+    if reduced in (set(), types):
+        return "reduced" if reduced else "full"
+    for name in reduced:
+        for body in bodies:
+            if name in body.part.element_types:
+                body.sets.elements[name] = list(body.part.element_types[name])
+    return dict.fromkeys(sorted(reduced), "reduced")
 
 
 def _constrained(
@@ -667,7 +690,7 @@ class _Assembly:
             element_blocks=[*part.element_blocks], other_elements=[*part.other_elements],
             other_nodes=[*part.other_nodes], sets=part.sets.copy(),
             point_elements=[*part.point_elements],
-            element_types=part.element_types.copy())
+            element_types={name: [*held] for name, held in part.element_types.items()})
         self.instances.append(_Instance(name, self.current, _Placement.read(lines, name),
                                         source if held else ""))
 
@@ -724,7 +747,8 @@ class _Part:
     sets: _Sets = field(default_factory=_Sets)
     system: tuple[Array, Array] | None = None
     point_elements: list[PointElement] = field(default_factory=list)
-    element_types: Counter[str] = field(default_factory=Counter)
+    # Numbers of the elements of each type that is read.
+    element_types: dict[str, list[Integers]] = field(default_factory=dict)
 
     @property
     def unused_nodes(self) -> int:
@@ -779,7 +803,7 @@ class _Part:
             raise MeshError(f"The file has elements {options['TYPE']} of another number of nodes "
                             f"than {count - 1}.")
         rows = numbers.reshape(-1, count)
-        self.element_types[options["TYPE"].upper()] += len(rows)
+        self.element_types.setdefault(options["TYPE"].upper(), []).append(rows[:, 0])
         if lines:
             self.element_blocks.append((kind, rows[:, 0], rows[:, 1:]))
         if "ELSET" in options:

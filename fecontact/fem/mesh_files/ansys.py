@@ -45,6 +45,8 @@ _EDGES = {
 }
 _CORNERS = {"hexahedron": 8, "wedge": 6, "pyramid": 5, "tetra": 4, "triangle": 3, "quad": 4}
 _BY_CORNERS = {8: "hexahedron", 6: "wedge", 5: "pyramid", 4: "tetra"}
+# Group of the cells with reduced integration, where others have full integration.
+_REDUCED = "reduced integration"
 # Corners of the faces 1, 2, ... of a brick, whose nodes may repeat, and of a tetrahedron.
 _FACES = {8: ((1, 0, 3, 2), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7), (4, 5, 6, 7)),
           4: ((1, 0, 2), (0, 1, 3), (1, 2, 3), (2, 0, 3))}
@@ -123,6 +125,10 @@ def read_cdb(path: Path) -> RawMesh:
         raw.materials = {}
     if elements.incompatible:
         raw.bricks = "incompatible"
+    raw.integration = "reduced" if elements.reduced.all() else "full"
+    if raw.integration == "full" and elements.reduced.any():
+        raw.cell_sets[_REDUCED] = elements.blocks(np.flatnonzero(elements.reduced))
+        raw.integration = {_REDUCED: "reduced"}
     return raw
 
 
@@ -166,8 +172,13 @@ class _Elements:
         heads = np.array([row[:10] for row in rows]).reshape(-1, 10)
         self.numbers, self.materials, self.count = heads[:, 8], heads[:, 0], len(kept)
         self.turned = bool(heads[:, 4].any())
-        self.incompatible = any(_option(found, kind, 2) in (1, 2, 3) for kind in np.unique(
-            heads[kinds[kept] == 185, 1]).tolist())
+        types = np.stack([kinds[kept], heads[:, 1]], axis=1)
+        distinct, which = np.unique(types, axis=0, return_inverse=True)
+        options = [(kind, {key: _option(found, number, key) for key in (1, 2, 11)})
+                   for kind, number in distinct.tolist()]
+        self.reduced = np.array([_is_reduced(*one) for one in options])[which.ravel()]
+        self.incompatible = any((kind == 185 and of[2] in (2, 3))
+                                or (kind == 45 and of[1] == of[2] == 0) for kind, of in options)
         self._row = np.full(int(found.nnum.max()) + 1, -1, np.int64)
         self._row[found.nnum] = np.arange(len(found.nnum))
         # Kind of the cells, which elements they are, and their nodes.
@@ -253,6 +264,13 @@ class _Elements:
             self.points = np.concatenate([self.points, added])
         self._groups.append((f"{shape}{_CORNERS[shape] + len(_EDGES[shape])}", which[~straight],
                              np.concatenate([ends, found], axis=1)))
+
+
+def _is_reduced(kind: int, options: dict[int, int]) -> bool:
+    """True for a type of element whose key options give it reduced integration."""
+    return ((kind == 186 and options[2] == 0) or (kind in (45, 185) and options[2] == 1)
+            or kind in (82, 183) or (kind == 182 and options[1] == 1)
+            or (kind == 95 and options[11] == 1))
 
 
 def _option(found: Any, kind: int, key: int) -> int:

@@ -16,6 +16,7 @@ from fecontact.fem.elements.cell_kinds import (
     row_numbers,
     unordered,
 )
+from fecontact.fem.elements.quadrature import Integration
 from fecontact.fem.material import AnyMaterial
 from fecontact.fem.mesh import Bricks, Mesh
 from fecontact.fem.mesh_files.raw_constraints import constraints_of_mesh
@@ -78,6 +79,8 @@ class RawMesh:
         Materials of groups of elements in the unit of the file, with forces in N.
     bricks : 'full' or 'incompatible'
         Kind of the eight-node bricks; elements of the second order say theirs.
+    integration : 'exact', 'full', 'reduced' or mapping of name in ``cell_sets`` to these
+        Rules of quadrature.
     temperature : (N,) array, optional
         Changes of temperature at the nodes.
     numbers : (n,) integer array, optional
@@ -100,6 +103,7 @@ class RawMesh:
     cell_sets: dict[str, list[tuple[str, Integers]]] = field(default_factory=dict)
     materials: dict[str, AnyMaterial] = field(default_factory=dict)
     bricks: Bricks = "full"
+    integration: Integration | dict[str, Integration] = "exact"
     temperature: Array | None = None
     numbers: Integers | None = None
 
@@ -228,7 +232,7 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     kept = np.sort(distinct)
     regions = _cell_groups(raw, dimension, number, cells[kept])
     mesh = Mesh(points[used], cells[kept], {}, {}, ends[once], middles[once],
-                cell_groups=regions, bricks=bricks,
+                cell_groups=regions, bricks=bricks, integration=_integration(raw, regions),
                 node_numbers=None if raw.numbers is None else raw.numbers[used])
     if raw.temperature is not None:
         mesh = replace(mesh, temperature=_temperature(raw.temperature, mesh, used, number,
@@ -246,6 +250,15 @@ def body_mesh(raw: RawMesh, scale: float) -> tuple[Mesh, Groups]:
     constraints, attachments = constraints_of_mesh(
         raw, groups.boundaries, groups.points, number, middles_of, points, scale)
     return mesh, replace(groups, constraints=constraints, attachments=attachments)
+
+
+def _integration(
+    raw: RawMesh, regions: dict[str, Integers]
+) -> Integration | dict[str, Integration]:
+    """Rules of quadrature of the groups of cells that a mesh has."""
+    if isinstance(raw.integration, str):
+        return raw.integration
+    return {name: rule for name, rule in raw.integration.items() if name in regions} or "full"
 
 
 def _cell_groups(

@@ -115,7 +115,8 @@ class SolidSolver:
         import scipy.sparse as sp
 
         unknowns = SolverUnknowns.of(body)
-        coarse = replace(body, degree=1, bricks="full") if body.degree == 2 else body
+        coarse = body if body.degree == 1 else replace(
+            body, degree=1, bricks="full", integration="exact")
         coarse_unknowns = unknowns if coarse is body else _unknowns_of_coarse(coarse)
         if unknowns is None or coarse_unknowns is None:
             return None
