@@ -237,3 +237,14 @@ def test_archives_that_ansys_wrote():
                                            integration="full"), 10)
         for mesh in (found["HexBeam"], fc.Mesh.grid(*places)))
     assert hertz[6:] == pytest.approx(wanted[6:], rel=1e-9)
+
+
+def test_layered_solids_and_damping_of_archives(tmp_path):
+    path = archive(tmp_path / "a.cdb", 186, *box((2, 1, 1)),
+                   material(**STEEL, DMPS=0.02, ALPX=1e-5))
+    with pytest.warns(ModelWarning, match="materials of the file have DMPS, which are not read"):
+        mesh = fc.read_mesh(path)
+    assert mesh.materials["material 1"].thermal_expansion == 1e-5
+    path.write_text(path.read_text().replace("NBLOCK", "KEYOP,1,3,1\nNBLOCK", 1))
+    with pytest.raises(MeshError, match="layered solids"):
+        fc.read_mesh(path)

@@ -227,6 +227,12 @@ def test_included_files_are_read_once(tmp_path):
     ("CORD2R,5,6,0.,0.,0.,0.,0.,1.\n+,1.,0.,0.\nCORD2R,6,5,0.,0.,0.,0.,0.,1.\n+,1.,0.,0.\n"
      "GRID,99,5,0.,0.,0.\n", "The coordinate system 5 of line .* refers to itself"),
     ("CORD2R,5,,0.,0.,0.,0.,0.,1.\n+,0.,0.,3.\nGRID,99,5,0.,0.,0.\n", "5 of line .* on one line"),
+    ("GRID,99,,0.,0.,0.,,,3\n", "card GRID of line .* has 3 in the field SEID, which makes a s"),
+    ("PSOLID,1,9,,,,,PFLUID\n", "PSOLID of line .* has PFLUID in the field FCTN, which makes it"),
+    ("PLOAD4,7,1,2.,,,,1,2\n+,0,,,,LINE\n", "PLOAD4 of line .* has LINE in the field SORL, whi"),
+    ("NSM1,3,PSOLID,.1,1\n", "The file holds NSM1, which is not read and would stiffen the me"),
+    ("GENEL,9\n", "The file holds GENEL, which is not read"),
+    ("RBE3,9,,1,1,1.,123,2,3\n", "RBE3 9 of line .* moves its reference point in the component"),
     ("GRID,99,,0.,0.,0.,5\nSPC1,3,1,99\n", "card SPC1 of line .* component 1 of the grid point 99"),
 ])
 def test_bad_files(tmp_path, more, message):
@@ -267,3 +273,33 @@ def test_components_that_grid_points_hold_are_supports(tmp_path):
     assert nastran_contents(tmp_path / "a.bdf").supports == (("PS 123", "x y z"),)
     assert "123" not in imported(written(tmp_path, bulk().replace(
         "0.00000,0.00000\n", "0.00000,0.00000,,456\n", 1), "b.bdf")).toml(tmp_path)
+
+
+def test_integration_of_a_property_is_named(tmp_path):
+    with pytest.warns(ModelWarning, match=r"PSOLID 1 of line \d+ chooses points of integration"):
+        read_mesh(written(tmp_path, bulk("PSOLID,1,9,,TWO\nMAT1,9,7e10,,.3,2700.\n")))
+
+
+@pytest.mark.parametrize(("card", "more"), [
+    ("CQUAD4", ["", "", "", "", ".002", "", ".002"]), ("CQUADR", ["30.", "", "", "", "", "", ".1"])
+])
+def test_thicknesses_at_corners_are_refused(tmp_path, card, more):
+    """THETA, ZOFFS, blank, TFLAG, T1 ... T4 behind the nodes."""
+    properties = "PSHELL,1,9,.01\nMAT1,9,7e10,,.3,2700.\n"
+    flat = written(tmp_path, bulk(properties, mesh=FLAT, kind=card))
+    assert read_mesh(flat).materials == {"1": fc.Material(7e10, 0.3, 2700.0)}
+    rows = flat.read_text().splitlines()
+    at = next(k for k, row in enumerate(rows) if row.startswith(card))
+    assert len(rows[at].split(",")) == 7
+    rows[at] += f",{more[0]},{more[1]}\n+,{','.join(more[2:])}"
+    flat.write_text("\n".join(rows))
+    with pytest.raises(MeshError, match=f"line {at + 1} has thicknesses at its corners"):
+        read_mesh(flat)
+    flat.write_text(flat.read_text().replace(f"\n+,{','.join(more[2:])}", ""))
+    assert read_mesh(flat).materials
+
+
+def test_masses_without_stiffness_are_refused(tmp_path):
+    with pytest.raises(MeshError, match=r"PSHELL of line .* has \.5 in the field NSM, a mass"):
+        read_mesh(written(tmp_path, bulk("PSHELL,1,9,.01,,,,,.5\n", mesh=FLAT, kind="CQUAD4")))
+    assert read_mesh(written(tmp_path, bulk("PSHELL,1,9,.01,,,,,0.\n", mesh=FLAT, kind="CQUAD4")))

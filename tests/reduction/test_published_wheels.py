@@ -1,4 +1,4 @@
-"""Two tests of CalculiX, a disc by sectors and a rotor with Coriolis forces; thick rings.
+"""Discs by sectors and a rotor with Coriolis forces beside CalculiX; thick rings.
 
 Units of the tests of CalculiX are mm, N, t.
 """
@@ -49,27 +49,29 @@ def test_segment_of_a_disc():
     assert found.frequencies_hz[0] == pytest.approx([130230.4, 819388.7, 1130438.0], rel=3e-5)
 
 
-def test_slender_disc_on_a_long_shaft():
-    """Deck rotor, its 20-node bricks integrated fully: output of CalculiX 2.20.
+@pytest.mark.parametrize(("integration", "expected", "tolerance"), [
+    ("full", [28.2136, 1859.768, 2377.916, 3729.586, 5570.446, 6206.445, 7175.661], 5e-5),
+    ("reduced", [25.1754, 1876.526, 2267.827, 3712.857, 5518.686, 6011.353, 7149.287], 3e-4)])
+def test_slender_disc_on_a_long_shaft(integration, expected, tolerance):
+    """Sector of a disc on a shaft beside CalculiX 2.20: the whole wheel of 704 bricks.
 
-    The stress is that of the rotation at 2795.6 Hz, near which the first mode whirls: seen from the
-    rotor it is slow, the small difference of large numbers. The deck's own bricks of reduced
-    integration, whose first three frequencies are published with CalculiX' tests, differ more.
+    CalculiX finds modes with Coriolis forces among the modes of the step before; 30 of them here.
+    With ten, as in its test ``rotor``, modes 5 and 6 are 1.2e-3 and 3.7e-3 higher. Its mass of
+    C3D20R at eight points accounts for the larger differences of these. The stress is that of the
+    rotation at 2795.6 Hz, near which the first mode whirls: seen from the rotor it is slow, the
+    small difference of large numbers.
     """
-    reduced = [0.810, 1868.10, 2313.45]
-    full = [27.586, 1859.85, 2377.07, 3729.51, 5576.46, 6226.86, 7177.60]
     z = np.concatenate([np.linspace(0.0, 50.0, 11), np.linspace(50.25, 100.25, 11)])
     sector = curved_sector(np.array([0.5, 0.75, 1.0, 3.0, 5.0]), np.array([0.0, np.pi / 8.0]), z,
                            lambda radius, height: radius < 1.0 or 50.0 < height < 50.25)
     speed = np.sqrt(3.0853e8)
     found = sector_modes(
-        ElasticBody(sector, STEEL, fixed={"ends": "xyz"}, bricks="serendipity"),
-        CyclicSymmetry("low", "high", 16), 8, diameters=[0, 1], rotation=Rotation(speed))
+        ElasticBody(sector, STEEL, fixed={"ends": "xyz"}, bricks="serendipity",
+                    integration=integration),
+        CyclicSymmetry("low", "high", 16), 12, diameters=[0, 1], rotation=Rotation(speed))
     seen = np.sort(np.concatenate([one.ravel() for one in found.rotation.frequencies_hz(speed)]))
-    assert seen[0] == pytest.approx(full[0], abs=1.0)
-    assert seen[1:4] == pytest.approx(full[1:4], rel=5e-4)
-    assert seen[4:7] == pytest.approx(full[4:], rel=4e-3)
-    assert seen[1:3] == pytest.approx(reduced[1:], rel=3e-2)
+    assert seen[0] == pytest.approx(expected[0], abs=0.1)
+    assert seen[1:7] == pytest.approx(expected[1:], rel=tolerance)
 
 
 def waves_of_a_ring(inner, outer, n, material, terms=12):

@@ -390,17 +390,28 @@ def test_what_is_not_taken_is_named(tmp_path):
         "*DLOAD\nUP, GRAV, 9.81, 0., 0., -1.\n2, P1, 5.\nEALL, BX, 3.\n"
         "UP, CENTRIF, 4., 0., 0., 0., 0., 0., 1.\n"
         "*DLOAD, AMPLITUDE=A\nUP, P2, 1.\n*DSLOAD\nROOF, TRVEC, 1., 0., 0., 1.\n"
+        "*BOUNDARY\nHELD, 1, 1, 0.001\n*CLOAD, AMPLITUDE=A, FOLLOWER\n"
         "*CLOAD\nHELD, 1, 5.\n*NODE, NSET=FREE\n9999, 1., 0., 0.\n*BOUNDARY\nFREE, 1, 3\n"))
     text = imported(tmp_path / "a.inp").toml(tmp_path)
     for wanted in ("Gravity on UP is left out: gravity must act on all cells.",
                    "The pressure on DLOAD-1 is left out: DLOAD-1 is not a boundary of the bodies.",
                    "Centrifugal force on UP is left out", "*DLOAD BX is left out",
+                   "*BOUNDARY with displacements other than zero is left out",
+                   "The option AMPLITUDE of *CLOAD is left out",
+                   "The option FOLLOWER of *CLOAD is left out",
                    "*DSLOAD TRVEC is left out", "*DLOAD with AMPLITUDE is left out",
                    "The force on HELD is left out: HELD is not a single point of the bodies.",
                    "The support of FREE is left out: FREE is not a group of the bodies"):
         assert wanted in text, wanted
     study = Study.from_toml(text, tmp_path / "a.toml")
     assert (study.load.gravity, study.load.boundaries, study.body.rotation) == (None, (), None)
+
+
+def test_a_sum_of_sets_of_supports_acts(tmp_path):
+    (tmp_path / "a.bdf").write_text(
+        "SPC = 9\n" + bulk(f"SPC1,4,3,{TIP}\nSPCADD,9,3,4\nSPC1,5,1,{TIP}\n"))
+    assert set(nastran_contents(tmp_path / "a.bdf").supports) == {
+        ("SPC 3", "x y z"), ("SPC 4", "z")}
 
 
 @pytest.mark.parametrize(("load", "message"), [

@@ -69,6 +69,17 @@ def test_shells_of_nastran_are_in_plane_stress(tmp_path):
     assert (found.body.plane, found.body.thickness) == ("stress", 0.007)
 
 
+@pytest.mark.parametrize(("card", "plane"), [("CPLSTS4", "stress"), ("CPLSTN4", "strain")])
+def test_plane_elements_of_nastran_have_their_state_and_thickness(tmp_path, card, plane):
+    path = tmp_path / "a.bdf"
+    path.write_text("BEGIN BULK\n" + "".join(
+        f"GRID,{k},,{x},{y},0.\n" for k, (x, y, _) in enumerate(NODES, 1)) + "".join(
+        f"{card},{k},1,{','.join(map(str, cell))}\n" for k, cell in enumerate(CELLS, 1))
+        + "PPLANE,1,2,.003\nMAT1,2,2.1e11,,.3,7850.\nENDDATA\n")
+    _, found = study(path)
+    assert (found.body.plane, found.body.thickness) == (plane, 0.003)
+
+
 @pytest.mark.parametrize(("kind", "option", "plane"), [
     (182, None, "stress"), (182, 0, "stress"), (183, 3, "stress"), (182, 2, "strain"),
     (42, 2, "strain")])

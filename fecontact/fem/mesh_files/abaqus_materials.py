@@ -44,7 +44,11 @@ def material(name: str, given: Mapping[str, Given]) -> AnyMaterial | str:
                 f"*DENSITY")
     values = [*values, 0.0][:constants]
     rho = float(density[0].split(",")[0] or 0)
-    loss = float(given.get("DAMPING", ({}, []))[0].get("STRUCTURAL") or 0)
+    damping = given.get("DAMPING", ({}, []))[0]
+    loss = float(damping.get("STRUCTURAL") or 0)
+    if unread := [key for key in ("ALPHA", "BETA", "COMPOSITE") if float(damping.get(key) or 0)]:
+        warnings.warn(f"The material '{name}' has *DAMPING, {', '.join(unread)}, which is not "
+                      f"read; give damping to the basis.", ModelWarning, stacklevel=4)
     expansion = _expansion(name, given, kind == "ISO")
     if kind == "ISO":
         return Material(values[0], values[1], rho, loss, expansion)

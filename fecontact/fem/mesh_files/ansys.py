@@ -45,6 +45,7 @@ _EDGES = {
 }
 _CORNERS = {"hexahedron": 8, "wedge": 6, "pyramid": 5, "tetra": 4, "triangle": 3, "quad": 4}
 _BY_CORNERS = {8: "hexahedron", 6: "wedge", 5: "pyramid", 4: "tetra"}
+_DAMPING = {"ALPD", "BETD", "DAMP", "DMPR", "DMPS"}
 # Group of the cells with reduced integration, where others have full integration.
 _REDUCED = "reduced integration"
 # Corners of the faces 1, 2, ... of a brick, whose nodes may repeat, and of a tetrahedron.
@@ -117,6 +118,9 @@ def read_cdb(path: Path) -> RawMesh:
         if number in materials:
             raw.materials[name] = materials[number]
     turned = any(isinstance(one, AnisotropicMaterial) for one in materials.values())
+    if damped := sorted(_properties(text) & _DAMPING):
+        warnings.warn(f"{path}: the materials of the file have {', '.join(damped)}, which are not "
+                      f"read; give damping to the basis.", ModelWarning, stacklevel=4)
     if not unread and turned and elements.turned:
         unread = "the file gives axes of materials by coordinate systems of elements (ESYS)"
     if unread:
@@ -174,8 +178,11 @@ class _Elements:
         self.turned = bool(heads[:, 4].any())
         types = np.stack([kinds[kept], heads[:, 1]], axis=1)
         distinct, which = np.unique(types, axis=0, return_inverse=True)
-        options = [(kind, {key: _option(found, number, key) for key in (1, 2, 11)})
+        options = [(kind, {key: _option(found, number, key) for key in (1, 2, 3, 11)})
                    for kind, number in distinct.tolist()]
+        if any(kind in (185, 186) and of[3] == 1 for kind, of in options):
+            raise MeshError("The file holds layered solids (KEYOPT 3 of SOLID185 or 186), which "
+                            "are not read; mesh each layer with elements of its own.")
         self.reduced = np.array([_is_reduced(*one) for one in options])[which.ravel()]
         self.incompatible = any((kind == 185 and of[2] in (2, 3))
                                 or (kind == 45 and of[1] == of[2] == 0) for kind, of in options)
@@ -278,6 +285,12 @@ def _option(found: Any, kind: int, key: int) -> int:
     return next((value for number, value in found.key_option.get(kind, ()) if number == key), 0)
 
 
+def _properties(text: str) -> set[str]:
+    """Names of the properties of materials of an archive."""
+    return {name.upper() for _, name, *_ in _DATA.findall(text)} | {
+        name.upper() for name, *_ in _ONE.findall(text)}
+
+
 def _materials(text: str) -> tuple[dict[int, AnyMaterial], str]:
     """Materials by their numbers, in the units of the file, and why there are none."""
     known: dict[int, dict[str, float]] = {}
@@ -306,7 +319,8 @@ def _materials(text: str) -> tuple[dict[int, AnyMaterial], str]:
 def _material(values: dict[str, float]) -> AnyMaterial:
     """Isotropic, or orthotropic where there is a second modulus."""
     if "EY" not in values:
-        return Material(values["EX"], values.get("PRXY", values.get("NUXY", 0.0)), values["DENS"])
+        return Material(values["EX"], values.get("PRXY", values.get("NUXY", 0.0)), values["DENS"],
+                        thermal_expansion=values.get("ALPX", 0.0))
     moduli = [values[f"E{axis}"] for axis in "XYZ"]
     # Minor ratios, nu_yx / E_x = nu_xy / E_y, where major ones are not given.
     ratios = [values[f"PR{pair}"] if f"PR{pair}" in values

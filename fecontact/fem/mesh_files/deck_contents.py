@@ -114,6 +114,9 @@ def deck_contents(path: Path) -> DeckContents:
         elif keyword == "CONTACT PAIR":
             pairs += [(row[0], row[1]) for row in rows if len(row) > 1]
         elif keyword == "BOUNDARY" and not deck.keywords["END STEP"]:
+            if any(len(row) > 3 and float(row[3] or 0.0) for row in rows):
+                distributed.unread.append("*BOUNDARY with displacements other than zero")
+            distributed.unread += _of_time(keyword, options)
             groups = [[name, *rows[k][1:]] for k, (name, _) in zip(
                 [k for k, row in enumerate(rows) if whole_number(row[0]) is not None],
                 groups_of_nodes(keyword, lines), strict=True)]
@@ -125,6 +128,7 @@ def deck_contents(path: Path) -> DeckContents:
         elif keyword in LOADS and not deck.keywords["END STEP"]:
             add_loads(distributed, keyword, options, lines)
         elif keyword == "CLOAD" and not deck.keywords["END STEP"]:
+            distributed.unread += _of_time(keyword, options)
             forces += [(name, COMPONENTS[dof - 1], float(value)) for name, word, value, *_ in (
                 (*row, "", "")[: max(len(row), 3)] for row in rows)
                 if (dof := whole_number(word) or 0) in range(1, 7) and float(value or 0.0)]
@@ -135,6 +139,12 @@ def deck_contents(path: Path) -> DeckContents:
         distributed,
         tuple(sorted({"stress" if name.startswith("CPS") else "strain" for name in elements
                       if name.startswith(("CPS", "CPE"))})), tuple(dict.fromkeys(thicknesses)))
+
+
+def _of_time(keyword: str, options: Mapping[str, str]) -> list[str]:
+    """Kinds of values that are read as if they were constant in time and space."""
+    return [f"The option {name} of *{keyword}"
+            for name in ("AMPLITUDE", "FOLLOWER", "LOAD CASE", "USER") if name in options]
 
 
 def _thickness(lines: list[str]) -> float:

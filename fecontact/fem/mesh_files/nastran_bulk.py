@@ -10,7 +10,7 @@ import numpy as np
 
 from fecontact.core.errors import MeshError
 from fecontact.core.types import Array, Integers
-from fecontact.fem.mesh_files.nastran_cards import Card, Line, all_cards, reals, whole
+from fecontact.fem.mesh_files.nastran_cards import Card, Line, all_cards, real, reals, whole
 from fecontact.fem.mesh_files.nastran_systems import Systems
 from fecontact.fem.mesh_files.raw import CORNERS, PLANE, SOLID, RawMesh
 
@@ -39,8 +39,18 @@ _EDGES = {
 _UNREAD = re.compile(r"C(?:TRI|TRAX|QUAD|HEX|PEN|TET|PYR|PLST|SHEAR|CONE|IHEX)\w*")
 _STIFFENING = re.compile(
     r"PBARL?|PBE(?:AML?|AM3|ND)|PROD|CONROD|PTUBE|CBUSH(?:1D|2D)?|CELAS\d|CDAMP\d|CVISC|CGAP|CWELD|"
-    r"CFAST|CSEAM|CMASS\d|CONM\d|RBE1|RBAR1?|RROD|RTRPLT1?|RSPLINE|RJOINT|MPCADD|DMIG")
+    r"CFAST|CSEAM|CMASS\d|CONM\d|GENEL|NSML?1?|NSMADD|RBE1|RBAR1?|RROD|RTRPLT1?|RSPLINE|RJOINT|MPCADD|DMIG")
 _SHELLS = ("PSHELL", "PCOMP", "PCOMPG")
+# Fields behind the number of a card that are not read: words that stand for none, and what they do.
+_FIELDS: dict[str, dict[int, tuple[tuple[str, ...], str]]] = {
+    "GRID": {7: (("", "0"), "SEID, which makes a superelement")},
+    "PSHELL": {7: (("",), "NSM, a mass without stiffness"),
+               10: (("", "0"), "MID4, which couples stretching and bending")},
+    "PPLANE": {3: (("",), "NSM, a mass without stiffness")},
+    "PSOLID": {6: (("", "SMECH"), "FCTN, which makes it a fluid")},
+    "PLOAD4": {12: (("", "SURF"), "SORL, which puts the load on a line"),
+               13: (("", "NORM"), "LDIR, a direction along the surface")},
+}
 
 
 class BulkData:
@@ -63,6 +73,8 @@ class BulkData:
         Systems of the displacements of grid points, by row, where they are not basic.
     angles : mapping of int to str
         Angles, or systems, of materials of plane elements by their numbers, where they are given.
+    planes : set of str
+        'stress' and 'strain' of elements that have such a state.
 
     Raises
     ------
@@ -78,6 +90,8 @@ class BulkData:
         self.permanent: defaultdict[str, list[int]] = defaultdict(list)
         self.turned: dict[int, str] = {}
         self.angles: dict[int, str] = {}
+        self.planes: set[str] = set()
+        self._uneven: Line | None = None
         self._places, self._systems = array("d"), list[str]()
         # Number, property and nodes of each element in turn.
         self._found: defaultdict[tuple[str, int], array[int]] = defaultdict(lambda: array("q"))
@@ -85,6 +99,11 @@ class BulkData:
         _require_end(path)
         for line, name, fields in all_cards(path, case):
             fields += [""] * (8 - len(fields))  # wide ones may end with the fourth
+            for place, (none, what) in _FIELDS.get(name, {}).items():
+                word = fields[place].upper() if place < len(fields) else ""
+                if word not in none and not (what.startswith("NSM") and not real(line, word)):
+                    raise MeshError(f"The card {name} of line {line} has {word} in the field "
+                                    f"{what}; this is not read, remove it.")
             if name == "GRID":
                 self._add_point(line, fields)
             elif name in _ELEMENTS:
@@ -127,10 +146,17 @@ class BulkData:
             raise MeshError(f"Line {line} gives the element {number} a second time; remove one of "
                             f"the cards, or renumber it.")
         self._numbers.add(number)
-        # Behind the nodes, and the temperatures or thicknesses at the corners of CQUAD8.
+        # Behind the nodes, and the thicknesses at the corners of CQUAD8.
         at = 2 + most + 4 * (most == 8)
         if kind in PLANE and fields[at : at + 1] not in ([], [""]):
             self.angles[number] = fields[at]
+        if name.startswith("CPLST"):
+            self.planes.add("strain" if name[5] == "N" else "stress")
+        elif kind in PLANE and self._uneven is None:
+            # Corners have their thicknesses behind the nodes, or on the second line.
+            first = 10 + (most != 8 and corners == 3) * (most == 3)
+            if any(word not in ("", "0", "0.0", "0.") for word in fields[first : first + corners]):
+                self._uneven = line
         # Middles that are left out are 0.
         self._found[kind + str(count) * (count > corners), count].extend(
             (number, whole(line, fields[1] or fields[0]), *(whole(line, one or "0")
@@ -251,6 +277,10 @@ class BulkData:
                     f"it mass; mesh stiffeners with solid elements, or give a deck of Abaqus or "
                     f"CalculiX, which may have couplings, equations, springs and masses, or the "
                     f"matrices of a superelement (EXTSEOUT, read_matrix).")
+        if self._uneven is not None and not is_solid:
+            raise MeshError(f"The element of line {self._uneven} has thicknesses at its corners "
+                            f"(T1, T2, ...), which are not read; give elements of one thickness "
+                            f"each property (PSHELL).")
         raw = RawMesh(self.points, [], numbers=self.numbers)
         lines: defaultdict[str, list[Integers]] = defaultdict(list)
         for (kind, _), found in self.elements.items():

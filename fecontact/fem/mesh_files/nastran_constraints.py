@@ -57,6 +57,9 @@ def _rigid(bulk: BulkData, raw: RawMesh) -> Iterator[Constraint]:
 def _means(bulk: BulkData, raw: RawMesh) -> Iterator[Constraint]:
     for line, fields in bulk.cards["RBE3"]:
         name = f"RBE3 {fields[0]}"
+        if not {*"123"} <= {*fields[3]}:
+            raise MeshError(f"The card {name} of line {line} moves its reference point in the "
+                            f"components {fields[3]!r} alone; REFC must hold 1, 2 and 3.")
         reference = _reference(bulk, line, fields[2], raw, name)
         parts: list[tuple[float, list[str]]] = []
         words = [word for word in fields[4:] if word]

@@ -61,15 +61,16 @@ def nastran_contents(path: Path) -> DeckContents:
         As in :func:`add_load_groups`.
     """
     bulk = BulkData(path)
-    found, shells = _Loads(bulk), bulk.cards["PSHELL"]
+    found, shells = _Loads(bulk), [*bulk.cards["PSHELL"], *bulk.cards["PPLANE"]]
     return DeckContents(
         found.keywords, supports=tuple(
             (name, " ".join(COMPONENTS[int(k) - 1] for k in components))
             for name, (_, components) in found.supports.items() if components),
         forces=tuple((f"point {point}", component, value)
                      for point, component, value in found.forces),
-        distributed=found.distributed, planes=("stress",) if shells else (),
-        thicknesses=tuple(dict.fromkeys(thickness for line, fields in shells if (
+        distributed=found.distributed,
+        planes=tuple(sorted(bulk.planes | ({"stress"} if bulk.cards["PSHELL"] else set()))),
+        thicknesses=tuple(dict.fromkeys(thickness for line, fields in shells if fields[2] and (
             thickness := real(line, fields[2])))))
 
 
@@ -186,11 +187,13 @@ class _Loads:
                     held.tolist())
         wanted = _of_case(self._bulk.case, "SPC") or (
             next(iter(nodes)) if len(nodes) == 1 else None)
+        acting: set[str | None] = {of for _, (number, *sets) in self._bulk.cards["SPCADD"]
+                  for of in sets if number == wanted} or {wanted}
         if moved:
             self.distributed.unread.append("SPC with displacements other than zero")
         found: dict[str, tuple[set[int], str]] = {}
         for number, by_components in nodes.items():
-            acts = number == wanted and not moved
+            acts = number in acting and not moved
             only = next(iter(by_components)) if len(by_components) == 1 else ""
             found[f"SPC {number}"] = (set().union(*by_components.values()),
                                       _digits(only) if acts else "")

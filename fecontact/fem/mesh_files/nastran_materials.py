@@ -49,13 +49,17 @@ def _of_property(bulk: BulkData, name: str, is_solid: bool) -> AnyMaterial:
     if card is None:
         raise InputError(f"The file holds no {' or '.join(kinds)} {name}")
     line, fields = card
+    if is_solid and any(fields[place] for place in (3, 5)):
+        warnings.warn(f"PSOLID {name} of line {line} chooses points of integration (IN, ISOP), "
+                      f"which are not read; give integration = 'full' or 'reduced' to the body.",
+                      ModelWarning, stacklevel=6)
     found = [(kind, one) for kind in _READERS for one in bulk.cards[kind] if one[1][0] == fields[1]]
     if len(found) != 1:
         raise InputError(f"The property {name} of line {line} has the material {fields[1]}, for "
                          f"which the file holds {'several' if found else 'no'} MAT1, MAT8, MAT9 or "
                          f"MAT11")
     (kind, (at, constants)), = found
-    if (kind == "MAT8") == is_solid:
+    if kind in (("MAT8",) if is_solid else ("MAT9", "MAT11")):
         raise InputError(f"The property {name} of line {line} has a material of the kind {kind}, "
                          f"which is that of {'plane bodies' if is_solid else 'solids'}")
     axes: AnyAxes = MaterialAxes()
