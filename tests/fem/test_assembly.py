@@ -59,9 +59,10 @@ def block(basis):
     members = np.array(basis.element_dofs.T, dtype=np.int64)
     corners, curved = basis.mesh.t.shape[0], hasattr(basis.mapping, "elem") and (
         basis.mesh.doflocs.shape[1] > basis.mesh.nvertices)
+    rule = np.ascontiguousarray(basis.X.T), basis.W
     return ElementBlock(
         CELL_KINDS[basis.mesh.dim(), corners], np.arange(len(members)), members, basis.doflocs.T,
-        members.shape[1] if curved else corners, np.ascontiguousarray(basis.X.T), basis.W)
+        members.shape[1] if curved else corners, *rule, rule)
 
 
 def compare(basis, tolerance=1e-14):

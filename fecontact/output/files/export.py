@@ -13,6 +13,7 @@ from fecontact.core.files.csv_text import csv_text
 from fecontact.fem.fields import BodyFields
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.dataset import columns, coordinates, to_xarray, variables
+from fecontact.output.files.vtk_cells import written_cells
 from fecontact.output.files.vtu import VtuField, write_vtu
 
 SUFFIXES = {"csv": ".csv", "mat": ".mat", "netcdf": ".nc"}
@@ -164,7 +165,7 @@ def export_fields(fields: BodyFields, path: str | Path) -> Path:
     moved = np.zeros((len(fields.nodes), 3))
     moved[:, :d] = fields.displacement
     with replaced(path) as part:
-        write_vtu(part, fields.nodes, fields.cells, [
+        write_vtu(part, fields.nodes, written_cells(fields.nodes, fields.elements, fields.cells), [
             VtuField("displacement", "Point", moved, ("x", "y", "z")),
             *(VtuField(f"stress_{name}", "Point", values) for name, values in zip(
                 ("xx", "yy", "zz", "xy", "yz", "xz")[: 4 if d == 2 else 6], fields.stress.T,

@@ -18,6 +18,7 @@ from fecontact.output.files.frames import (
     require_field,
     von_mises,
 )
+from fecontact.output.files.vtk_cells import written_cells
 from fecontact.reduction.modal_basis import ModalBasis
 
 _VECTOR = ("x", "y", "z")
@@ -100,20 +101,23 @@ class FrameFields:
     kinds : tuple of FieldKind
     sizes : dict
         Numbers of points and cells, by 'Point' and 'Cell'.
+    cells : (M, n) integer array
+        Cells of files, see :func:`fecontact.output.files.vtk_cells.written_cells`.
     """
 
     def __init__(self, trajectory: Trajectory) -> None:
         field, basis = require_field(trajectory), trajectory.basis
         self._run, self._field = trajectory, field
         self.kinds = field_kinds(basis)
-        self.sizes = {"Point": len(field.nodes), "Cell": len(field.cells)}
+        self.cells = written_cells(field.nodes, field.elements, field.cells)
+        self.sizes = {"Point": len(field.nodes), "Cell": len(self.cells)}
         self._owners = contact_owners(basis)
         # Cells of solids with a facet on a contact face, their contact nodes, and 1 on the body of
         # the contact node, -1 on the other side.
         self._cells = self._nodes = self._signs = np.zeros(0, dtype=np.int64)
         if basis.dimension == 3:
             facets = contact_facets(basis)
-            beside = facets.at_cells(field.cells, len(field.nodes))
+            beside = facets.at_cells(self.cells, len(field.nodes))
             self._cells = np.flatnonzero(beside >= 0)
             self._nodes = facets.owner[beside[self._cells]]
             self._signs = np.where(facets.own[beside[self._cells]], 1, -1)
@@ -128,7 +132,7 @@ class FrameFields:
             ("Point", "von_mises"): von_mises(field, q),
             ("Point", "contact_force"): nodal_contact_force(run, which),
             ("Point", "contact_state"): nodal_contact_states(run, which, self._owners),
-            ("Cell", "stress"): cell_stress(field, q)}
+            ("Cell", "stress"): cell_stress(field, q, self.cells)}
         if run.basis.dimension == 2:
             return found
         areas = run.basis.contact_areas

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.magnitude import magnitude
-from fecontact.core.types import Array
+from fecontact.core.types import Array, Integers
 from fecontact.fem.elements.cell_kinds import widths
 from fecontact.fem.von_mises import von_mises_of
 from fecontact.integrate.trajectory import Trajectory
@@ -129,17 +129,18 @@ def von_mises(field: ModeShapes, q: Array) -> Array:
         return von_mises_of(parts) * size * unit
 
 
-def cell_stress(field: ModeShapes, q: Array) -> Array:
+def cell_stress(field: ModeShapes, q: Array, cells: Integers | None = None) -> Array:
     """Stresses (F, M, 4) xx, yy, zz, xy, or (F, M, 6) with yz, xz, of the cells [Pa].
 
-    They are the means of their corners.
+    They are the means of their nodes. ``cells`` are those of the field by default.
     """
-    count, size = len(field.cells), widths(field.cells)[:, None, None]
+    cells = field.cells if cells is None else cells
+    count, size = len(cells), widths(cells)[:, None, None]
     stress, factors = field.stress_terms, field.stress_coordinates(q)
     _, components, terms = stress.shape
     # Corner by corner: all at once would hold the stress of each cell several times.
     mean = sum(stress[nodes] * (corner < size)
-               for corner, nodes in enumerate(field.cells.T)) / size
+               for corner, nodes in enumerate(cells.T)) / size
     unit = magnitude(factors)
     found = (factors / unit) @ mean.reshape(components * count, terms).T
     with np.errstate(over="ignore"):

@@ -62,13 +62,13 @@ def export_pvd(
     _require_free(folder)
     basis, fields = trajectory.basis, FrameFields(trajectory)
     body = ([VtuField("body", "Point", numbers := body_numbers(basis)),
-             VtuField("body", "Cell", numbers[field.cells[:, 0]])] if basis.parts else [])
+             VtuField("body", "Cell", numbers[fields.cells[:, 0]])] if basis.parts else [])
     with output_folder(folder.parent), replaced_folder(folder) as part:
         names = []
         for number, index in enumerate(indices):
             found = fields.at(slice(index, index + 1))
             names.append(f"{name}_{number:04d}.vtu")
-            write_vtu(part / names[-1], field.nodes, field.cells, [
+            write_vtu(part / names[-1], field.nodes, fields.cells, [
                 *(VtuField(one.name, one.of, one.flat(found[one.of, one.name]), one.components)
                   for one in fields.kinds), *body], float(trajectory.time[index]))
         times = trajectory.time[indices].tolist()

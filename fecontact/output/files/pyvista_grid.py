@@ -9,7 +9,7 @@ from fecontact.core.errors import InputError, MissingLibraryError
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.fields_of_frames import FrameFields
 from fecontact.output.files.frames import require_drawable, require_field
-from fecontact.output.files.vtkhdf import cells_of_vtk
+from fecontact.output.files.vtk_cells import cells_of_vtk
 
 if TYPE_CHECKING:
     import pyvista
@@ -66,10 +66,10 @@ def to_pyvista(trajectory: Trajectory, time: float | None = None) -> "pyvista.Un
     d = field.nodes.shape[1]
     points = np.zeros((len(field.nodes), 3))
     points[:, :d] = field.nodes
-    connectivity, offsets, types = cells_of_vtk(field.cells, d)
+    fields = FrameFields(trajectory)
+    connectivity, offsets, types = cells_of_vtk(fields.cells, d)
     cells = np.insert(connectivity, offsets[:-1], np.diff(offsets))
     grid = pyvista.UnstructuredGrid(cells, types, points)
-    fields = FrameFields(trajectory)
     values = fields.at(which)
     for kind in fields.kinds:
         data = grid.point_data if kind.of == "Point" else grid.cell_data

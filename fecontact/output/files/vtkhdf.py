@@ -6,27 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
-from fecontact.fem.elements.cell_kinds import widths
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.files.fields_of_frames import FrameFields
 from fecontact.output.files.frames import blocks, body_numbers, require_field
 from fecontact.output.files.hdf5 import COMPRESSED, store_compressed
-
-# VTK_TRIANGLE, VTK_QUAD, VTK_TETRA, VTK_PYRAMID, VTK_WEDGE, VTK_HEXAHEDRON by dimension, corners.
-_CELL_TYPES = {(2, 3): 5, (2, 4): 9, (3, 4): 10, (3, 5): 14, (3, 6): 13, (3, 8): 12}
-
-
-def cells_of_vtk(cells: Integers, dimension: int) -> tuple[Integers, Integers, Any]:
-    """Nodes of all cells in turn, the first (M + 1,) of each and the last one's end, VTK's types.
-
-    Rows of cells may be filled by their last corner.
-    """
-    size = widths(cells)
-    types = np.zeros(9, np.uint8)
-    for (of, corners), code in _CELL_TYPES.items():
-        types[corners] = code if of == dimension else types[corners]
-    nodes = cells[np.arange(cells.shape[1]) < size[:, None]].astype(np.int64)
-    return nodes, np.append(0, np.cumsum(size)), types[size]
+from fecontact.output.files.vtk_cells import cells_of_vtk
 
 _CHUNK = 2**14  # fewest values of a compressed chunk
 
@@ -66,14 +50,14 @@ def write_vtkhdf(file: Any, trajectory: Trajectory, indices: NDArray[np.intp]) -
     group = file.create_group("VTKHDF")
     group.attrs["Version"] = np.array([2, 0], dtype=np.int64)
     group.attrs["Type"] = np.bytes_("UnstructuredGrid")
-    _write_grid(group, field.nodes, field.cells)
     fields = FrameFields(trajectory)
+    _write_grid(group, field.nodes, fields.cells)
     _write_steps(group.create_group("Steps"), trajectory.time[indices], fields)
 
     parts = trajectory.basis.parts
     if parts:
         body = body_numbers(trajectory.basis)
-        for kind, numbers in (("Point", body), ("Cell", body[field.cells[:, 0]])):
+        for kind, numbers in (("Point", body), ("Cell", body[fields.cells[:, 0]])):
             group[f"{kind}Data/body"] = numbers
             group[f"{kind}Data/body"].attrs["names"] = [part.name for part in parts]
             group[f"Steps/{kind}DataOffsets/body"] = np.zeros(steps, dtype=np.int64)

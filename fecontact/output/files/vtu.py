@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.types import Array, Integers
-from fecontact.output.files.vtkhdf import cells_of_vtk
+from fecontact.output.files.vtk_cells import cells_of_vtk
 
 _BLOCK = 2**15  # bytes that are compressed together
 _TYPES = {"f4": "Float32", "f8": "Float64", "i1": "Int8", "u1": "UInt8", "i4": "Int32",
@@ -31,7 +31,10 @@ def write_vtu(
     part: Path, nodes: Array, cells: Integers, fields: Iterable[VtuField],
     time: float | None = None,
 ) -> None:
-    """Write fields on first-order cells as a compressed VTU file, with the time it shows [s]."""
+    """Write fields on cells as a compressed VTU file, with the time it shows [s].
+
+    The cells are those of :func:`~fecontact.output.files.vtk_cells.written_cells`.
+    """
     points = np.zeros((len(nodes), 3))
     points[:, : nodes.shape[1]] = nodes
     connectivity, offsets, types = cells_of_vtk(cells, nodes.shape[1])
