@@ -64,7 +64,7 @@ THREADS = [(f"BPT-{k}_Set-1", f"NPT-{k}_Set-1") for k in (1, 2, 3)]
 
 
 def beam(deck: Path) -> fc.ElasticBody:
-    """Both beams and their bolts, bricks with incompatible modes."""
+    """Both beams and their bolts, bricks with mean strain as in the deck."""
     mesh = fc.read_mesh(deck)
     return fc.ElasticBody(mesh, degree=1)
 
