@@ -66,7 +66,7 @@ def extrapolation(kind: CellKind, count: int, local: Array) -> Array:
 
 
 def _monomials(kind: CellKind, count: int, at: Array) -> Array:
-    """As many monomials (n, count) at places (n, d) as a rule of a program has points."""
+    """Monomials (n, count) at places (n, d), one for each point of a rule of a program."""
     if (kind.dimension, kind.corners) == (3, 6):
         flat = [np.ones(len(at))] if count == 2 else [np.ones(len(at)), at[:, 0], at[:, 1]]
         return np.stack([one * at[:, 2] ** power for one in flat
