@@ -108,8 +108,15 @@ def test_drawn_places_scale_the_displacements_and_stay_in_the_box():
 def test_ground_travels_at_its_true_speed_and_its_waves_are_scaled():
     motion = motion_of(run(times=21, waviness=4e-6, speed=0.3), given_scale=100.0)
     np.testing.assert_allclose(motion.ground_pose[0], motion.times[:, None] * [0.3, 0.0])
-    x = np.linspace(0.0, 0.2, 7)
+    x, run_of = np.linspace(0.0, 0.2, 7), motion.trajectory
+    drift = np.mean([run_of.displacement(node)[:, 0] for node in range(5)], axis=0)
+    assert np.abs(drift).max() > 0.0
     for frame in (0, 5, 20):
+        # Over waves, drawn in their true length, the drift along them is not magnified.
+        moved = 100.0 * motion.mode_shapes.shapes @ run_of.modal_coordinates[frame]
+        moved[:, 0] -= 99.0 * drift[frame]
+        np.testing.assert_allclose(motion.body(frame)[0], motion.mode_shapes.nodes + moved,
+                                   rtol=0.0, atol=1e-13)
         wave = 4e-6 * np.sin(2.0 * np.pi * (x - 0.3 * motion.times[frame]) / 0.03)
         np.testing.assert_allclose(motion.ground(frame, x[:, None]), 100.0 * wave, atol=1e-15)
     gap = run(times=3)

@@ -15,8 +15,10 @@ from fecontact import InputError, ModelWarning, Study, read_case
 from fecontact.cli import execute
 from fecontact.cli.templates import template
 from fecontact.io import report
+from fecontact.laws import HeightMap
 from fecontact.output.files.frames import contact_forces
 from fecontact.output.report import page
+from fecontact.output.report.contact import _height_map
 from fecontact.output.report.payload import Payload
 
 EVIL = "</script><img src=x onerror=\"document.title='broken'\"><script>alert(1)</script>"
@@ -117,6 +119,18 @@ def test_contact_nodes_and_ground_stand_where_they_are(tmp_path):
     drift = trajectory.modal_coordinates @ np.array(header["drift"])
     mean = np.mean([trajectory.displacement(node)[:, 0] for node in range(5)], axis=0)
     np.testing.assert_allclose(drift, mean, rtol=1e-12, atol=1e-18)
+
+
+def test_a_large_map_of_heights_is_stored_where_bodies_come():
+    """With .6 of the bodies' width beside them, wherever the ground has travelled."""
+    heights = HeightMap(np.random.default_rng(0).standard_normal((400, 300)), 0.01, 0.01)
+    box, way = np.array([[0.0, 0.0, 0.0], [0.2, 0.1, 0.1]]), np.array([[0.0, 0.0], [0.5, -0.3]])
+    found = _height_map(heights, box, way)
+    first, steps = np.array(found["origin"]), np.array(found["steps"])
+    assert first == pytest.approx([-0.12 - 0.5, -0.12])
+    assert first + steps * found["heights"].shape == pytest.approx([0.32, 0.22 + 0.3])
+    assert found["heights"][3, 5] == pytest.approx(
+        float(heights.shape(*(first + steps * [3, 5]))[0]))
 
 
 def test_curves_are_those_of_the_run(tmp_path):

@@ -7,6 +7,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
+from matplotlib.quiver import Quiver
 from solid_blocks import quadratic_grid
 from test_solid_result_files import SIZE, moved, solid, stacked, system
 
@@ -19,7 +20,7 @@ from fecontact.output.render.frames_data import Motion
 from fecontact.output.render.run_overlay import RunOverlay
 from fecontact.output.render.scene import NODE_COLOURS, Camera
 from fecontact.output.render.scenes import scene_of
-from fecontact.output.render.surfaces import shaded_surface, sharp_edges
+from fecontact.output.render.surfaces import borders, shaded_surface, sharp_edges
 from fecontact.plot import picture, render_mode
 
 rendering = pytest.mark.skipif(offscreen.rendering_problem() is not None,
@@ -116,6 +117,17 @@ def test_sharp_edges_divide_the_surface_and_smooth_ones_do_not():
     assert np.abs((round_one.normals(at) * at).sum(axis=1)[inside]) == pytest.approx(1.0, abs=1e-3)
 
 
+def test_borders_run_between_patches_and_around_them():
+    """Four squares in two patches: eight sides around them and the two between the patches."""
+    number = np.arange(9).reshape(3, 3)
+    squares = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]],
+                       axis=-1).reshape(-1, 4)
+    found = borders(squares, np.array([0, 0, 1, 1]))
+    around = [(0, 1), (1, 2), (2, 5), (5, 8), (7, 8), (6, 7), (3, 6), (0, 3)]
+    assert set(map(tuple, found.tolist())) == {*around, (3, 4), (4, 5)}
+    assert len(found) == 10
+
+
 @rendering
 @pytest.mark.parametrize("view", ["above", "below"])
 def test_the_camera_stands_still_and_the_body_moves(run, view):
@@ -168,8 +180,15 @@ def test_maps_show_pressure_state_wear_and_friction(run):
     assert len(set(counts)) > 1
     assert amounts.max() > 500 * counts.max()
     assert amounts == pytest.approx(counts / counts.max() * amounts.max(), rel=0.05)
+    # Of the pressed patches each has the colour of its pressure.
+    largest = int(run.pressure[pressed].argmax())
+    shade = colormaps["inferno"](run.pressure[pressed, largest] / run.pressure.max())[:3]
+    assert max(shade) > 0.3
+    assert close_to(shown, shade, 3).sum() > 500
     assert not np.array_equal(maps(0), shown)
     assert np.array_equal(maps(pressed), shown)
+    (arrows,) = overlay.figure.findobj(Quiver)
+    assert np.column_stack([arrows.U, arrows.V]) == pytest.approx(motion.friction[pressed, :, :2])
     titles = map_titles(overlay)
     assert titles[:2] == ["pressure and friction   → x  ↑ y", "state"]
     assert titles[2].startswith("worn, up to ")
