@@ -10,6 +10,7 @@ import continuation_cases
 import eigenfrequencies
 import friction_cases
 import friction_section
+import half_spaces_section
 import impact_section
 import large_deflections_section
 import line_contact_section
@@ -46,6 +47,7 @@ def main() -> None:
                        ("line contact", lambda: line_contact_section.section(images)),
                        ("two bodies", lambda: two_bodies_section.section(images)),
                        ("solids", lambda: solids_section.section(images)),
+                       ("half-spaces", half_spaces_section.section),
                        ("sliding solids", lambda: sliding_solids_section.section(images)),
                        ("bodies that turn or repeat", turning_section.section),
                        ("large deflections", large_deflections_section.section),
