@@ -16,6 +16,8 @@ Contact is that of elastic-plastic asperities with measured heights (`AsperityCo
 flatten them, the vibration is elastic. Each asperity sticks with Mindlin's stiffness and slides at
 its own limit, along both directions of the lap; ten elements stand for all of a node. The lap is
 flat, or has its measured shape. The file of the surface is published with the reference too.
+Modulus and density are those of the published model, not the deck's; free modes are printed for the
+deck's.
 
 Usage: python brake_reuss_beam.py DECK SURFACE [FOLDER] [--quick]
        python brake_reuss_beam.py DECK --second-order
@@ -46,7 +48,12 @@ from fecontact.bifurcation import (
 from fecontact.fem import Pairing, pair_faces
 from fecontact.laws import AsperityContact, IwanFriction
 from fecontact.plot import COLOURS, new_figure
-from fecontact.reduction import assembled_basis, eigenfrequencies_hz, reduce_bodies
+from fecontact.reduction import (
+    assembled_basis,
+    eigenfrequencies_hz,
+    reduce_bodies,
+    with_masses,
+)
 from fecontact.system import LoadHistory
 
 BOLT = 12249.0  # force of each bolt [N]
@@ -60,13 +67,25 @@ PUBLISHED = np.array([
     (3.278e-6, 168.153, 2.114e-3), (6.282e-6, 167.539, 4.261e-3), (8.694e-6, 166.919, 6.151e-3),
     (1.203e-5, 166.147, 7.900e-3), (1.663e-5, 165.187, 9.863e-3), (2.295e-5, 164.034, 1.220e-2),
     (3.153e-5, 162.622, 1.525e-2), (4.224e-5, 160.778, 2.074e-2), (5.449e-5, 158.667, 2.631e-2)])
+# With the measured shape.
+PUBLISHED_SHAPE = np.array([
+    (9.839e-8, 180.627, 8.780e-4), (3.456e-7, 180.622, 8.891e-4), (1.272e-6, 180.573, 1.075e-3),
+    (2.437e-6, 180.447, 1.538e-3), (4.655e-6, 180.032, 3.078e-3), (8.850e-6, 178.603, 8.386e-3),
+    (1.378e-5, 176.233, 1.611e-2), (1.799e-5, 174.222, 2.105e-2), (2.293e-5, 172.215, 2.456e-2),
+    (3.046e-5, 169.768, 2.799e-2), (3.739e-5, 167.819, 3.114e-2), (4.680e-5, 165.517, 3.454e-2),
+    (5.364e-5, 164.058, 3.655e-2), (6.409e-5, 162.073, 3.940e-2)])
+# Bending modes with stuck contacts [Hz], flat and with the measured shape.
+PUBLISHED_STUCK = {"flat": (168.503, 580.408, 1177.650),
+                   "measured shape": (180.629, 595.282, 1199.900)}
+# Steel and accelerometer of the model with these results; the deck has 200 GPa and 7800 kg/m^3.
+STEEL, SENSOR = fc.Material(MODULUS, 0.29, 7784.3), 0.8e-3
 THREADS = [(f"BPT-{k}_Set-1", f"NPT-{k}_Set-1") for k in (1, 2, 3)]
 
 
-def beam(deck: Path) -> fc.ElasticBody:
-    """Both beams and their bolts, bricks with mean strain as in the deck."""
-    mesh = fc.read_mesh(deck)
-    return fc.ElasticBody(mesh, degree=1)
+def beam(deck: Path, material: fc.Material | None = None) -> fc.ElasticBody:
+    """Both beams and their bolts, bricks with incompatible modes; by default of its own steel."""
+    return fc.ElasticBody(fc.read_mesh(deck), material, degree=1, bricks="incompatible",
+                          integration="full")
 
 
 def reduced(
@@ -171,11 +190,13 @@ def draw(modes: Mapping[str, NonlinearMode], path: Path) -> None:
                     100.0 * (mode.frequency_hz / mode.frequency_hz[0] - 1.0),
                     100.0 * mode.damping_ratio), strict=True):
                 one.plot(1e6 * mode.amplitude, values, color=COLOURS[k], label=name)
-        for one, values, label in zip(axes, (
-                100.0 * (PUBLISHED[:, 1] / PUBLISHED[0, 1] - 1.0), 100.0 * PUBLISHED[:, 2]),
-                ("change of frequency [%]", "damping ratio [%]"), strict=True):
-            one.plot(1e6 * PUBLISHED[:, 0], values, "o", color="black", ms=4.0,
-                     label="flat, Porter and Brake 2023")
+        for name, known, marker in (("flat", PUBLISHED, "o"),
+                                    ("measured shape", PUBLISHED_SHAPE, "^")):
+            for one, values in zip(axes, (
+                    100.0 * (known[:, 1] / known[0, 1] - 1.0), 100.0 * known[:, 2]), strict=True):
+                one.plot(1e6 * known[:, 0], values, marker, color="black", ms=4.0,
+                         label=f"{name}, published")
+        for one, label in zip(axes, ("change of frequency [%]", "damping ratio [%]"), strict=True):
             one.set(xlabel="amplitude of the end [um]", ylabel=label)
             one.set_xscale("log")
             one.set_xlim(left=0.9)
@@ -205,8 +226,9 @@ def print_free_modes(frequencies_hz: np.ndarray) -> None:
 def main(deck: Path, file: Path, folder: Path, quick: bool) -> None:
     """Prints frequencies and the backbones; pictures in the folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    lap, basis = reduced(beam(deck), *(((8, 2), 60) if quick else ((12, 3), 90)))
-    print_free_modes(basis.frequencies_hz)
+    lap, basis = reduced(beam(deck, STEEL), *(((8, 2), 60) if quick else ((12, 3), 90)))
+    print_free_modes(basis.frequencies_hz * np.sqrt(2e11 / MODULUS * STEEL.density / 7800.0))
+    basis = with_masses(basis, {"beam.out": SENSOR})
     surface = Surface.read(file)
     systems = {"flat": bolted(lap, basis, surface),
                "flat, elastic": bolted(lap, basis, surface, yield_stress=0.0),
@@ -214,16 +236,20 @@ def main(deck: Path, file: Path, folder: Path, quick: bool) -> None:
     modes = {}
     for name, system in systems.items():
         rest, frequencies = stuck_modes(system)
-        print(f"{name}: {frequencies[frequencies > 20.0][0]:.2f} Hz with stuck contacts "
-              f"(published, flat {PUBLISHED[0, 1]:.2f} Hz)", flush=True)
-        modes[name] = mode = backbone(system, rest, 4e-6 if quick else 1.6e-5)
-        print("amplitude [um], change of frequency [%] and damping ratio, both published for flat")
-        for amplitude, hertz, ratio in PUBLISHED:
+        bending = frequencies[frequencies > 20.0][[0, 2, 4]]
+        known = PUBLISHED_STUCK["measured shape" if "shape" in name else "flat"]
+        print(f"{name}, bending modes with stuck contacts: " + ", ".join(
+            f"{found:.2f} Hz (published {one:g})"
+            for found, one in zip(bending, known, strict=True)), flush=True)
+        modes[name] = mode = backbone(system, rest, 4e-6 if quick else 2.4e-5)
+        print("amplitude [um], change of frequency [%] and damping ratio, both published")
+        curve = PUBLISHED_SHAPE if "shape" in name else PUBLISHED
+        for amplitude, hertz, ratio in curve:
             if mode.amplitude[0] <= amplitude <= mode.amplitude[-1]:
                 own, damping = (np.interp(amplitude, mode.amplitude, found)
                                 for found in (mode.frequency_hz, mode.damping_ratio))
                 print(f"{1e6 * amplitude:5.2f} {100.0 * (own / mode.frequency_hz[0] - 1.0):+.3f} "
-                      f"{damping:.5f} {100.0 * (hertz / PUBLISHED[0, 1] - 1.0):+.3f} {ratio:.5f}",
+                      f"{damping:.5f} {100.0 * (hertz / curve[0, 1] - 1.0):+.3f} {ratio:.5f}",
                       flush=True)
     draw_pressure(lap, {name: systems[name] for name in ("flat", "measured shape")},
                   folder / "brake_reuss_pressure.png")
