@@ -12,7 +12,7 @@ from fecontact.analysis.histories import quantity_unit
 from fecontact.analysis.receptance import response_unit
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, ModelWarning, choices
+from fecontact.core.errors import FecontactError, InputError, ModelWarning, choices
 from fecontact.core.tables import located
 from fecontact.fitting.data import FitData
 from fecontact.fitting.data_in_time import DecayData, HistoryData, LoopData
@@ -33,7 +33,8 @@ from fecontact.study.study import Study
 from fecontact.system.contact_system import ContactSystem
 
 # Words of problems of a measurement that a fit does not stop for.
-_DOUBTS = ("gap", "thousandth", "overloaded", "ascend")
+_UNEVEN = ("gap", "ascend")
+_DOUBTS = (*_UNEVEN, "thousandth", "overloaded")
 
 
 def fit_study(
@@ -70,8 +71,15 @@ def settings_of(study: Study) -> FitSettings:
     return study.fit
 
 
+class UnusableError(InputError):
+    """Measured values that cannot be used, which does not hinder the other data of a fit."""
+
+
 def study_data(study: Study) -> tuple[FitData, ...]:
     """Measurements of ``[[fit.data]]`` of a study.
+
+    Data that are not spaced as they must be, or lack numbers in between, are left out with a
+    warning if there are others.
 
     Parameters
     ----------
@@ -83,10 +91,18 @@ def study_data(study: Study) -> tuple[FitData, ...]:
     InputError
         For files that cannot be read, channels that do not exist, and values that cannot be used.
     """
-    found = []
+    found: list[FitData] = []
+    refused: list[UnusableError] = []
     for number, one in enumerate(settings_of(study).data):
-        with located(f"{study.title}: [[fit.data]] {number}:"):
-            found.append(replace(_KINDS[one.kind](study, one), changes=dict(one.changes)))
+        try:
+            with located(f"{study.title}: [[fit.data]] {number}:"):
+                found.append(replace(_KINDS[one.kind](study, one), changes=dict(one.changes)))
+        except UnusableError as error:
+            refused.append(error)
+    if refused and not found:
+        raise refused[0]
+    for lost in refused:
+        warnings.warn(f"{lost} The fit goes on without these data.", ModelWarning, stacklevel=2)
     return tuple(found)
 
 
@@ -174,8 +190,15 @@ def _curve(study: Study, one: FitDataSettings) -> tuple[Any, dict[str, Any]]:
     if one.t_start is not None:
         options["t_start"] = one.t_start
     test = _measurement(study, one, "time", one.channel, even=True)
-    return ring_down(test, channel=test.index(one.channel), resample=one.resample,
-                     **options), options
+    k = test.index(one.channel)
+    try:
+        return ring_down(test, channel=k, resample=one.resample, **options), options
+    except FecontactError as error:
+        sound = len(test.known(test.names[k])) == len(test) and not any(
+            word in problem for problem in test.problems for word in _UNEVEN)
+        if sound:
+            raise
+        raise UnusableError(str(error)) from None
 
 
 def _frequencies(study: Study, one: FitDataSettings) -> FitData:

@@ -323,6 +323,39 @@ def test_cells_without_numbers_are_left_out(study, cli):
     assert "chi square" in out
 
 
+@pytest.mark.parametrize(("delay", "why"), [(0.0, "leave that part out"),
+                                            (0.1, "needs even ones")])
+def test_the_rest_of_a_fit_goes_on_without_a_broken_decay(study, cli, delay, why):
+    """A cell without a number, or a gap in the middle."""
+    time = np.arange(0.0, 0.6, 2e-3)
+    x = np.exp(-9.0 * time) * np.cos(250.0 * time)
+    time[150:] += delay
+    if not delay:
+        x[150] = np.nan
+    (study.parent / "decay.csv").write_text("time [s], tip [m]\n" + "\n".join(
+        f"{t:.9f}, {v:.9g}" for t, v in zip(time, x, strict=True)))
+    whole, decay = study.read_text(), """
+[[fit.data]]
+kind = "ring-down"
+file = "decay.csv"
+channel = "tip"
+t_end = 0.6
+"""
+    study.write_text(whole + decay)
+    code, out, said = cli("fit", str(study), "--set", "fit.starts=1")
+    assert code == 0
+    assert why in said
+    assert "[[fit.data]] 1:" in said
+    assert "The fit goes on without these data." in said
+    assert "chi square" in out
+    # Alone it ends the fit, as does a channel that does not exist.
+    head, _, _ = whole.partition("[[fit.data]]")
+    study.write_text(head + decay)
+    assert cli("fit", str(study))[0] == 1
+    study.write_text(whole + decay.replace('"tip"', '"tap"'))
+    assert cli("fit", str(study))[0] == 1
+
+
 def test_decays_with_uneven_times_are_resampled(study, cli):
     time = np.arange(0.0, 0.6, 2e-3) + 2e-4 * np.random.default_rng(1).random(300)
     x = np.exp(-9.0 * time) * np.cos(250.0 * time)
