@@ -41,6 +41,11 @@ _OTHERWISE = {
     r"C3D20R\w*": "bricks {} have reduced integration as in the deck, and the mass of full "
                   "integration as in Abaqus. With integration = \"full\" in [body] the stiffness "
                   "has all points.",
+    r"C3D8(?![RI])\w*": "bricks {} become second-order hexahedra. With degree = 1 in [body] they "
+                        "have full integration as in CalculiX, and are stiff in bending; Abaqus "
+                        "also takes the mean of their change of volume.",
+    r"C3D4\w*": "tetrahedra {} become second-order tetrahedra. With degree = 1 they stay "
+                "first-order ones, which are much too stiff in bending.",
     r"C3D6\w*": "wedges {} become second-order wedges. With degree = 1 they stay first-order ones "
                 "with two points of quadrature as in the deck.",
     r"C3D5\w*": "pyramids {} become second-order pyramids. With degree = 1 they stay first-order "

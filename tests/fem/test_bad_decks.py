@@ -115,7 +115,8 @@ def test_sections_of_unknown_sets_and_elements_without_one_are_said(tmp_path):
     bare = imported(written(tmp_path, "c.inp", NODES + BRICK))
     assert "The deck gives the body no material. The study takes steel: correct [body]." in (
         bare.notes)
-    assert imported(written(tmp_path, "d.inp", text)).notes == ()
+    assert not any("section" in note or "set" in note
+                   for note in imported(written(tmp_path, "d.inp", text)).notes)
 
 
 def test_couplings_of_no_nodes_and_ties_of_faces_apart_are_said(tmp_path):
