@@ -45,7 +45,9 @@ def tension(force, point="bolt"):
 
 
 @pytest.mark.parametrize("elements", [
-    {"degree": 1}, {"degree": 2}, {"degree": 2, "bricks": "serendipity"}])
+    {"degree": 1}, {"degree": 2}, {"degree": 2, "bricks": "serendipity"},
+    {"degree": 1, "integration": "reduced"},
+    {"degree": 2, "bricks": "serendipity", "integration": "reduced"}])
 @pytest.mark.parametrize("cells", ["hexahedra", "tetrahedra", "mixed"])
 def test_a_bar_between_walls(cells, elements):
     """The force F shortens it by F L / (E A), with the stress F / A; held, it is the whole bar."""
