@@ -1,5 +1,6 @@
 """Iterative modes and deflections of solids with ties, couplings, rigid parts and springs."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -123,6 +124,26 @@ def test_single_precision_suffices_for_deflections_of_few_digits(name):
     assert coarse.dtype == np.float32
     energies = [np.einsum("ij,ij->j", one, forces) for one in (fine, coarse)]
     assert energies[1] == pytest.approx(energies[0], rel=1e-4)
+
+
+def test_where_single_precision_fails_double_precision_serves():
+    """Work that is not positive: here by another sign of the stiffness, else by rounding."""
+    solver = FreeSystem.of(body("distributing, clamped"), "iterative").iterative
+    single = solver.stiffness.single()
+
+    class Turned:
+        def product(self, x):
+            return -single.product(x)
+
+    solver.__dict__["_single"] = replace(solver, stiffness=Turned())
+    forces = solver.mass_product(np.random.default_rng(2).standard_normal(
+        (solver.moving.size, 40)) * solver.moving.reshape(-1, 1))
+    fine, _ = solver.deflections(forces, 1e-9)
+    coarse, converged = solver.deflections(forces, 1e-3)
+    assert converged
+    energies = [np.einsum("ij,ij->j", one, forces) for one in (fine, coarse)]
+    assert energies[1] == pytest.approx(energies[0], rel=1e-4)
+    assert not solver._single._conjugate_gradients(forces.astype(np.float32), 1e-3, 100)[1]
 
 
 def test_a_modal_basis_with_contact_nodes_beside_a_tie():

@@ -179,7 +179,7 @@ class SolidSolver:
 
         Conjugate gradients, until the energy norm of the residual is below the tolerance, relative
         to that of the displacements, which may hold any rigid motion: balanced forces do no work
-        on it. Above a tolerance of 1e-3 they are of single precision.
+        on it. Above a tolerance of 1e-3 they are of single precision, unless that does not do.
         """
         solver, dtype = (self._single, np.float32) if tolerance >= _SINGLE else (self, np.float64)
         found, converged = np.empty(forces.shape, dtype), True
@@ -187,6 +187,10 @@ class SolidSolver:
             part = slice(first, first + WIDTH)
             found[:, part], reached = solver._conjugate_gradients(
                 forces[:, part].astype(dtype), tolerance, most)
+            if not reached and solver is not self:
+                solver, dtype = self, np.float64
+                found[:, part], reached = self._conjugate_gradients(
+                    forces[:, part].astype(dtype), tolerance, most)
             converged &= reached
         return found, converged
 
@@ -203,7 +207,10 @@ class SolidSolver:
         for _ in range(most):
             pushed = self.stiffness_product(direction)
             curvature = np.einsum("ij,ij->j", direction, pushed)
-            step = np.where(reached, 0.0, energy / np.where(curvature > 0.0, curvature, 1.0))
+            # Where rounding exceeds what is left, as rigid motions in it may do.
+            if not (curvature[~reached] > 0.0).all():
+                return x, False
+            step = np.where(reached, 0.0, energy / np.where(reached, 1.0, curvature))
             step_on(step, direction, pushed, x, residual)
             gain = step * energy
             work += gain
@@ -216,6 +223,8 @@ class SolidSolver:
             before = gain
             z = self._cycle(residual)
             following = np.einsum("ij,ij->j", residual, z)
+            if not (following[~reached] > -(tolerance**2) * work[~reached]).all():
+                return x, False
             reached |= following <= tolerance**2 * work
             if reached.all():
                 break
