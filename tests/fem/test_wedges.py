@@ -525,9 +525,10 @@ def test_mixed_files_are_read_as_they_are(tmp_path, form, seed):
     (8, 1, "C3D8R", "32 bricks C3D8R (one point) become second-order hexahedra. With"),
     (8, 1, "C3D8I", "32 bricks C3D8I become second-order hexahedra, with nearly the same"),
     (8, 1, "C3D8", "32 bricks C3D8 become second-order hexahedra. With degree = 1 in [body] they"),
+    (4, 1, "C3D4", "192 tetrahedra C3D4 become second-order tetrahedra. With degree = 1 they stay"),
 ])
 def test_an_import_tells_elements_that_are_read_as_others(tmp_path, corners, order, kind, note):
-    block = block_mesh((8, 2, 2), SIZE)
+    block = block_mesh((8, 2, 2), SIZE, tetrahedra=corners == 4)
     nodes, cells = wedges((8, 2, 2)) if corners == 6 else (block.nodes, block.cells)
     if order == 2:
         nodes, cells = second_order(nodes, cells, WEDGE)

@@ -1,10 +1,12 @@
 import inspect
 import struct
 from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from matplotlib import rc_context
+from matplotlib.collections import TriMesh
 from matplotlib.image import imread
 from synthetic import basis, rectangle, run
 
@@ -14,8 +16,10 @@ from fecontact.fem import BodyFields
 from fecontact.integrate import Energies
 from fecontact.output.diagrams.colours import ENERGY_COLOURS
 from fecontact.output.diagrams.diagram import thinned
+from fecontact.output.plots.bodies import draw_body
 from fecontact.plot import (
     STATE_COLOURS,
+    new_figure,
     plot_contact_map,
     plot_energies,
     plot_friction_work,
@@ -25,6 +29,7 @@ from fecontact.plot import (
     plot_stress,
     styled,
 )
+from fecontact.reduction.mode_shapes import BodyPart
 from fecontact.system import columns, powers
 
 
@@ -435,3 +440,21 @@ def test_a_file_among_what_is_drawn_is_refused(tmp_path):
     with pytest.raises(TypeError):
         plot_energies(run(times=11), tmp_path / "a.png")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("still", [0, 1])
+def test_bodies_that_move_are_drawn_above_those_at_rest(still):
+    """Two squares at one place, of which one has amplitudes of zero."""
+    square = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+    bodies = SimpleNamespace(nodes=np.tile(square, (2, 1)), cells=np.arange(8).reshape(2, 4),
+                             outline=np.array([(0, 1), (4, 5)]))
+    values = np.ones(8)
+    values[4 * still : 4 * still + 4] = 0.0
+    parts = [BodyPart("one", (0, 1), (0, 4)), BodyPart("two", (1, 1), (4, 4))]
+    with new_figure(3.0, 3.0) as figure:
+        axes = figure.subplots()
+        draw_body(axes, bodies, bodies.nodes, values, cmap="viridis", low=0.0, high=1.0,
+                  parts=parts)
+    below, above = (one for one in axes.collections if isinstance(one, TriMesh))
+    owners = [4 * (one._triangulation.triangles.min() >= 4) for one in (below, above)]
+    assert owners == [4 * still, 4 * (1 - still)]

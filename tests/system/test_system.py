@@ -23,6 +23,7 @@ from fecontact.integrate import initial_state
 from fecontact.laws import ExponentialFriction, RoughSurface
 from fecontact.system import columns
 from fecontact.system.columns import POWERS
+from fecontact.system.kernels import contact_at
 from fecontact.system.powers import powers
 
 R = 10e-6
@@ -473,3 +474,14 @@ def test_states_of_other_layout_and_type():
     many = np.column_stack([y, y]).T
     assert (system.contact_history([0.0, 0.0], many[:, :])[0] ==
             system.contact_history(np.zeros(1), y[None])[0]).all()
+
+
+def test_contact_of_one_state_is_that_of_a_history():
+    system = random_system()
+    states = np.random.default_rng(4).standard_normal((3, system.size)) * 1e-5
+    times = np.array([0.0, 0.2, 0.7])
+    history = system.contact_history(times, states)
+    assert history.any()
+    for k in range(3):
+        assert contact_at(times[k], states[k], system.arrays) == pytest.approx(
+            history[k], rel=1e-12)
