@@ -6,12 +6,13 @@ the kernel from Python spends no time on converting function objects.
 """
 
 import dis
+import gc
 import hashlib
 import inspect
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache, cached_property, partial
 from numbers import Number
@@ -42,6 +43,17 @@ from fecontact.core.stored_code import (
 _FASTMATH = {"reassoc", "contract", "nsz", "arcp"}
 _COMPILING = ("Compiling {}{}, once on this machine; 'fecontact compile --all' compiles everything "
               "ahead.")
+
+
+@contextmanager
+def _little_collecting() -> Iterator[None]:
+    """Look for garbage rarely: what numba makes stays, and going through it takes a seventh."""
+    before = gc.get_threshold()
+    gc.set_threshold(100_000, 10, 1000)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
 
 
 def source_digest(function: Any) -> str:
@@ -143,7 +155,7 @@ class _Kernel(CPUDispatcher):
     @cached_property
     def signature(self) -> Any:
         """Arguments and result, as numba's types."""
-        return self.given or signature_of(self.py_func, by_reference=self.by_address)
+        return self.given or signature_of(self.py_func)
 
     def for_values(self, constants: str) -> Any:
         """The kernel for records with values of :func:`fecontact.core.constants.constants`."""
@@ -166,8 +178,8 @@ class _Kernel(CPUDispatcher):
                 about = "" if last is None else f", about {math.ceil(last)} s"
                 name = f"{self.__module__}.{self.__name__}".removeprefix("fecontact.")
                 # Code that is on disk is no miss.
-                with said_if_slow(_COMPILING.format(name, about),
-                                  lambda: bool(self._cache_misses)):
+                with _little_collecting(), said_if_slow(_COMPILING.format(name, about),
+                                                        lambda: bool(self._cache_misses)):
                     self.compile(self.signature)
                 if self._cache_misses:
                     note_seconds_to_compile(self, time.perf_counter() - begin)
@@ -316,7 +328,8 @@ class CompiledLaw:
         if Path(inspect.getfile(function)).is_file():
             keep_on_disk(law, (source_digest(function), function.__module__), function.__module__)
         try:
-            law.compile()
+            with _little_collecting():
+                law.compile()
         except (NumbaError, TypeError) as error:
             lines = [line.strip() for line in str(error).splitlines() if line.strip()]
             raise InputError(f"The law {function.__name__}({_arguments(function)}) is not one of "

@@ -47,7 +47,19 @@ class _NoMachineCode:
         """Do nothing: the kernel provides the environment."""
 
 
-class _PartLibrary(JITCodeLibrary):
+class _Library(JITCodeLibrary):
+    """Code whose functions are optimised one by one before it is joined with other code."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        # Numba does it for declarations, and for functions that read a single field, too.
+        ll_module.data_layout = self._codegen._data_layout
+        for function in ll_module.functions:
+            if not function.is_declaration and not function.name.startswith("Reference("):
+                passes, builder = self._codegen._function_pass_manager()
+                passes.run(function, builder)
+
+
+class _PartLibrary(_Library):
     """Intermediate code of a part and of what it calls."""
 
     @property
@@ -68,7 +80,7 @@ class _PartLibrary(JITCodeLibrary):
         self._finalized = True
 
 
-class _KernelLibrary(JITCodeLibrary):
+class _KernelLibrary(_Library):
     """Code of a kernel, which is seen from outside by its entries only.
 
     Its routines stay functions of their own, unless ``constants`` make them short.
@@ -127,23 +139,31 @@ class _Borrow(FunctionPass):
         return True
 
 
-# Numba's hash of flags, which depends on their names alone.
+# Numba's hash of flags, which depends on their names alone, and the values of those not set.
 _HASH = int(Flags.__hash__(Flags()))
+_DEFAULTS = {name: option.default for name, option in Flags.options.items()}
 
 
 class _Flags(Flags):
     """Numba's flags, which it compares at each call that it types, by reading all of them twice.
 
-    Flags of equal settings are equal without that; those that differ are compared as before.
+    Only those that are set on one side are read here.
     """
 
     def __hash__(self) -> int:
         return _HASH
 
     def __eq__(self, other: object) -> bool:
-        if isinstance(other, Flags) and self._values == other._values:
+        if not isinstance(other, Flags):
+            return NotImplemented
+        mine, others = self._values, other._values
+        if mine == others:
             return True
-        return bool(super().__eq__(other))
+        for name in mine.keys() | others.keys():
+            default = _DEFAULTS[name]
+            if mine.get(name, default) != others.get(name, default):
+                return False
+        return True
 
 
 class _PlainCompiler(Compiler):

@@ -28,7 +28,7 @@ from numba.core.typing import Signature
 from numpy.typing import NDArray
 from typing_extensions import TypeAliasType
 
-from fecontact.core.references import Reference
+from fecontact.core.references import reference_to
 from fecontact.core.types import Array, ComplexArray, Integers
 
 Record = TypeVar("Record", bound=tuple[Any, ...])
@@ -207,11 +207,10 @@ def shapes(sizes: Mapping[Size, int], *records: Any) -> dict[Any, dict[str, Any]
     return found
 
 
-def signature_of(annotated: Any, *, by_reference: bool = True) -> Signature:
+def signature_of(annotated: Any) -> Signature:
     """The signature of a function, or of a ``Callable[[...], ...]``, for numba.
 
-    Functions that compiled code calls by their address get references to records with arrays.
-    Those that Python calls get the records themselves.
+    Functions get references to records with arrays.
     """
     if get_origin(annotated) is Callable:
         given, result = get_args(annotated)
@@ -219,10 +218,8 @@ def signature_of(annotated: Any, *, by_reference: bool = True) -> Signature:
         hints = typing.get_type_hints(annotated, include_extras=True)
         result = hints.pop("return")
         given = list(hints.values())
-    arguments = [numba_type(item) for item in given]
-    if by_reference:
-        arguments = [Reference(kind) if isinstance(kind, types.BaseNamedTuple)
-                     and holds_arrays(kind) else kind for kind in arguments]
+    arguments = [reference_to(kind) if isinstance(kind, types.BaseNamedTuple)
+                 and holds_arrays(kind) else kind for kind in map(numba_type, given)]
     return Signature(numba_type(result), tuple(arguments), None)
 
 

@@ -11,9 +11,12 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
+from numba.core.boxing import unbox
 from numba.core.datamodel import models
 from numba.core.imputils import lower_cast
+from numba.core.pythonapi import NativeValue
 from numba.core.typeconv import Conversion
+from numba.core.typeconv.rules import default_type_manager
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, register_model
 
@@ -32,6 +35,13 @@ class Reference(types.Type):
     def can_convert_to(self, typingctx: Any, other: Any) -> Any:
         """A reference serves where the tuple itself is expected."""
         return Conversion.safe if other == self.tuple_type else None
+
+
+def reference_to(tuple_type: Any) -> Reference:
+    """The reference that a kernel takes, to which Python gives the tuple itself."""
+    reference = Reference(tuple_type)
+    default_type_manager.set_safe_convert(tuple_type, reference)
+    return reference
 
 
 def _described(kind: Any) -> str:
@@ -158,12 +168,62 @@ def without_owner(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     return array._getvalue()
 
 
+@unbox(Reference)
+def _given_by_python(kind: Any, value: Any, c: Any) -> Any:
+    """A reference to a copy on the stack of the entry; who calls holds the arrays meanwhile."""
+    place = cgutils.alloca_once(c.builder, c.context.get_value_type(kind.tuple_type))
+    failed = c.builder.call(_filler(kind, c), [value, place])
+    return NativeValue(_written(c.builder, place), is_error=failed)
+
+
+def _filler(kind: Any, c: Any) -> Any:
+    """A function that writes the fields of a Python tuple; whether one of them cannot be read.
+
+    The fields of numba's own entries are hundreds of branches, which take longer to compile than
+    many a kernel.
+    """
+    name = f"fill.{kind.name}"
+    function = c.builder.module.globals.get(name)
+    if function is not None:
+        return function
+    place = c.context.get_value_type(kind.tuple_type).as_pointer()
+    function = ir.Function(c.builder.module,
+                           ir.FunctionType(cgutils.bool_t, [c.pyapi.pyobj, place]), name)
+    function.linkage = "linkonce_odr"
+    function.attributes.add("noinline")
+    builder = ir.IRBuilder(function.append_basic_block())
+    inside = c._replace(builder=builder, pyapi=c.context.get_python_api(builder))
+    array_type = ir.FunctionType(_I32, [c.pyapi.pyobj, cgutils.voidptr_t])
+    adapt = cgutils.get_or_insert_function(c.builder.module, array_type, "numba_adapt_ndarray")
+    failed = cgutils.false_bit
+    for index in range(len(kind.tuple_type)):
+        field = _field_type(kind.tuple_type, index)
+        item = inside.pyapi.tuple_getitem(function.args[0], index)
+        target = cgutils.gep_inbounds(builder, function.args[1], 0, index)
+        if isinstance(field, types.Array):
+            code = builder.call(adapt, [item, builder.bitcast(target, cgutils.voidptr_t)])
+            wrong = cgutils.is_not_null(builder, code)
+        elif isinstance(field, types.BaseNamedTuple):
+            wrong = builder.call(_filler(Reference(field), inside), [item, target])
+        else:
+            found = inside.unbox(field, item)
+            builder.store(found.value, target)
+            wrong = found.is_error
+        failed = builder.or_(failed, wrong)
+    builder.ret(failed)
+    return function
+
+
 @lower_cast(types.BaseTuple, Reference)
 def _reference(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> Any:
     """A reference to a copy on the stack of what calls; arrays stay that one's."""
     place = cgutils.alloca_once(builder, value.type)
     _write(builder, value, place)
-    # No read may come before what is written here.
+    return _written(builder, place)
+
+
+def _written(builder: Any, place: Any) -> Any:
+    """The place; no read of it comes before what has been written there."""
     pointer = ir.FunctionType(place.type, [place.type])
     return builder.asm(pointer, "", "=r,0,~{memory}", [place], True)
 

@@ -16,7 +16,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.laws.friction.planar import along_slip
 from fecontact.laws.friction.stribeck import no_friction
 from fecontact.system.node_forces import force_workspace, node_forces
-from fecontact.system.nodes import SystemArrays, ground_motion, memory_of, node_motion
+from fecontact.system.nodes import SystemArrays, ground_motion, memory_of, most_memory, node_motion
 from fecontact.system.powers import BRISTLES, FRICTION, POWER_COUNT
 
 # An element that sticks again is short of its limit by this part, so that a parameter that changes
@@ -43,7 +43,7 @@ def limit_of(j, i, count, pressing, s):
 @routine
 def limits_at(moved, y, s, counts, force, rates):
     """Largest deflections (n, elements) of all elements in the state y [m]."""
-    limits = np.zeros((len(counts), s.memory.max()))
+    limits = np.zeros((len(counts), most_memory(s)))
     for j in range(len(counts)):
         if counts[j] > 0:
             _, pressing, _ = pressing_at(j, y, moved, s, force, rates)
@@ -110,7 +110,7 @@ def widen_scales(moved, y, s, counts, force, rates, scale):
     """
     limits, tangents = limits_at(moved, y, s, counts, force, rates), s.rows.shape[1] - 1
     for j in range(len(counts)):
-        first = len(y) + (j - len(counts)) * s.memory.max()
+        first = len(y) + (j - len(counts)) * most_memory(s)
         for i in range(counts[j]):
             limit, size = limits[j, i], deflection_of(memory_of(j, y, s), i, s)
             if size > limit:

@@ -19,6 +19,7 @@ from fecontact.system.nodes import (
     SystemArrays,
     ground_motion,
     memory_of,
+    most_memory,
     node_motion,
 )
 from fecontact.system.parameter_derivatives import (
@@ -261,5 +262,5 @@ def batch_derivatives(
     workspace = DerivativesWorkspace(
         np.empty(m), np.empty(m), force, rates, np.empty((d + 1, 2 * d)), np.empty(d),
         np.empty((d, 2 * m)), np.empty_like(s.polynomial_rows), offset_force, offset_rates,
-        np.empty(s.memory.max()), np.empty(2 * d), np.empty(d))
+        np.empty(most_memory(s)), np.empty(2 * d), np.empty(d))
     _fill_derivatives(t, x, s, r, offset_laws(s, r, step), workspace, Derivatives(f, J, P))

@@ -14,7 +14,7 @@ from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.laws.friction.planar import direction
 from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, planar_at
-from fecontact.system.nodes import NodeContact, node_contact
+from fecontact.system.nodes import NodeContact, most_memory, node_contact
 
 
 class NodeForces(NamedTuple):
@@ -35,7 +35,7 @@ def friction_entries(states, s):
 @helper
 def force_workspace(s):
     """Arrays for what a friction law says at a node of a system: ``force`` and ``rates``."""
-    states = s.memory.max()
+    states = most_memory(s)
     return (np.empty(friction_entries(states, s)),
             np.empty((states, s.rows.shape[1] + 1 + states)))
 

@@ -245,6 +245,15 @@ def node_contact(j, motion, moved, s):
 
 
 @helper
+def most_memory(s):
+    """Largest number of internal variables of a node."""
+    most = 0
+    for j in range(len(s.memory)):
+        most = max(most, s.memory[j])
+    return most
+
+
+@helper
 def memory_of(j, y, s):
     """Internal variables of node j: a view of the state y."""
     n, _, m = s.rows.shape

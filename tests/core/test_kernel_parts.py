@@ -1,5 +1,6 @@
 """References to named tuples in kernels, and parts of kernels."""
 
+import gc
 import subprocess
 import sys
 from collections.abc import Callable
@@ -17,8 +18,12 @@ from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law, helper, kernel, routine
 from fecontact.core.constants import constants
 from fecontact.core.records import (
+    ComplexMatrix,
+    ComplexVector,
+    FlagVector,
     IntegerVector,
     Matrix,
+    ShortBlock,
     Vector,
     holds_arrays,
     numba_type,
@@ -145,6 +150,56 @@ def test_constants_stand_for_what_a_tuple_says():
     assert weighted(p) == 2.0 * (111.0 + 1.0 + 5.0 + 9.0)
 
 
+class Mixed(NamedTuple):
+    """Fields of every kind, and a record in another that has numbers alone."""
+
+    flag: bool
+    amount: float
+    marks: FlagVector
+    spectrum: ComplexMatrix
+    short: ShortBlock
+    count: int
+    inner: Inner
+    outer: Outer
+
+
+@kernel
+def fields_of(p: Mixed, own: ComplexVector) -> int:
+    own[0], own[1] = p.amount, p.spectrum[0, 0]
+    own[2], own[3] = p.spectrum[1, 0], p.short[1, 2, 0]
+    own[4], own[5] = p.inner.factor, p.outer.inner.rows[0, 1]
+    own[6], own[7] = p.outer.x[2], p.outer.count
+    p.marks[1] = p.flag
+    return p.count
+
+
+def mixed():
+    return Mixed(True, 0.5, np.zeros(2, bool), np.array([[3.0j], [4.0j]]),
+                 np.arange(6, dtype=np.int32).reshape(2, 3, 1), -7, given().inner, given())
+
+
+def test_python_hands_over_fields_of_every_kind():
+    p, own = mixed(), np.zeros(8, complex)
+    counts = [sys.getrefcount(array) for array in (p.marks, p.spectrum, p.outer.x)]
+    for _ in range(100):
+        assert fields_of(p, own) == -7
+    assert own.tolist() == [0.5, 3.0j, 4.0j, 5.0, 2.5, p.outer.inner.rows[0, 1],
+                            p.outer.x[2], 4.0]
+    assert p.marks.tolist() == [False, True]
+    assert [sys.getrefcount(array) for array in (p.marks, p.spectrum, p.outer.x)] == counts
+
+
+@pytest.mark.parametrize("change", [
+    {"amount": "a"}, {"count": 1.5}, {"flag": None}, {"marks": np.zeros(2)},
+    {"marks": [True, False]}, {"spectrum": np.ones((2, 1))}, {"spectrum": np.ones(2, complex)},
+    {"spectrum": np.asfortranarray(np.ones((2, 2), complex))}, {"inner": (np.ones((1, 1)), 1.0)},
+    {"inner": Inner(np.ones(1), 1.0)}, {"outer": given()._replace(x=np.ones(5)[::2])},
+])
+def test_fields_of_another_type_are_refused(change):
+    with pytest.raises(TypeError, match="No matching definition"):
+        fields_of(mixed()._replace(**change), np.zeros(8, complex))
+
+
 class Numbers(NamedTuple):
     a: float
     b: float
@@ -167,7 +222,7 @@ def test_only_records_with_arrays_go_by_reference():
     assert found.args == (Reference(numba_type(Outer)), numba_type(Numbers), numba_type(Vector),
                           types.boolean)
     assert found.return_type == types.void
-    assert signature_of(weighted.py_func, by_reference=False).args == (numba_type(Table),)
+    assert signature_of(weighted.py_func).args == (Reference(numba_type(Table)),)
 
 
 @kernel(by_address=True)
@@ -231,6 +286,24 @@ def test_threads_may_call_a_kernel_for_the_first_time_together():
     with ThreadPoolExecutor(4) as threads:
         found = list(threads.map(lambda _: many_sines(x), range(8)))
     assert found == pytest.approx([np.sin(x).sum()] * 8)
+
+
+@kernel
+def many_cosines(x: Vector) -> float:
+    total = 0.0
+    for value in x:
+        total += np.cos(value)
+    return total
+
+
+def test_the_collector_of_garbage_is_as_before_after_compilation():
+    before = gc.get_threshold()
+    gc.set_threshold(701, 9, 8)
+    try:
+        assert many_cosines(np.zeros(3)) == 3.0
+        assert gc.get_threshold() == (701, 9, 8)
+    finally:
+        gc.set_threshold(*before)
 
 
 @pytest.mark.long

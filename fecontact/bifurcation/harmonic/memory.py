@@ -34,7 +34,13 @@ from fecontact.system.node_forces import (
     pressing_force,
     set_friction,
 )
-from fecontact.system.nodes import SystemArrays, ground_motion, node_contact, node_motion
+from fecontact.system.nodes import (
+    SystemArrays,
+    ground_motion,
+    most_memory,
+    node_contact,
+    node_motion,
+)
 
 LEAK = 1e-6
 # Largest number of rounds, of Newton steps at a sample, and relative changes that end both.
@@ -434,7 +440,7 @@ def march(
     without deflection; after two of them, Newton's method finds the start that repeats. Returns 1
     if every node has come to that, 0 if one has not.
     """
-    N, n, states = len(t), len(s.rows), s.memory.max()
+    N, n, states = len(t), len(s.rows), most_memory(s)
     slip, p = np.empty((N, 3)), np.empty(3)
     element, samples = Sliding(p, slip), Samples(t, y, T)
     z[:, :] = 0.0

@@ -36,6 +36,7 @@ from fecontact.system.nodes import (
     ground_motion,
     ground_moved,
     memory_of,
+    most_memory,
     node_motion,
     size_of,
 )
@@ -187,7 +188,7 @@ def _begin_columns(j, i, through, deepening, moment):
     t, y, vary, force, rates = (moment.t, moment.y, moment.vary, moment.force,
                                 moment.node_rates)
     s, v, tangents = moment.problem.system, vary.variation, moment.problem.system.rows.shape[1] - 1
-    first = 2 * len(moment.problem.control.largest) + j * s.memory.max() + tangents * i
+    first = 2 * len(moment.problem.control.largest) + j * most_memory(s) + tangents * i
     F, pressing, contact = pressing_at(j, y, ground_motion(t, s), s, force, rates)
     _, by_depth, by_rate = normal_force(j, contact.penetration, contact.rate, s)
     rate = by_depth * contact.rate + by_rate * deepening if through else contact.rate
@@ -225,7 +226,7 @@ def _begin_contact(j, since, through, acceleration, moment):
         limit = limit_of(j, i, count, pressing, s)
         first, time, moves = tangents * i, since, False
         if speed * since > limit:
-            time = max(since, _LEAST * scales[j * s.memory.max() + first] / speed)
+            time = max(since, _LEAST * scales[j * most_memory(s) + first] / speed)
         for k in range(tangents):
             moves |= z[first + k] != slip[k] * time
         if not moves:
@@ -314,7 +315,7 @@ def _columns(j, i, limit, size, moment):
                                 moment.node_rates)
     s, v, control = moment.problem.system, vary.variation, moment.problem.control
     tangents, count = s.rows.shape[1] - 1, control.slider_counts[j]
-    first = 2 * len(control.largest) + j * s.memory.max() + tangents * i
+    first = 2 * len(control.largest) + j * most_memory(s) + tangents * i
     z, p = memory_of(j, y, s), s.friction_parameters[j]
     slope = p[1 + count + i] / p[1 + i]
     for c in range(len(v.columns)):
@@ -353,7 +354,7 @@ def _return_one(j, i, within, moment):
 def _switch(step, problem, progress, workspace, vary):
     s, control = problem.system, problem.control
     n, varies = len(control.slider_counts), len(vary.variation.columns) > 0
-    states = s.memory.max()
+    states = most_memory(s)
     force, rates = force_workspace(s)
     y = np.empty(len(progress.state))
     view = View(step, problem, progress, workspace, y, force, rates)

@@ -9,7 +9,7 @@ from fecontact.core.compiled import kernel
 from fecontact.core.records import Block, Vector
 from fecontact.system.kernels import prescribed_at
 from fecontact.system.node_forces import axis_force, force_workspace, node_forces
-from fecontact.system.nodes import SystemArrays, memory_of, node_motion
+from fecontact.system.nodes import SystemArrays, memory_of, most_memory, node_motion
 
 
 class AffineSystem(NamedTuple):
@@ -36,7 +36,7 @@ def forces_at_rest(
     """
     s = affine.system
     n, d, m = s.rows.shape
-    P, N, states = len(places), len(tau), s.memory.max()
+    P, N, states = len(places), len(tau), most_memory(s)
     force, rates = force_workspace(s)
     load, still = np.empty(m), np.zeros(2 * m + n * states)
     loads, rest, matrices = np.empty((P, N, m)), np.empty((N, m)), np.empty((P, 2, m, m))
