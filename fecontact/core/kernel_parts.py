@@ -11,7 +11,7 @@ from typing import Any
 
 from llvmlite.binding import Linkage, parse_assembly
 from numba import types
-from numba.core import ir
+from numba.core import ir, sigutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, Flags
 from numba.core.compiler_machinery import FunctionPass, register_pass
@@ -224,6 +224,19 @@ class _Part(CPUDispatcher):
 
     def __call__(self, *arguments: Any) -> Any:
         return self._callable(*arguments)
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for a signature, unless that is done.
+
+        Numba does the same, and tells each function under way, of which there are many at a time,
+        about every lock: a part takes no time of its own that anybody asks for.
+        """
+        arguments, result = sigutils.normalize_signature(sig)
+        found = self.overloads.get(tuple(arguments))
+        if found is None:
+            found = self._compiler.compile(arguments, result)
+            self.add_overload(found)
+        return found.entry_point
 
 
 def part(function: Callable[..., Any], *, borrows: bool = False, **options: Any) -> Any:
