@@ -5,9 +5,12 @@ at most the deviation of its coefficients from that line, and a node by at most 
 modes. For few nodes on flat ground it is cheaper to evaluate the coefficients themselves.
 """
 
-from fecontact.core.compiled import helper, routine
+from fecontact.core.addresses import function_at
+from fecontact.core.compiled import helper, kernel, routine
+from fecontact.core.types import Array
 from fecontact.integrate.near_nodes import reach_out
 from fecontact.integrate.rodas5p import dynamics as motion
+from fecontact.integrate.rodas5p import state
 from fecontact.integrate.step_polynomials import (
     FASTEST,
     HIGHEST,
@@ -21,19 +24,6 @@ from fecontact.system.nodes import ground_speed
 
 # Largest number of nodes that counts as few.
 _FEW = 4
-
-
-@routine
-def may_switch(step, problem, progress, workspace):
-    """True if :func:`needs_search` may return True; costs less.
-
-    ``workspace.ends`` and ``workspace.nodes`` hold the nodes at both ends, ``workspace.given`` the
-    motion of the ground at the end.
-    """
-    s, control = problem.system, problem.control
-    if len(s.gap) <= _FEW and control.ground[STEEPEST] == 0.0:
-        return _nodes_may_switch(step.moved, step.h, s, problem.blocks, control, workspace)
-    return _modes_may_switch(step, problem, progress, workspace)
 
 
 @helper
@@ -90,9 +80,25 @@ def _nodes_may_switch(moved, h, s, blocks, control, workspace):
     return some
 
 
+def counts_as_few(nodes: int, ground: Array) -> bool:
+    """Whether so many nodes over ground of these bounds are looked at one by one."""
+    return nodes <= _FEW and ground[STEEPEST] == 0.0
+
+
 @helper
-def _modes_may_switch(step, problem, progress, workspace):
-    """Tests of :func:`needs_search` for many nodes or wavy ground, by bounds on the modes."""
+def _departure(k1, k2, k3):
+    """Bound on the distance of the interpolant from the straight line between its ends."""
+    return max(max(0.25 * abs(k1), abs(2.0 * k1 + k2) / 6.0), 0.25 * abs(k1 + k2 + k3))
+
+
+@kernel(by_address=True)
+def modes_may_switch(
+    step: state.Step, problem: state.Problem, progress: state.Progress, workspace: state.Workspace
+) -> bool:
+    """Tests of :func:`needs_search` for many nodes or wavy ground, by bounds on the modes.
+
+    ``Control.many`` is its address, zero where nodes count as few.
+    """
     s, blocks, control = problem.system, problem.blocks, problem.control
     bounds, levels, ends, nodes, dense = (control.ground, control.levels, workspace.ends,
                                           workspace.nodes, workspace.dense)
@@ -108,7 +114,7 @@ def _modes_may_switch(step, problem, progress, workspace):
         moves[i + 1] = moves[i] + largest * _departure(dense[0, i], dense[1, i], dense[2, i])
         speeds[i + 1] = speeds[i] + largest * _departure(
             dense[0, m + i], dense[1, m + i], dense[2, m + i])
-    reach_out(furthest + moves[m], blocks, workspace)
+    reach_out(furthest + moves[m], problem, progress, workspace)
     wavy = bounds[STEEPEST] != 0.0
     if wavy:
         set_heights(motion.motion_given(workspace.given), s, bounds, nodes[0], ends[2, n : 2 * n])
@@ -149,10 +155,20 @@ def _modes_may_switch(step, problem, progress, workspace):
     return some
 
 
-@helper
-def _departure(k1, k2, k3):
-    """Bound on the distance of the interpolant from the straight line between its ends."""
-    return max(max(0.25 * abs(k1), abs(2.0 * k1 + k2) / 6.0), 0.25 * abs(k1 + k2 + k3))
+_modes_may_switch_at = function_at(modes_may_switch)
+
+
+@routine
+def may_switch(step, problem, progress, workspace):
+    """True if :func:`needs_search` may return True; costs less.
+
+    ``workspace.ends`` and ``workspace.nodes`` hold the nodes at both ends, ``workspace.given`` the
+    motion of the ground at the end.
+    """
+    s, control = problem.system, problem.control
+    if control.many != 0:
+        return _modes_may_switch_at(control.many)(step, problem, progress, workspace)
+    return _nodes_may_switch(step.moved, step.h, s, problem.blocks, control, workspace)
 
 
 @routine

@@ -18,6 +18,7 @@ from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.interfaces import PrescribedMotion
 from fecontact.system.loads import load_rows
 from fecontact.system.nodes import SystemArrays
+from fecontact.system.polynomial_forces import evaluate_polynomial
 
 LawGroup = tuple[slice, Array, Any]
 
@@ -90,10 +91,12 @@ def _polynomial_arrays(basis: ModalBasis) -> dict[str, Any]:
 
     given, m = basis.large_deflections, basis.modes
     first = np.cumsum([0, *(len(one.coordinates) for one in given)])
+    pairs = np.concatenate([np.zeros((0, 2), dtype=np.int64), *(
+        one.pairs + start for one, start in zip(given, first, strict=False))])
     return {
+        "polynomial": evaluate_polynomial.address if len(pairs) else 0,
         "polynomial_rows": np.concatenate([np.zeros((0, m)), *(one.coordinates for one in given)]),
-        "polynomial_pairs": np.concatenate([np.zeros((0, 2), dtype=np.int64), *(
-            one.pairs + start for one, start in zip(given, first, strict=False))]),
+        "polynomial_pairs": pairs,
         "polynomial_cubic": np.concatenate([np.zeros((0, m)), *(one.cubic for one in given)]),
         "polynomial_quartic": block_diag(*(one.quartic for one in given)) if given else (
             np.zeros((0, 0)))}

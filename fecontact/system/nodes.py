@@ -39,7 +39,8 @@ class SystemArrays(NamedTuple):
     which both motions of the other sides move along the tangents of a node.
 
     ``polynomial_rows`` (D, m), ``polynomial_pairs`` (P, 2), ``polynomial_cubic`` (P, m) and
-    ``polynomial_quartic`` (P, P) are those of :mod:`fecontact.system.polynomial_forces`.
+    ``polynomial_quartic`` (P, P) are those of :mod:`fecontact.system.polynomial_forces`;
+    ``polynomial`` is the address of its function, 0 without such forces.
 
     ``planar`` (n,) are addresses of friction in two directions, (0,) in the plane. Heights of the
     ground are those of ``surface``, or where that is 0 of ``profile`` along the unit vector
@@ -85,6 +86,7 @@ class SystemArrays(NamedTuple):
     ground_motion: int
     second_motion: int
     follows_surface: int
+    polynomial: int
 
 
 class GroundMotion(NamedTuple):

@@ -24,6 +24,7 @@ are empty.
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array
@@ -33,7 +34,7 @@ from fecontact.system.nodes import SystemArrays
 @helper
 def has_polynomial(s):
     """Whether a system has forces that are polynomials of the modal coordinates."""
-    return len(s.polynomial_pairs) > 0
+    return s.polynomial != 0
 
 
 @helper
@@ -108,29 +109,41 @@ def _set_gradient(c, quartic, cubic, s, gradient):
             gradient[j, k] += half * rows[i, k] + first * L[r, k]
 
 
-@routine
-def add_polynomial_forces(x, s, out):
-    """Add to out (m,) the forces at coordinates x (m,)."""
+@kernel(by_address=True)
+def evaluate_polynomial(x: Vector, s: SystemArrays, gradient: Matrix, out: Vector) -> None:
+    """Add the forces at coordinates x (m,) to out (m,), and fill their ``gradient`` G (D, m).
+
+    What is empty is left out. ``SystemArrays.polynomial`` is its address, so that it is compiled
+    for systems that have such forces alone.
+    """
     work = _work_arrays(s)
     _evaluate(x, s, work[0], work[2], work[3], work[4])
-    _add_forces(work[0], work[2], work[3], work[4], s, work[1], out)
+    if len(out) > 0:
+        _add_forces(work[0], work[2], work[3], work[4], s, work[1], out)
+    if len(gradient) > 0:
+        _set_gradient(work[0], work[3], work[4], s, gradient)
 
 
-@routine
+_evaluate_at = function_at(evaluate_polynomial)
+
+
+@helper
 def add_polynomial(x, s, gradient, out):
     """Add to out (m,) the forces at coordinates x (m,), and fill their ``gradient`` G (D, m)."""
-    work = _work_arrays(s)
-    _evaluate(x, s, work[0], work[2], work[3], work[4])
-    _add_forces(work[0], work[2], work[3], work[4], s, work[1], out)
-    _set_gradient(work[0], work[3], work[4], s, gradient)
+    if s.polynomial != 0:
+        _evaluate_at(s.polynomial)(x, s, gradient, out)
 
 
-@routine
+@helper
+def add_polynomial_forces(x, s, out):
+    """Add to out (m,) the forces at coordinates x (m,)."""
+    add_polynomial(x, s, s.polynomial_rows[:0], out)
+
+
+@helper
 def set_polynomial_gradient(x, s, gradient):
     """Fill the gradient G (D, m) of the forces at coordinates x (m,)."""
-    work = _work_arrays(s)
-    _evaluate(x, s, work[0], work[2], work[3], work[4])
-    _set_gradient(work[0], work[3], work[4], s, gradient)
+    add_polynomial(x, s, gradient, x[:0])
 
 
 @routine

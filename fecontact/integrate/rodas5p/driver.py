@@ -17,8 +17,10 @@ from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.kept_rows import workspace_for_rows
 from fecontact.integrate.kept_steps import KeptSteps
+from fecontact.integrate.near_nodes import take_near
+from fecontact.integrate.polynomial_bounds import counts_as_few, modes_may_switch
 from fecontact.integrate.rodas5p import state as run_arrays
-from fecontact.integrate.rodas5p.blocks import blocks_of
+from fecontact.integrate.rodas5p.blocks import FEW, blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.integrate.rodas5p.missed_contacts import first_missed
 from fecontact.integrate.rodas5p.propagation import in_parts, propagate_for
@@ -233,17 +235,20 @@ def control_for(
     untouched[system.arrays.memory[: len(untouched)] > 0] = -np.inf
     with np.errstate(over="ignore", invalid="ignore"):
         energy = energy_scale(system, state) if work else 0.0
-    counts = slider_counts(system)
+    counts, bounds = slider_counts(system), _ground_bounds(system, times)
+    n = system.basis.contact_nodes
     return Control(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
         slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
         largest=largest, untouched=untouched,
         breaks=breaks(system, times)[1],
-        levels=_levels(system), ground=_ground_bounds(system, times),
+        levels=_levels(system), ground=bounds,
         rtol=float(rtol), slip_part=SLIP_PART, switch_part=SWITCH_PART,
         longest=longest_step(system, times, max_step),
         speed_scale=system.velocity_scale, energy_scale=energy,
         work=int(work), missed=first_missed.address,
+        near=take_near.address if n > FEW else 0,
+        many=0 if counts_as_few(n, bounds) else modes_may_switch.address,
         sliders=attend.address if counts.any() else 0, slider_counts=counts)
 
 

@@ -69,6 +69,9 @@ class Control(NamedTuple):
         Whether to integrate the powers.
     missed : int
         Address of :data:`fecontact.integrate.rodas5p.missed_contacts.first_missed`.
+    near, many : int
+        Addresses of :func:`fecontact.integrate.near_nodes.take_near` and
+        :func:`fecontact.integrate.polynomial_bounds.modes_may_switch`; zero for few nodes.
     sliders : int
         Address of :data:`fecontact.integrate.rodas5p.sliders.attend`; zero without elastic Coulomb
         elements.
@@ -95,6 +98,8 @@ class Control(NamedTuple):
     energy_scale: float
     work: int
     missed: int
+    near: int
+    many: int
     sliders: int
     slider_counts: Annotated[Integers, NODES]
 
