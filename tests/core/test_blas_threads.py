@@ -19,8 +19,10 @@ def blas_threads() -> set[int]:
 
 
 @pytest.fixture(autouse=True)
-def three_threads() -> Iterator[None]:
+def three_threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Three BLAS threads, like on a machine of three cores; OpenBLAS starts missing threads."""
+    # Tests before may have loaded one more library.
+    monkeypatch.setattr(one_blas_thread, "_libraries", None)
     with one_blas_thread:  # loads all libraries
         pass
     with threadpool_limits(3, user_api="blas"):
