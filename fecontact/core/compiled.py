@@ -46,14 +46,18 @@ _COMPILING = ("Compiling {}{}, once on this machine; 'fecontact compile --all' c
 
 
 @contextmanager
-def _little_collecting() -> Iterator[None]:
-    """Look for garbage rarely: what numba makes stays, and going through it takes a seventh."""
-    before = gc.get_threshold()
-    gc.set_threshold(100_000, 10, 1000)
-    try:
-        yield
-    finally:
-        gc.set_threshold(*before)
+def _compiling() -> Iterator[None]:
+    """Compile in one thread, and look for garbage rarely.
+
+    Most of what numba makes stays, and going through it again takes a seventh of the time.
+    """
+    with global_compiler_lock:
+        before = gc.get_threshold()
+        gc.set_threshold(100_000, 10, 1000)
+        try:
+            yield
+        finally:
+            gc.set_threshold(*before)
 
 
 def source_digest(function: Any) -> str:
@@ -172,14 +176,14 @@ class _Kernel(CPUDispatcher):
 
     def ready(self) -> Any:
         """Itself, compiled."""
-        with global_compiler_lock:
+        with _compiling():
             if not self.overloads:
                 begin, last = time.perf_counter(), seconds_to_compile(self)
                 about = "" if last is None else f", about {math.ceil(last)} s"
                 name = f"{self.__module__}.{self.__name__}".removeprefix("fecontact.")
                 # Code that is on disk is no miss.
-                with _little_collecting(), said_if_slow(_COMPILING.format(name, about),
-                                                        lambda: bool(self._cache_misses)):
+                with said_if_slow(_COMPILING.format(name, about),
+                                  lambda: bool(self._cache_misses)):
                     self.compile(self.signature)
                 if self._cache_misses:
                     note_seconds_to_compile(self, time.perf_counter() - begin)
@@ -328,7 +332,7 @@ class CompiledLaw:
         if Path(inspect.getfile(function)).is_file():
             keep_on_disk(law, (source_digest(function), function.__module__), function.__module__)
         try:
-            with _little_collecting():
+            with _compiling():
                 law.compile()
         except (NumbaError, TypeError) as error:
             lines = [line.strip() for line in str(error).splitlines() if line.strip()]

@@ -11,14 +11,19 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.boxing import unbox
 from numba.core.datamodel import models
 from numba.core.imputils import lower_cast
-from numba.core.pythonapi import NativeValue
 from numba.core.typeconv import Conversion
 from numba.core.typeconv.rules import default_type_manager
 from numba.core.typing.templates import AttributeTemplate
-from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, register_model
+from numba.extending import (
+    NativeValue,
+    infer_getattr,
+    intrinsic,
+    lower_getattr_generic,
+    register_model,
+    unbox,
+)
 
 _I32, _I64 = ir.IntType(32), ir.IntType(64)
 

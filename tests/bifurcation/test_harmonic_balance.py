@@ -25,9 +25,9 @@ from fecontact.bifurcation import (
     orbit_branch,
     vector_field,
 )
-from fecontact.bifurcation.harmonic.series import series
+from fecontact.bifurcation.harmonic.series import series, shifted
 from fecontact.bifurcation.harmonic.stability import koopman_hill
-from fecontact.bifurcation.harmonic.starts import converged_orbit, problem_for
+from fecontact.bifurcation.harmonic.starts import converged_orbit, problem_for, restored
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.output.files.branches import read_branch, write_branch
 
@@ -290,6 +290,31 @@ def test_orbits_born_at_a_hopf_point_agree_with_collocation(two_masses):
         assert kind == other
         assert pytest.approx(B2, rel=1e-5) == B
         assert pytest.approx(T2, rel=1e-6) == T
+
+
+def test_an_orbit_in_another_phase_is_met_again_unless_its_amplitudes_differ(two_masses):
+    """No shift in time brings two orbits closer than their amplitudes are."""
+    field, found = two_masses
+    here, there = found["harmonic"].points[3], found["harmonic"].points[6]
+    problem, u, tangent = restored(field, here)
+    _, v, _ = restored(field, there)
+    weights = problem.weights()[: -problem.common]
+    X, Y = problem.coefficients(u), problem.coefficients(v)
+
+    def apart(shift):
+        return np.sqrt(weights @ (shifted(X, shift) - Y).ravel() ** 2)
+
+    least = min(map(apart, np.linspace(0.0, 1.0, 2001)))
+    bound = problem._apart_at_least(u, v)
+    assert 0.3 * least < bound <= least * (1.0 + 1e-12)
+    later = np.append(shifted(X, 0.217).ravel(), u[-problem.common :])
+    assert problem._apart_at_least(u, later) < 1e-12
+    problem = replace(problem, reference=problem.coefficients(later).copy())
+    again = problem.met_again(problem, u, tangent, later, tangent, 1e-6)
+    assert again == pytest.approx(later, abs=1e-9 * np.abs(later).max())
+    larger = later.copy()
+    larger[: -problem.common] *= 1.1
+    assert problem.met_again(problem, u, tangent, larger, tangent, 1e-6) is None
 
 
 def test_doubled_orbits_agree_with_collocation(two_masses):

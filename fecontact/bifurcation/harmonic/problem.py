@@ -411,7 +411,13 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         """See :meth:`Problem.met_again`: in the phase of ``like``."""
         if len(u) != len(like) or not same_place(self, (u, tangent), (like, heading), within):
             return None
-        return self._in_phase(u, like)
+        return None if self._apart_at_least(u, like) > within else self._in_phase(u, like)
+
+    def _apart_at_least(self, u: Array, like: Array) -> float:
+        """A bound of the distance of two orbits in any phase: that of their amplitudes."""
+        weights = self.weights()[: self.size].reshape(self.reference.shape)
+        X, Y = (np.hypot(Z[1::2], Z[2::2]) for Z in map(self.coefficients, (u, like)))
+        return float(np.sqrt((np.minimum(weights[1::2], weights[2::2]) * (X - Y) ** 2).sum()))
 
     def _in_phase(self, u: Array, like: Array) -> Array:
         """An orbit shifted in time to match another one."""
