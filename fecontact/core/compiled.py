@@ -33,7 +33,7 @@ from fecontact.core.addresses import contract_signature
 from fecontact.core.errors import InputError
 from fecontact.core.kernel_parts import BorrowingCompiler, kernel_compiler, part
 from fecontact.core.progress import said_if_slow
-from fecontact.core.records import is_record, signature_of
+from fecontact.core.records import is_record, read_from_python, signature_of
 from fecontact.core.stored_code import (
     keep_on_disk,
     note_seconds_to_compile,
@@ -201,39 +201,6 @@ class _Kernel(CPUDispatcher):
         return self.ready()
 
 
-class _RecordKernel(_Kernel):
-    """A kernel that takes records, in which arrays of results may be read-only.
-
-    It must not write to them, as to read-only arrays that any kernel is given.
-    """
-
-    def __call__(self, *arguments: Any) -> Any:
-        """Call the function, with views in place of read-only arrays if it refuses these."""
-        try:
-            return super().__call__(*arguments)
-        except TypeError:
-            given = tuple(map(_writeable, arguments))
-            if all(new is old for new, old in zip(given, arguments, strict=True)):
-                raise
-            return super().__call__(*given)
-
-
-def _writeable(value: Any) -> Any:
-    """The value, with views that numba takes in place of read-only arrays."""
-    if isinstance(value, np.ndarray) and not value.flags.writeable:
-        view = value.view()
-        try:
-            view.flags.writeable = True
-        except ValueError:
-            return value.copy()
-        return view
-    if isinstance(value, tuple):
-        items = tuple(map(_writeable, value))
-        if any(new is not old for new, old in zip(items, value, strict=True)):
-            return value._make(items) if hasattr(value, "_make") else items
-    return value
-
-
 # All kernels of the modules that have been imported.
 KERNELS: list[_Kernel] = []
 
@@ -260,8 +227,10 @@ def kernel(
         "nopython": True, "boundscheck": None, "error_model": "numpy", "fastmath": _FASTMATH,
         "no_cpython_wrapper": by_address, "no_cfunc_wrapper": not by_address, **options,
     }
-    kind = _RecordKernel if any(map(is_record, function.__annotations__.values())) else _Kernel
-    made = kind(function, targetoptions=settings, pipeline_class=kernel_compiler(constants))
+    for annotation in function.__annotations__.values():
+        if is_record(annotation):
+            read_from_python(annotation)
+    made = _Kernel(function, targetoptions=settings, pipeline_class=kernel_compiler(constants))
     made.given, made.by_address, made.options = signature, by_address, options
     keep_on_disk(made, (source_digest(made), ""), function.__module__, constants)
     KERNELS.append(made)

@@ -25,6 +25,7 @@ from typing import Annotated, Any, TypeVar, get_args, get_origin
 import numpy as np
 from numba import types
 from numba.core.typing import Signature
+from numba.extending import typeof_impl
 from numpy.typing import NDArray
 from typing_extensions import TypeAliasType
 
@@ -126,6 +127,29 @@ def numba_type(annotation: Any) -> Any:
     if get_origin(annotation) is tuple:
         return types.BaseTuple.from_types([numba_type(item) for item in get_args(annotation)])
     raise TypeError(f"{annotation!r} stands for no type of compiled functions")
+
+
+def read_from_python(record: Any) -> None:
+    """Let numba take records of Python for what their annotations say, whatever may be written to.
+
+    Kernels must not write to read-only arrays that they are given.
+    """
+    typeof_impl.register(record, _typeof)
+
+
+def _typeof(value: Any, context: Any) -> Any:
+    kinds = [typeof_impl(item, context) for item in value]
+    return None if None in kinds else types.BaseTuple.from_types(
+        list(map(_writeable, kinds)), type(value))
+
+
+def _writeable(kind: Any) -> Any:
+    """The type with arrays that may be written to."""
+    if isinstance(kind, types.Array):
+        return kind.copy(readonly=False)
+    if isinstance(kind, types.BaseNamedTuple):
+        return types.BaseTuple.from_types(list(map(_writeable, kind)), kind.instance_class)
+    return kind
 
 
 def is_record(annotation: Any) -> bool:
