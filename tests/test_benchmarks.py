@@ -13,6 +13,7 @@ BENCHMARKS = {
     "bodies": ((), [(r"^ (2) bodies of 20 modes", 2.0, 0.0)]),
     "calculix": ((), []),
     "contact_kernels": ((), [(r"^ +400 +(\d+)", 40.0, 0.0)]),
+    "compilation": ((), [(r"^first run .* (\d+) functions", 20.0, 12.0)]),
     "continuation": ((), [(r"^ +50 fecontact .* (\S+) +\S+$", 0.0, 1e-9),
                           (r"^ +50 fecontact .* \S+ +(\S+)$", 0.0, 1e-6),
                           (r"^ +50 curve of folds: .* (\S+)$", 0.0, 1e-9),
