@@ -11,7 +11,7 @@ SYSTEM := $(VENV)/.system-libraries
 # What the tables of README and docs are made of: scripts, and their arguments after plus signs.
 BENCHMARKS := integrator+a+b+b2+c+d integrator+a+b+c+--tight random_systems \
   many_contacts shooting calculix decks fit_coverage large_deflections wheel \
-  continuation harmonic nlvib ensemble first_tasks nonsmooth bodies solids contact_kernels laws sweep output \
+  compilation continuation harmonic nlvib ensemble first_tasks nonsmooth bodies solids contact_kernels laws sweep output \
   eigen eigen+--solids+cube eigen+--solids+150000+plate reduction+1 reduction+--solid
 
 # For test-variant: processor that kernels are compiled for (none: this one), kernels of OpenBLAS,
