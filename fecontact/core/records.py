@@ -129,6 +129,7 @@ def numba_type(annotation: Any) -> Any:
     raise TypeError(f"{annotation!r} stands for no type of compiled functions")
 
 
+@cache
 def read_from_python(record: Any) -> None:
     """Let numba take records of Python for what their annotations say, whatever may be written to.
 

@@ -273,12 +273,18 @@ def test_read_only_arrays_are_read_in_records_too():
     assert len(total_of.overloads) == 1
 
 
-@kernel
-def many_sines(x: Vector) -> float:
-    total = 0.0
-    for value in x:
-        total += np.sin(value)
+def sum_of(function):
+    @kernel
+    def total(x: Vector) -> float:
+        found = 0.0
+        for value in x:
+            found += function(value)
+        return found
+
     return total
+
+
+many_sines, many_cosines = sum_of(np.sin), sum_of(np.cos)
 
 
 def test_threads_may_call_a_kernel_for_the_first_time_together():
@@ -286,14 +292,6 @@ def test_threads_may_call_a_kernel_for_the_first_time_together():
     with ThreadPoolExecutor(4) as threads:
         found = list(threads.map(lambda _: many_sines(x), range(8)))
     assert found == pytest.approx([np.sin(x).sum()] * 8)
-
-
-@kernel
-def many_cosines(x: Vector) -> float:
-    total = 0.0
-    for value in x:
-        total += np.cos(value)
-    return total
 
 
 def test_the_collector_of_garbage_is_as_before_after_compilation():
