@@ -50,7 +50,8 @@ def _frozen(problem: Problem) -> tuple[Any, Any, Any]:
     scratch = allocate(dynamics.Gradients, {
         nodes.NODES: n, nodes.MODES: m, nodes.AXES: 2, nodes.MEMORY: int(arrays.memory.max()),
         nodes.COMBINATIONS: 0})
-    held = {**workspace, **{f"g{k}": item for k, item in enumerate(scratch)},
+    rows, slopes = np.empty((n, 2, m)), np.empty((n, 2, 2 * m))
+    held = {**workspace, "rows": rows, "slopes": slopes, **{f"g{k}": item for k, item in enumerate(scratch)},
             **{f"b{k}": item for k, item in enumerate(blocks_of(problem.system.basis, arrays))},
             **{f"s{k}": item for k, item in enumerate(arrays) if isinstance(item, np.ndarray)}}
     lines = [f"    {name} = carray(pointer({item.ctypes.data}), {item.shape}, "
@@ -66,13 +67,15 @@ def _frozen(problem: Problem) -> tuple[Any, Any, Any]:
         f"    set_rate(borrowed(y), s, Blocks({blocks}), given, pull, nodes, "
         f"Gradients({gradients}), borrowed(out))",
         "def jacobian(t, y, out):", *lines,
-        f"    fill(t, y, System({system}), out)",
+        f"    count = 2 * fill(t, y, System({system}), rows, slopes, out)",
+        f"    out[{m}:{2 * m}, :{2 * m}] += dot(rows.reshape(({2 * n}, {m}))[:count].T, "
+        f"slopes.reshape(({2 * n}, {2 * m}))[:count])",
     ])
     space: dict[str, Any] = {
         "carray": carray, "f8": np.float64, "i8": np.int64, "pointer": _pointer,
         "borrowed": borrowed, "set_given": dynamics.set_given, "set_rate": dynamics.set_rate,
         "System": nodes.SystemArrays, "Blocks": Blocks, "Gradients": dynamics.Gradients,
-        "fill": contact_jacobian.jacobian}
+        "fill": contact_jacobian.fill_jacobian, "dot": np.dot}
     exec(source, space)
     options = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}
     return njit(**options)(space["rate"]), njit(**options)(space["jacobian"]), (held, arrays)

@@ -25,8 +25,6 @@ def read_only(value: Any) -> Any:
         return view
     if value is None or isinstance(value, str | int | float):
         return value
-    if type(value).__module__.startswith("scipy.sparse") and hasattr(value, "indptr"):
-        return _read_only_sparse(value)
     if type(value) in (dict, MappingProxyType):
         frozen = {name: read_only(item) for name, item in value.items()}
         changed = any(frozen[name] is not item for name, item in value.items())
@@ -36,6 +34,8 @@ def read_only(value: Any) -> Any:
         if all(new is old for new, old in zip(items, value, strict=True)):
             return value
         return value._make(items) if hasattr(value, "_make") else type(value)(items)
+    if type(value).__module__.startswith("scipy.sparse") and hasattr(value, "indptr"):
+        return _read_only_sparse(value)
     return value
 
 

@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.core.compiled import borrowing, helper, kernel, routine
+from fecontact.core.compiled import borrowing, helper, kernel
 from fecontact.core.records import Block, Matrix, Vector
+from fecontact.core.types import Array
 from fecontact.system.kernels import linear_rates, prescribed_at, rates_under
 from fecontact.system.node_forces import (
     axis_force,
@@ -91,15 +92,22 @@ def _set_gradients(j, s, partial, out):
                 out[axis, m + i] += by_speed * s.rows[j, other, i]
 
 
-@routine
-def _contact_gradients(t, y, s, gradients, active, out):
-    """Rows of the Jacobian's contact part, for the nodes whose normal force is not zero.
+@kernel
+def fill_jacobian(
+    t: float, y: Vector, s: SystemArrays, rows: Block, gradients: Block, out: Matrix
+) -> int:
+    """Fill the Jacobian ``out``, but for the forces of contact nodes; how many nodes have forces.
 
-    Fills ``active`` (n, d, m) with the rows of these nodes and ``gradients`` (n, d, 2 m) with the
-    derivatives of their forces to q and q'. Returns their number. The parts of friction with
-    memory are put into the Jacobian ``out`` at once.
+    Fills ``rows`` (n, d, m) with the rows of these nodes, and ``gradients`` (n, d, 2 m) with the
+    derivatives of their forces to q and q'.
     """
     n, d, m = s.rows.shape
+    out[:, :] = 0.0
+    _body_jacobian(s, out)
+    if has_polynomial(s):
+        gradient = np.empty_like(s.polynomial_rows)
+        set_polynomial_gradient(y, s, gradient)
+        add_polynomial_stiffness(-1.0, gradient, s, out[m:])
     moved = ground_motion(t, s)
     force, rates = force_workspace(s)
     partial = np.empty((d + 1, 2 * d))
@@ -112,27 +120,20 @@ def _contact_gradients(t, y, s, gradients, active, out):
             continue
         for axis in range(d):
             for i in range(m):
-                active[count, axis, i] = s.rows[j, axis, i]
+                rows[count, axis, i] = s.rows[j, axis, i]
         _set_gradients(j, s, partial, gradients[count])
         count += 1
     return count
 
 
-@kernel
-def jacobian(t: float, y: Vector, s: SystemArrays, out: Matrix) -> None:
+def jacobian(t: float, y: Array, s: SystemArrays, out: Array) -> None:
     """Fill out (2 m + n s, 2 m + n s) with dy'/dy."""
     n, d, m = s.rows.shape
-    gradients, active = np.empty((n, d, 2 * m)), np.empty((n, d, m))
-    out[:] = 0.0
-    count = _contact_gradients(t, y, s, gradients, active, out)
-    _body_jacobian(s, out)
-    if has_polynomial(s):
-        gradient = np.empty_like(s.polynomial_rows)
-        set_polynomial_gradient(y, s, gradient)
-        add_polynomial_stiffness(-1.0, gradient, s, out[m:])
+    rows, gradients = np.empty((n, d, m)), np.empty((n, d, 2 * m))
+    count = fill_jacobian(t, y, s, rows, gradients, out)
     if count:
-        out[m : 2 * m, : 2 * m] += np.dot(active[:count].reshape((count * d, m)).T,
-                                          gradients[:count].reshape((count * d, 2 * m)))
+        out[m : 2 * m, : 2 * m] += (rows[:count].reshape(count * d, m).T
+                                    @ gradients[:count].reshape(count * d, 2 * m))
 
 
 @borrowing

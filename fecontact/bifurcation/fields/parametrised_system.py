@@ -297,7 +297,7 @@ def _offsets(level: int, width: float) -> tuple[float, float]:
 
 def _inside(values: Array, limits: list[tuple[float, float]]) -> bool:
     for value, (low, high) in zip(values.tolist(), limits, strict=True):
-        if not low < value < high:
+        if not low <= value < high:
             return False
     return True
 

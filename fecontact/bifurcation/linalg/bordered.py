@@ -126,16 +126,16 @@ class Bordered:
         rows = original_rows(self._factors, left[:d], -left[d:] @ self._weights)
         return float(sizes[-1]), rows, self.expand(rights[-1])
 
-    def softest(self, scales: Array) -> tuple[float, Array]:
+    def softest(self, scales: Array, below: float) -> tuple[float, Array] | None:
         """Smallest singular value of the reduced matrix, of even rows and with unknowns in units
-        of ``scales`` (d + e,), and the right vector with all unknowns.
+        of ``scales`` (d + e,), and the right vector with all unknowns; None unless it is ``below``.
         """
         d, matrix = len(self._factors.end), self.matrix * scales
         size = np.abs(matrix).max(axis=1)
         ends = np.abs(self._factors.end[:, : 2 * d]) * np.tile(scales[:d], 2)
         size[:d] = np.maximum(size[:d], ends.max(axis=1))
         _, sizes, rights = np.linalg.svd(matrix / size[:, None])
-        return float(sizes[-1]), self.expand(scales * rights[-1])
+        return (float(sizes[-1]), self.expand(scales * rights[-1])) if sizes[-1] < below else None
 
     def expand(self, solution: Array) -> Array:
         """All unknowns from x_0 and the common unknowns for a zero right-hand side."""

@@ -139,8 +139,9 @@ _DIFFERENCE = 1e-5  # relative parameter step for the derivative of the forcing 
 # one instead of that at the same parameter.
 _LEAST_SHARE = 0.05
 # Singular value of the scaled equations below which, as at branch points, orbits are compared with
-# the nearest one across the branch, and least change of a state, in its scale, for which it counts.
-_LEAST_SINGULAR, _LEAST_CHANGE = 1e-4, 1e-7
+# the nearest one across the branch, one from which on that makes no difference, and least change of
+# a state, in its scale, for which it counts.
+_LEAST_SINGULAR, _REGULAR, _LEAST_CHANGE = 1e-4, 1e-2, 1e-7
 # Step of rough Jacobians that are differenced again, in ranges of the states.
 _FAR = 3e-4
 # Smallest range of a state, in its values and in the scale that its field has.
@@ -341,8 +342,11 @@ class CollocationLinearisation:
         largest = np.abs(change[: problem.size].reshape(-1, d) / problem.scales[:d]).max()
         if not _LEAST_CHANGE < largest < np.inf:
             return change
-        size, across = self.bordered(row).softest(
-            np.concatenate([problem.scales[:d], problem.scales[-problem.common :]]))
+        soft = self.bordered(row).softest(
+            np.concatenate([problem.scales[:d], problem.scales[-problem.common :]]), _REGULAR)
+        if soft is None:
+            return change
+        size, across = soft
         rows = problem.weights() * across
         part = float(rows @ change) / float(rows @ across)
         found: Array = change - part * _LEAST_SINGULAR**2 / (size**2 + _LEAST_SINGULAR**2) * across

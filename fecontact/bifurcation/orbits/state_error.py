@@ -117,10 +117,10 @@ def state_error(
     if not np.isfinite(errors).all():
         return np.inf
     fill_smooth_errors(problem.widths, nodes, found.top, sizes, smooth)
-    odd = np.flatnonzero(errors > _ODD * found.bump * smooth)
+    is_odd = errors > _ODD * found.bump * smooth
     # Those below the largest of the others need no better ones.
-    others = np.delete(errors, odd).max(initial=0.0)
-    odd = odd[errors[odd] > others]
+    others = errors.max(where=~is_odd, initial=0.0)
+    odd = np.flatnonzero(is_odd & (errors > others))
     odd = odd[np.argsort(errors[odd])[::-1]]
     for first in range(0, min(len(odd), _MOST_SOLVED), _AT_ONCE):
         several = odd[first : first + _AT_ONCE]
