@@ -51,7 +51,8 @@ def _frozen(problem: Problem) -> tuple[Any, Any, Any]:
         nodes.NODES: n, nodes.MODES: m, nodes.AXES: 2, nodes.MEMORY: int(arrays.memory.max()),
         nodes.COMBINATIONS: 0})
     rows, slopes = np.empty((n, 2, m)), np.empty((n, 2, 2 * m))
-    held = {**workspace, "rows": rows, "slopes": slopes, **{f"g{k}": item for k, item in enumerate(scratch)},
+    held = {**workspace, "rows": rows, "slopes": slopes,
+            **{f"g{k}": item for k, item in enumerate(scratch)},
             **{f"b{k}": item for k, item in enumerate(blocks_of(problem.system.basis, arrays))},
             **{f"s{k}": item for k, item in enumerate(arrays) if isinstance(item, np.ndarray)}}
     lines = [f"    {name} = carray(pointer({item.ctypes.data}), {item.shape}, "

@@ -78,7 +78,8 @@ def differentiated(X: Array) -> Array:
 @cache
 def _turns(harmonics: int, dimension: int) -> Array:
     """2 pi k of the harmonics, along the first of so many axes."""
-    return 2.0 * np.pi * np.arange(1, harmonics + 1).reshape(-1, *[1] * (dimension - 1))
+    k = np.arange(1, harmonics + 1).reshape(-1, *[1] * (dimension - 1))
+    return np.asarray(2.0 * np.pi * k)
 
 
 def rows_of(orders: tuple[int, ...] | None, harmonics: int) -> Integers:
