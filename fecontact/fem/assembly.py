@@ -204,10 +204,14 @@ def _rows(
                     seen[node] = end
                     indices[end] = node
                     end += 1
-        row = np.sort(indices[first:last])
-        for s in range(last - first):
-            indices[first + s] = row[s]
-            seen[row[s]] = first + s
+        for s in range(first + 1, last):
+            node, place = indices[s], s
+            while place > first and indices[place - 1] > node:
+                indices[place] = indices[place - 1]
+                place -= 1
+            indices[place] = node
+        for s in range(first, last):
+            seen[indices[s]] = s
         for a in range(starts[i], starts[i + 1]):
             cell = around[a]
             for own in range(width):
