@@ -155,8 +155,7 @@ def test_5_a_mode_of_two_masses_with_regularised_friction(nlvib):
     mode = nonlinear_mode(system, (1e-2, 0.5), 1, observe=("B", "y"), method=example.method)
     assert mode.angular_frequency[0] == pytest.approx(np.sqrt(640.0), rel=1e-4)
     rows = np.array([system.basis.point_row(name, "y") for name in ("element0", "B")])
-    ratios = []
-    for index in range(5, len(mode), 12):
+    for index in range(5, len(mode), 8):
         x = np.array([rows @ mode.coordinates(k)[index] for k in range(22)])
         x *= np.exp(-1j * np.angle(x[1, 1]) * np.arange(22))[:, None]
         w, ratio = mode.angular_frequency[index], mode.damping_ratio[index]
@@ -164,9 +163,8 @@ def test_5_a_mode_of_two_masses_with_regularised_friction(nlvib):
         assert found[0] == pytest.approx(w, rel=1e-6)
         assert found[1] / (2.0 * found[0]) == pytest.approx(ratio, rel=1e-4, abs=1e-9)
         assert half_range(found[2][:, 1]) == pytest.approx(mode.amplitude[index], rel=1e-5)
-        ratios.append(ratio)
     # It is largest in between.
-    assert max(ratios) > 1.5 * max(ratios[0], ratios[-1])
+    assert mode.damping_ratio.max() > 1.5 * mode.damping_ratio[[0, -1]].max()
 
 
 def test_9_a_mode_of_a_beam_with_a_cubic_spring_at_its_tip(nlvib):

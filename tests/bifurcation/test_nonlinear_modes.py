@@ -143,7 +143,7 @@ def test_energies_at_the_ends_of_the_resonance(resonant):
     energy = np.log10(mode.energy)
     turns = np.flatnonzero(np.diff(np.sign(np.diff(energy)))) + 1
     # Points of the mode lie beside the turns.
-    assert energy[turns[:4]] == pytest.approx([3.6703, 2.4551, 3.3233, 3.2520], abs=4e-3)
+    assert energy[turns[:4]] == pytest.approx([3.6703, 2.4551, 3.3233, 3.2520], abs=5e-3)
 
 
 def test_a_stalled_mode_of_springs_blames_no_contact(resonant):

@@ -45,7 +45,8 @@ def neglected(
         return np.full(count, np.nan), np.full(count, np.nan)
     spectrum = 2.0 * np.fft.rfft(forces, axis=1) / samples
     spectrum[:, 0] *= np.sqrt(0.5)
-    numbers = np.delete(np.arange(most + 1), range(H + 1) if orders is None else orders)
+    numbers = (np.arange(H + 1, most + 1) if orders is None
+               else np.delete(np.arange(most + 1), orders))
     left = spectrum[:, numbers]
     turns = 2.0j * np.pi / periods[:, None] * numbers
     turned = turns[:, :, None, None]

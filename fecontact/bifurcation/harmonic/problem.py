@@ -191,6 +191,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
     row: Array | None = None
 
     keeps_matrix: ClassVar[bool] = True
+    polishes: ClassVar[bool] = True
     ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
 
     def attributes(self) -> dict[str, Any]:
@@ -353,7 +354,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         """At orbits that are homoclinic to a saddle, as far as numbers tell."""
         if self.autonomous and near_saddle(
                 self, self.parameters(u), linearisation.states,
-                np.full(self.samples, 1.0 / self.samples), tangent):
+                np.full(self.samples, 1.0 / self.samples), tangent, linearisation.rates):
             return BranchStatus.HOMOCLINIC
         return None
 

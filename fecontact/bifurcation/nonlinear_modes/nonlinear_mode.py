@@ -52,7 +52,7 @@ from fecontact.system.quasistatic.rest_state import RestState
 
 # Points at most and steps, unless options say so: a step of one is the amplitude itself, and the
 # parts of frequency and damping below.
-_POINTS, _STEP, _LARGEST = 2000, 0.02, 0.06
+_POINTS, _STEP, _LARGEST = 2000, 0.02, 0.1
 _XI_SCALE = 0.2
 # Largest |xi| of a conservative system, relative to the frequency.
 _CONSERVATIVE = 1e-8
@@ -291,7 +291,7 @@ def nonlinear_mode(
         ``repeats=EngineOrder(wheel, m)`` a travelling wave as under engine order m, counted among
         the modes of its nodal diameter.
     options : ContinuationOptions, optional
-        By default up to 2000 points, step 0.02, largest_step 0.06 (longer with many modes), in
+        By default up to 2000 points, step 0.02, largest_step 0.1 (longer with many modes), in
         units of the amplitude, a fifth of the frequency, and a damping ratio of 0.1.
     preload : LoadHistory, RestState or (d,) array, optional
         As for responses.

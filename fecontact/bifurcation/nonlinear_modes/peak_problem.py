@@ -88,6 +88,7 @@ class PeakProblem(Problem):
     lag: float = 0.5 * np.pi
 
     keeps_matrix: ClassVar[bool] = True
+    polishes: ClassVar[bool] = True
 
     def labels(self, names: Sequence[str]) -> tuple[str, ...]:
         """See :meth:`Problem.labels`."""

@@ -94,6 +94,7 @@ class TorusProblem(FreeParameters, Problem):
     elements: TorusElements | None = None
 
     keeps_matrix: ClassVar[bool] = True
+    polishes: ClassVar[bool] = True
     ends: ClassVar[Mapping[str, BranchStatus]] = {_SHRINKS: BranchStatus.SINGLE_FREQUENCY}
 
     @property
