@@ -586,7 +586,8 @@ class Linearised:
 
     def determinant_sign(self, row: Array) -> float:
         """Sign of det [[G_u], [row]] by the factors of :meth:`solve`; 0 where they are singular."""
-        _ = self.solve(row, np.zeros(len(row)))
+        if self._factors is None:
+            self.solve(row, np.zeros(len(row)))
         factors, first = self._factors or (None, row)
         if not isinstance(factors, Factors):
             return 0.0
