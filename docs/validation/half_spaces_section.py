@@ -35,7 +35,6 @@ are wrong by 38 % in the mean; completed by 0.3 %, and the loss of a cycle by 0.
 that grow twice as fast away from the contact (the test) these are 2.4 and 2.3 %. With random
 heights of 1 um (RMS) on the sphere as `HeightMap`, nu = 0.3, the same 32 of 64 nodes touch and
 forces differ by 0.5 % in the mean.
-
 """
 
 
