@@ -19,12 +19,14 @@ _FADING = 1e-7
 
 
 @helper
-def _fade(z, rates):
-    """Decay rate of one internal variable without normal force."""
-    rates[0, 0] = -z[0] / _FADING
-    rates[0, 1] = 0.0
-    rates[0, 2] = 0.0
-    rates[0, 3] = -1.0 / _FADING
+def _fade(tangents, z, rates):
+    """Decay rates of one internal variable along each tangent without normal force."""
+    for i in range(tangents):
+        for k in range(3 + tangents):
+            rates[i, k] = 0.0
+        if tangents > 1:
+            rates[i, 3 + len(rates)] = 0.0
+        rates[i, 0], rates[i, 3 + i] = -z[i] / _FADING, -1.0 / _FADING
 
 
 @memory_friction_law
@@ -36,7 +38,7 @@ def dahl(v, F, z, p, force, rates):
     force[2] = stiffness * z[0]
     force[3] = F * stiffness
     if F <= 0.0:
-        _fade(z, rates)
+        _fade(1, z, rates)
         return
     sign = 1.0 if v >= 0.0 else -1.0
     left = 1.0 - sign * stiffness * z[0] / mu
@@ -45,67 +47,6 @@ def dahl(v, F, z, p, force, rates):
     rates[0, 1] = power * left
     rates[0, 2] = 0.0
     rates[0, 3] = -abs(v) * exponent * power * stiffness / mu
-
-
-@memory_friction_law
-def lugre(v, F, z, p, force, rates):
-    """R = F [sigma_0 z + sigma_1(v) z' + sigma_2 v]."""
-    static, kinetic, stribeck, exponent = p[0], p[1], p[2], p[3]
-    stiffness, damping, viscous, decay = p[4], p[5], p[6], p[7]
-    speed = abs(v)
-    sign = 1.0 if v >= 0.0 else -1.0
-    x = (speed / stribeck) ** exponent
-    excess = (static - kinetic) * math.exp(-x)
-    g = kinetic + excess
-    u = stiffness * z[0] / g
-    # |v| g' / g: finite at rest for every exponent.
-    fall = -exponent * x * excess / g
-    rate = v - speed * u
-    rate_v = 1.0 - sign * u * (1.0 - fall)
-    rate_z = -speed * stiffness / g
-    fade = damping * math.exp(-((decay * v) ** 2))
-    ratio = stiffness * z[0] + fade * rate + viscous * v
-    force[0] = F * ratio
-    force[1] = F * (fade * (rate_v - 2.0 * decay * decay * v * rate) + viscous)
-    force[2] = ratio
-    force[3] = F * (stiffness + fade * rate_z)
-    if F <= 0.0:
-        _fade(z, rates)
-        return
-    rates[0, 0] = rate
-    rates[0, 1] = rate_v
-    rates[0, 2] = 0.0
-    rates[0, 3] = rate_z
-
-
-@memory_friction_law
-def bouc_wen(v, F, z, p, force, rates):
-    """R = mu F z."""
-    mu, yielding, beta, exponent = p[0], p[1], p[2], p[3]
-    force[0] = mu * F * z[0]
-    force[1] = 0.0
-    force[2] = mu * z[0]
-    force[3] = mu * F
-    if F <= 0.0:
-        _fade(z, rates)
-        return
-    size = abs(z[0])
-    pull = 1.0 if v * z[0] >= 0.0 else -1.0
-    share = beta * pull + 1.0 - beta
-    power = size ** (exponent - 1.0)
-    rates[0, 0] = v * (1.0 - share * power * size) / yielding
-    rates[0, 1] = (1.0 - share * power * size) / yielding
-    rates[0, 2] = 0.0
-    side = 1.0 if z[0] >= 0.0 else -1.0
-    rates[0, 3] = -v * share * exponent * power * side / yielding
-
-
-@helper
-def _fade_both(z, rates):
-    """Decay rates of a vector without normal force."""
-    for i in range(2):
-        rates[i, 0] = -z[i] / _FADING
-        rates[i, 3 + i] = -1.0 / _FADING
 
 
 @helper
@@ -132,7 +73,7 @@ def _planar_dahl(law, v1, v2, F, z, p, force, rates):
     clear(force, rates)
     mu, stiffness, exponent = p[0], p[1], p[2]
     if F <= 0.0:
-        _fade_both(z, rates)
+        _fade(2, z, rates)
         return
     a = stiffness / mu
     speed, e1, e2 = direction(v1, v2, z[0], z[1])
@@ -153,67 +94,84 @@ def _planar_dahl(law, v1, v2, F, z, p, force, rates):
             rates[i, 3 + k] = -speed * a * (h * unit + z[i] * h_s * a * e)
 
 
-@planar_friction_law
-def _planar_lugre(law, v1, v2, F, z, p, force, rates):
-    """R = F [sigma_0 z + sigma_1(|v|) z' + sigma_2 v], z' = v - sigma_0 |v| z / g(|v|)."""
-    clear(force, rates)
+@helper
+def _lugre(v, e, speed, F, z, p, force, rates):
+    """R = F [sigma_0 z + sigma_1(|v|) z' + sigma_2 v], z' = v - sigma_0 |v| z / g(|v|), v = |v| e."""
     static, kinetic, stribeck, exponent = p[0], p[1], p[2], p[3]
     stiffness, damping, viscous, decay = p[4], p[5], p[6], p[7]
-    if F <= 0.0:
-        _fade_both(z, rates)
-        return
-    speed, e1, e2 = direction(v1, v2, z[0], z[1])
     x = (speed / stribeck) ** exponent
     excess = (static - kinetic) * math.exp(-x)
     g = kinetic + excess
     # |v| g' / g: finite at rest for every exponent.
     fall = -exponent * x * excess / g
     fade = damping * math.exp(-((decay * speed) ** 2))
-    for i in range(2):
-        row = i * (4 + len(rates))
-        v = v1 if i == 0 else v2
-        u = stiffness * z[i] / g
-        rate = v - speed * u
-        ratio = stiffness * z[i] + fade * rate + viscous * v
-        rates[i, 0] = rate
+    for i in range(len(v)):
+        row, u = i * (4 + len(rates)), stiffness * z[i] / g
+        rate = v[i] - speed * u
+        ratio = stiffness * z[i] + fade * rate + viscous * v[i]
+        rates[i, 0], rates[i, 2] = rate, 0.0
         force[row], force[row + 2] = F * ratio, ratio
-        for k in range(2):
-            e, other = (e1, v1) if k == 0 else (e2, v2)
-            unit = 1.0 if i == k else 0.0
-            rate_v = unit - u * e * (1.0 - fall)
-            rate_z = -speed * stiffness / g * unit
-            column = 1 if k == 0 else 3 + len(rates)
+        for k in range(len(v)):
+            unit, column = 1.0 if i == k else 0.0, 1 if k == 0 else 3 + len(rates)
+            rate_v, rate_z = unit - u * e[k] * (1.0 - fall), -speed * stiffness / g * unit
             rates[i, column], rates[i, 3 + k] = rate_v, rate_z
-            force[row + column] = F * (fade * (rate_v - 2.0 * decay * decay * other * rate)
+            force[row + column] = F * (fade * (rate_v - 2.0 * decay * decay * v[k] * rate)
                                        + viscous * unit)
             force[row + 3 + k] = F * (stiffness * unit + fade * rate_z)
+    if F <= 0.0:
+        _fade(len(v), z, rates)
+
+
+@memory_friction_law
+def lugre(v, F, z, p, force, rates):
+    """LuGre friction along a line."""
+    _lugre((v,), (1.0 if v >= 0.0 else -1.0,), abs(v), F, z, p, force, rates)
+
+
+@planar_friction_law
+def _planar_lugre(law, v1, v2, F, z, p, force, rates):
+    """LuGre friction in two directions."""
+    clear(force, rates)
+    speed, e1, e2 = direction(v1, v2, z[0], z[1])
+    _lugre((v1, v2), (e1, e2), speed, F, z, p, force, rates)
+
+
+@helper
+def _bouc_wen(v, a, size, F, z, p, force, rates):
+    """R = mu F z, u_s z' = v - (beta |v.a| + (1 - beta) v.a) |z|^n a with z = |z| a."""
+    mu, yielding, beta, exponent = p[0], p[1], p[2], p[3]
+    along = 0.0
+    for i in range(len(v)):
+        along += v[i] * a[i]
+    share = beta * (1.0 if along >= 0.0 else -1.0) + 1.0 - beta
+    power = size ** (exponent - 1.0)
+    for i in range(len(v)):
+        row = i * (4 + len(rates))
+        force[row], force[row + 2] = mu * F * z[i], mu * z[i]
+        rates[i, 0], rates[i, 2] = (v[i] - share * along * power * size * a[i]) / yielding, 0.0
+        for k in range(len(v)):
+            unit, column = 1.0 if i == k else 0.0, 1 if k == 0 else 3 + len(rates)
+            force[row + column], force[row + 3 + k] = 0.0, mu * F * unit
+            rates[i, column] = (unit - share * power * size * a[i] * a[k]) / yielding
+            rates[i, 3 + k] = -share * power * (
+                v[k] * a[i] + along * ((exponent - 2.0) * a[i] * a[k] + unit)) / yielding
+    if F <= 0.0:
+        _fade(len(v), z, rates)
+
+
+@memory_friction_law
+def bouc_wen(v, F, z, p, force, rates):
+    """Bouc-Wen hysteresis along a line."""
+    _bouc_wen((v,), (1.0 if z[0] >= 0.0 else -1.0,), abs(z[0]), F, z, p, force, rates)
 
 
 @planar_friction_law
 def _planar_bouc_wen(law, v1, v2, F, z, p, force, rates):
-    """R = mu F z, u_s z' = v - (beta |v.z| + (1 - beta) v.z) |z|^(n-2) z."""
+    """Bouc-Wen hysteresis in two directions."""
     clear(force, rates)
-    mu, yielding, beta, exponent = p[0], p[1], p[2], p[3]
-    if F <= 0.0:
-        _fade_both(z, rates)
-        return
     size = math.hypot(z[0], z[1])
-    a1, a2 = (z[0] / size, z[1] / size) if size > 0.0 else (0.0, 0.0)
-    along = v1 * a1 + v2 * a2
-    share = beta * (1.0 if along >= 0.0 else -1.0) + 1.0 - beta
-    power = size ** (exponent - 1.0)
-    for i in range(2):
-        row = i * (4 + len(rates))
-        v, a = (v1, a1) if i == 0 else (v2, a2)
-        force[row], force[row + 2], force[row + 3 + i] = mu * F * z[i], mu * z[i], mu * F
-        rates[i, 0] = (v - share * along * power * size * a) / yielding
-        for k in range(2):
-            other, b = (v1, a1) if k == 0 else (v2, a2)
-            unit = 1.0 if i == k else 0.0
-            column = 1 if k == 0 else 3 + len(rates)
-            rates[i, column] = (unit - share * power * size * a * b) / yielding
-            rates[i, 3 + k] = -share * power * (
-                other * a + along * ((exponent - 2.0) * a * b + unit)) / yielding
+    a = (z[0] / size, z[1] / size) if size > 0.0 else (0.0, 0.0)
+    _bouc_wen((v1, v2), a, size, F, z, p, force, rates)
 
 
 @dataclass(frozen=True)
