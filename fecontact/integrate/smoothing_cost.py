@@ -1,6 +1,6 @@
 """Effect of friction smoothing, or of the compliance of stops, on a run."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,12 +8,11 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.integrate.coefficients import node_values
 from fecontact.integrate.initial_state import Initial, initial_state
-from fecontact.integrate.nonsmooth.problem import CREEP, STEEP
 from fecontact.integrate.simulate import simulate
 from fecontact.integrate.solvers import SET_VALUED, SetValued
 from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Status
-from fecontact.laws.friction_curve import coefficient, largest_coefficient
+from fecontact.laws.friction_curve import largest_coefficient, static_coefficient
 from fecontact.system.contact_system import ContactSystem
 
 
@@ -117,7 +116,7 @@ def _break_away(system: ContactSystem, solver: SetValued) -> tuple[float, float]
     smooth, sharp = np.empty(n), np.empty(n)
     for nodes, _, law in system.law_groups("friction"):
         smooth[nodes] = largest_coefficient(law)[0]
-        sharp[nodes] = coefficient(replace(law, smoothing_slope=STEEP), CREEP)
+        sharp[nodes] = static_coefficient(law, nodes.stop - nodes.start)
     static = node_values("static_coefficient", solver.static_coefficient, system.basis, -1.0)
     sharp = np.where(static >= 0.0, static, sharp)
     worst = int(np.argmax(np.abs(smooth - sharp)))

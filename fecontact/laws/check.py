@@ -12,7 +12,7 @@ from fecontact.core.compiled import CompiledLaw as CompiledLaw
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.laws.base import FrictionLaw, NormalLaw
-from fecontact.laws.sampling import cycle_work, friction_values, memory_values, normal_values
+from fecontact.laws.sampling import cycle_work, law_values, memory_values
 from fecontact.laws.signatures import FRICTION_FORM, MEMORY_FORM, NORMAL_FORM
 
 _NORMAL_PLACES = np.array([(u, v) for u in (-1e-3, 0.0, 1e-9, 1e-6, 1e-4)
@@ -87,10 +87,8 @@ def _evaluated(
 
     def values(places: slice) -> Array:
         x, y = first[places], second[places]
-        if isinstance(law, NormalLaw):
-            return normal_values(address, row, x, y)
-        if not law.memory:
-            return friction_values(address, row, x, y)
+        if isinstance(law, NormalLaw) or not law.memory:
+            return law_values(address, row, x, y)
         size = (1 + law.memory) * (3 + law.memory)
         return memory_values(address, row, x, y, np.zeros((len(x), law.memory))).reshape(-1, size)
 
@@ -116,7 +114,7 @@ def _require_untouched(law: NormalLaw, table: Array) -> None:
     for limit, *row in np.unique(np.column_stack([limits, table])[known], axis=0):
         u, v = (grid.ravel() for grid in np.meshgrid(
             limit - law.penetration_scale * _DISTANCES, (-1.0, -1e-3, 0.0, 1e-3, 1.0)))
-        values = normal_values(law.kernel.address, np.array(row), u, v)
+        values = law_values(law.kernel.address, np.array(row), u, v)
         _require(law, "(u, v)", np.column_stack([u, v]), (values == 0.0).all(axis=1), values,
                  f"must be zero, as untouched = {limit:g} m says")
 
@@ -176,10 +174,10 @@ def _check_normal(law: NormalLaw, p: Array) -> None:
         np.concatenate([-np.geomspace(1.0, 1e-4, 5), [0.0], np.geomspace(1e-4, 1.0, 5)])))
 
     def forces(points: Array) -> Array:
-        return normal_values(law.kernel.address, p, points[:, 0], points[:, 1])[:, :1]
+        return law_values(law.kernel.address, p, points[:, 0], points[:, 1])[:, :1]
 
-    values = normal_values(law.kernel.address, p, u, v)
-    still = normal_values(law.kernel.address, p, u, np.zeros_like(u))
+    values = law_values(law.kernel.address, p, u, v)
+    still = law_values(law.kernel.address, p, u, np.zeros_like(u))
     points, force = np.column_stack([u, v]), values[:, 0]
     _require(law, "(u, v)", points, np.isfinite(values).all(axis=1), values, "must be finite")
     pushes = law.bilateral | (u <= 0.0) | (force >= 0.0)
@@ -204,7 +202,7 @@ def _check_energy(law: NormalLaw, share: Array) -> None:
     u = (middle[:, None] + half[:, None] * nodes).ravel()
     stored = law.stored_energy(np.tile(edges[:, None], (1, len(share))), share)
     for node, p in enumerate(law.table(share)):
-        force = normal_values(law.kernel.address, p, u, np.zeros_like(u))[:, 0]
+        force = law_values(law.kernel.address, p, u, np.zeros_like(u))[:, 0]
         force = force.reshape(-1, len(nodes))
         work = np.concatenate([[0.0], np.cumsum(half * (force @ weights))])
         work -= np.interp(0.0, edges, work)
@@ -223,14 +221,14 @@ def _check_friction(law: FrictionLaw, p: Array) -> None:
     v, F = (grid.ravel() for grid in np.meshgrid(scale * _SIGNED, _FORCES))
 
     def forces(points: Array) -> Array:
-        return friction_values(law.kernel.address, p, points[:, 0], points[:, 1])[:, :1]
+        return law_values(law.kernel.address, p, points[:, 0], points[:, 1])[:, :1]
 
-    values = friction_values(law.kernel.address, p, v, F)
+    values = law_values(law.kernel.address, p, v, F)
     points, force = np.column_stack([v, F]), values[:, 0]
     _require(law, "(v, F)", points, np.isfinite(values).all(axis=1), values, "must be finite")
     _require(law, "(v, F)", points, force * v >= 0.0, force,
              "must have the sign of v, or zero: friction would give energy off")
-    open_ = friction_values(law.kernel.address, p, v, np.zeros_like(F))[:, 0]
+    open_ = law_values(law.kernel.address, p, v, np.zeros_like(F))[:, 0]
     _require(law, "(v, F)", points * [1.0, 0.0], open_ == 0.0, open_,
              "must be zero without normal force")
     sizes = np.column_stack([np.maximum(np.abs(v), scale), F])

@@ -12,11 +12,10 @@ import numpy as np
 from scipy.optimize import brentq
 
 from fecontact.core.checks import as_floats
-from fecontact.core.compiled import CompiledLaw, kernel
+from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError
-from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array
-from fecontact.laws.signatures import friction_at
+from fecontact.laws.sampling import law_values
 
 
 class Curve(Protocol):
@@ -38,20 +37,12 @@ class Curve(Protocol):
 
 # Smoothing slope and slip velocity at which every smoothed sign is 1 to the last digit while the
 # curve of the coefficient has not begun to change.
-_STEEP, _CREEP = 1e36, 1e-18
+STEEP, CREEP = 1e36, 1e-18
 # Speeds searched for extremes, in units of the law's velocity scale.
 _SEARCHED = np.geomspace(1e-6, 1e12, 4001)
 
 
-@kernel(nogil=True)
-def _sample(address: int, v: Vector, F: float, p: Vector, out: Matrix) -> None:
-    """Fill out (len(v), 2) with R/F and d(R/F)/dv."""
-    for i in range(len(v)):
-        R, slope, _ = friction_at(address)(v[i], F, p)
-        out[i, 0], out[i, 1] = R / F, slope / F
-
-
-def coefficient(law: Curve, velocity: Array | float, normal_force: float = 1.0) -> Array:
+def coefficient(law: Curve, velocity: Array | float) -> Array:
     """R/F at slip velocities [m/s]; it has the sign of the velocity.
 
     Parameters
@@ -60,22 +51,20 @@ def coefficient(law: Curve, velocity: Array | float, normal_force: float = 1.0) 
         A law without memory.
     velocity : (...) array or float
         Slip velocities [m/s]; with parameters per node, (n,) of them, they broadcast against (n,).
-    normal_force : float
-        F [N]; it matters only if the friction force is not proportional to F.
 
     Returns
     -------
     (...) array
     """
-    return _curve(law, velocity, normal_force, 0)
+    return _curve(law, velocity, 0)
 
 
-def slope(law: Curve, velocity: Array | float, normal_force: float = 1.0) -> Array:
+def slope(law: Curve, velocity: Array | float) -> Array:
     """d(R/F)/dv [s/m] at slip velocities [m/s]; arguments as for :func:`coefficient`."""
-    return _curve(law, velocity, normal_force, 1)
+    return _curve(law, velocity, 1)
 
 
-def largest_coefficient(law: Curve, normal_force: float = 1.0) -> tuple[Array, Array]:
+def largest_coefficient(law: Curve) -> tuple[Array, Array]:
     """Largest maximum of R/F over slip velocity, and the velocity where it lies [m/s].
 
     Without a maximum the velocity is infinite, and the coefficient is the limit of R/F, which is
@@ -86,7 +75,7 @@ def largest_coefficient(law: Curve, normal_force: float = 1.0) -> tuple[Array, A
     (n,) array, (n,) array
         One value per contact node if a parameter is given per node, else one.
     """
-    return _largest(law, _nodes(law), normal_force)
+    return _largest(law, _nodes(law))
 
 
 def static_coefficient(law: Curve, nodes: int) -> Array:
@@ -97,10 +86,10 @@ def static_coefficient(law: Curve, nodes: int) -> Array:
     """
     names = [entry.name for entry in fields(cast(Any, law))]
     if "smoothing_slope" in names:
-        steep = replace(cast(Any, law), smoothing_slope=_STEEP)
+        steep = replace(cast(Any, law), smoothing_slope=STEEP)
         return _per_node(steep, nodes, lambda single, row: [
-            _sampled(single, np.array([_CREEP]), 1.0, row)[0, 0]])[:, 0]
-    found = _largest(law, nodes, 1.0)[0]
+            _sampled(single, np.array([CREEP]), row)[0, 0]])[:, 0]
+    found = _largest(law, nodes)[0]
     if not np.isfinite(found).all():
         raise InputError(f"{type(law).__name__} has no largest coefficient: its friction force "
                          f"grows with slip velocity without bound; use a law with a "
@@ -108,14 +97,14 @@ def static_coefficient(law: Curve, nodes: int) -> Array:
     return found
 
 
-def velocity_of_minimum(law: Curve, normal_force: float = 1.0) -> Array:
+def velocity_of_minimum(law: Curve) -> Array:
     """Smallest slip velocity (n,) at which R/F has a minimum [m/s], infinite without one.
 
     Between the maximum and this minimum friction decreases with slip velocity, and steady sliding
     may be unstable.
     """
     def smallest(single: Curve, row: Array) -> list[float]:
-        minima = _turning_points(single, row, normal_force, falling_before=True)
+        minima = _turning_points(single, row, falling_before=True)
         return [min(minima, default=np.inf)]
 
     return _per_node(law, _nodes(law), smallest)[:, 0]
@@ -131,7 +120,7 @@ def stick_velocity(law: Curve, nodes: int) -> Array:
 
 
 def _stick_velocity(law: Curve, nodes: int) -> Array:
-    velocity = _largest(law, nodes, 1.0)[1]
+    velocity = _largest(law, nodes)[1]
     width = _per_node(law, nodes, lambda single, _: [10.0 * single.velocity_scale])[:, 0]
     found = np.where(np.isfinite(velocity), velocity, width)
     found.setflags(write=False)
@@ -142,15 +131,15 @@ def _stick_velocity(law: Curve, nodes: int) -> Array:
 _kept_stick_velocity = lru_cache(maxsize=64)(_stick_velocity)
 
 
-def _largest(law: Curve, nodes: int, F: float) -> tuple[Array, Array]:
+def _largest(law: Curve, nodes: int) -> tuple[Array, Array]:
     def largest(single: Curve, row: Array) -> list[float]:
-        maxima = _turning_points(single, row, F, falling_before=False)
+        maxima = _turning_points(single, row, falling_before=False)
         if maxima:
-            values = _sampled(single, np.array(maxima), F, row)[:, 0]
+            values = _sampled(single, np.array(maxima), row)[:, 0]
             best = int(np.argmax(values))
             return [values[best], maxima[best]]
         far = single.velocity_scale * np.array([1e20, 1e30])
-        below, limit = _sampled(single, far, F, row)[:, 0]
+        below, limit = _sampled(single, far, row)[:, 0]
         return [limit if limit < 2.0 * below else np.inf, np.inf]
 
     value, velocity = _per_node(law, nodes, largest).T
@@ -158,41 +147,40 @@ def _largest(law: Curve, nodes: int, F: float) -> tuple[Array, Array]:
 
 
 def _turning_points(
-    law: Curve, row: Array, F: float, *, falling_before: bool
+    law: Curve, row: Array, *, falling_before: bool
 ) -> list[float]:
     """Speeds at which the slope of the curve changes its sign."""
     speeds = law.velocity_scale * _SEARCHED
-    slopes = _sampled(law, speeds, F, row)[:, 1] * (-1.0 if falling_before else 1.0)
+    slopes = _sampled(law, speeds, row)[:, 1] * (-1.0 if falling_before else 1.0)
     tilted = np.flatnonzero(slopes)
     before, after = tilted[:-1], tilted[1:]
     turns = np.flatnonzero((slopes[before] > 0.0) & (slopes[after] < 0.0))
     return [
-        brentq(lambda v: _sampled(law, np.array([v]), F, row)[0, 1], speeds[before[i]],
+        brentq(lambda v: _sampled(law, np.array([v]), row)[0, 1], speeds[before[i]],
                speeds[after[i]], xtol=1e-300, rtol=1e-12)
         for i in turns
     ]
 
 
-def _curve(law: Curve, velocity: Array | float, F: float, column: int) -> Array:
+def _curve(law: Curve, velocity: Array | float, column: int) -> Array:
     nodes = _nodes(law)
     v = as_floats(velocity, f"{type(law).__name__}: velocity")
     if nodes == 1:
-        return _sampled(law, v.reshape(-1), F, _table(law, 1)[0])[:, column].reshape(v.shape)
+        return _sampled(law, v.reshape(-1), _table(law, 1)[0])[:, column].reshape(v.shape)
     v = np.broadcast_to(v, np.broadcast_shapes(v.shape, (nodes,)))
     values = np.empty(v.shape)
     for j, row in enumerate(_table(law, nodes)):
         part = v[..., j]
-        values[..., j] = _sampled(law, part.reshape(-1), F, row)[:, column].reshape(part.shape)
+        values[..., j] = _sampled(law, part.reshape(-1), row)[:, column].reshape(part.shape)
     return values
 
 
-def _sampled(law: Curve, v: Array, F: float, row: Array) -> Array:
+def _sampled(law: Curve, v: Array, row: Array) -> Array:
     if law.memory:
         raise InputError(f"{type(law).__name__} has memory: its force is not a curve over slip "
                          f"velocity.")
-    out = np.empty((v.size, 2))
-    _sample(law.kernel.address, np.array(v), F, row, out)
-    return out
+    # Under a normal force of 1 N.
+    return law_values(law.kernel.address, row, v, np.ones(v.size))[:, :2]
 
 
 def _nodes(law: Curve) -> int:

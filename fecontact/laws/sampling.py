@@ -9,15 +9,9 @@ from fecontact.laws.signatures import friction_at, memory_at, normal_at
 
 
 @kernel(nogil=True)
-def _normal(address: int, u: Vector, v: Vector, p: Vector, out: Matrix) -> None:
-    for k in range(len(u)):
-        out[k, 0], out[k, 1], out[k, 2] = normal_at(address)(u[k], v[k], p)
-
-
-@kernel(nogil=True)
-def _friction(address: int, v: Vector, F: Vector, p: Vector, out: Matrix) -> None:
-    for k in range(len(v)):
-        out[k, 0], out[k, 1], out[k, 2] = friction_at(address)(v[k], F[k], p)
+def _scalar(address: int, x: Vector, y: Vector, p: Vector, out: Matrix) -> None:
+    for k in range(len(x)):
+        out[k, 0], out[k, 1], out[k, 2] = friction_at(address)(x[k], y[k], p)
 
 
 @kernel(nogil=True)
@@ -26,17 +20,14 @@ def _memory(address: int, v: Vector, F: Vector, z: Matrix, p: Vector, out: Block
         memory_at(address)(v[k], F[k], z[k], p, out[k, 0], out[k, 1:])
 
 
-def normal_values(address: int, p: Array, u: Array, v: Array) -> Array:
-    """F, dF/du, dF/dv (k, 3) at penetrations and rates (k,), for one row of parameters."""
-    out = np.full((len(u), 3), np.nan)
-    _normal(address, _floats(u), _floats(v), p, out)
-    return out
+def law_values(address: int, p: Array, x: Array, y: Array) -> Array:
+    """A force and its derivatives (k, 3) at pairs of arguments (k,), for one row of parameters.
 
-
-def friction_values(address: int, p: Array, v: Array, F: Array) -> Array:
-    """R, dR/dv, dR/dF (k, 3) at slip velocities and normal forces (k,), without memory."""
-    out = np.full((len(v), 3), np.nan)
-    _friction(address, _floats(v), _floats(F), p, out)
+    A normal law gives F, dF/du, dF/dv at penetrations u and rates v; friction without memory gives
+    R, dR/dv, dR/dF at slip velocities v and normal forces F.
+    """
+    out = np.full((len(x), 3), np.nan)
+    _scalar(address, _floats(x), _floats(y), p, out)
     return out
 
 

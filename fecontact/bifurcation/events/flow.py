@@ -28,7 +28,6 @@ from fecontact.integrate.nonsmooth.equations import (
 from fecontact.integrate.nonsmooth.event_search import Workspace
 from fecontact.integrate.nonsmooth.problem import (
     CLUSTERS,
-    CREEP,
     FORCE,
     GRIP,
     PENETRATION,
@@ -53,6 +52,7 @@ from fecontact.integrate.step_loop import (
     Method,
     step_loop,
 )
+from fecontact.laws.friction_curve import CREEP
 from fecontact.system.node_forces import normal_force
 from fecontact.system.nodes import MODES, NODES
 

@@ -28,6 +28,7 @@ from fecontact.integrate.step_runs import ENDS, StepRun, finish
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.laws.friction.stribeck import Frictionless
+from fecontact.laws.friction_curve import CREEP, STEEP
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.powers import POWER_COUNT
 
@@ -312,7 +313,7 @@ def _unsmoothed(law: FrictionLaw) -> FrictionLaw:
     if law.memory or "smoothing_slope" not in (entry.name for entry in fields(law)):
         raise InputError(f"{type(law).__name__} has no smoothing_slope that could become infinite; "
                          f"set-valued friction needs a law with one, without memory.")
-    steep: dict[str, Any] = {"smoothing_slope": kinds.STEEP}
+    steep: dict[str, Any] = {"smoothing_slope": STEEP}
     return replace(law, **steep)
 
 
@@ -363,7 +364,7 @@ def _rough_nodes(groups: list[tuple[FrictionLaw, Array]], static: Array) -> NDAr
                 raise InputError(f"Friction of {type(law).__name__} is not proportional to the "
                                  f"normal force, as that of rigid stops has to be; use another "
                                  f"law, or leave restitution out.")
-            rough.append(law.kernel.python(kinds.CREEP, 1.0, row)[0] != 0.0)
+            rough.append(law.kernel.python(CREEP, 1.0, row)[0] != 0.0)
     return np.array(rough) | (static > 0.0)
 
 

@@ -19,7 +19,6 @@ from fecontact.core.compiled import compile_law, helper
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import IntegerVector, Vector
 from fecontact.integrate.nonsmooth.problem import (
-    CREEP,
     CURVED,
     FIXED,
     FORCE,
@@ -36,6 +35,7 @@ from fecontact.integrate.nonsmooth.problem import (
     Evaluation,
     NonsmoothProblem,
 )
+from fecontact.laws.friction_curve import CREEP
 from fecontact.laws.signatures import signal_at
 from fecontact.system.kernels import body_acceleration, prescribed_at
 from fecontact.system.node_forces import normal_force, plane_friction, pressing_force

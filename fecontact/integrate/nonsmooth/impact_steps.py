@@ -40,7 +40,6 @@ from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import solve
 from fecontact.integrate.nonsmooth.equations import stick_limit
 from fecontact.integrate.nonsmooth.problem import (
-    CREEP,
     GAINED,
     IMPACTS,
     Limits,
@@ -70,6 +69,7 @@ from fecontact.integrate.step_loop import (
     Method,
     step_loop,
 )
+from fecontact.laws.friction_curve import CREEP
 from fecontact.system.kernels import body_acceleration, prescribed_at
 from fecontact.system.node_forces import friction_scale, plane_friction
 from fecontact.system.nodes import ground_motion, ground_speed, node_contact, node_motion

@@ -22,10 +22,6 @@ from fecontact.integrate.step_loop import (
 from fecontact.system.nodes import AXES, MODES, NODES, SystemArrays
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump
 
-# Smoothing slope and slip velocity at which every smoothed sign is 1 to the last digit while the
-# curve of the coefficient has not begun to change.
-STEEP, CREEP = 1e36, 1e-18
-
 # Columns of `Workspace.nodes`; the last two in space only.
 NODE_COLUMNS, SPACE_NODE_COLUMNS = 9, 11
 (FORCE, PRESSING, PENETRATION, RATE, SLIP, SLOPE, CURVED, LIMIT, GRIP, SLIP_ACROSS,

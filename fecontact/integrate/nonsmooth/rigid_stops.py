@@ -50,7 +50,6 @@ from fecontact.integrate.nonsmooth.equations import (
 from fecontact.integrate.nonsmooth.event_search import ROUNDING, Workspace
 from fecontact.integrate.nonsmooth.problem import (
     CLOSED,
-    CREEP,
     CURVED,
     FIXED,
     GAINED,
@@ -70,6 +69,7 @@ from fecontact.integrate.nonsmooth.problem import (
 )
 from fecontact.integrate.nonsmooth.steps.flights import CLIMB, YOUNG, begin_flight
 from fecontact.integrate.nonsmooth.steps.rates import set_prescribed
+from fecontact.laws.friction_curve import CREEP
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import (
     BELT_FRICTION,

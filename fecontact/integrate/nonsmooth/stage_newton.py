@@ -33,7 +33,7 @@ from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import Vector
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.nonsmooth.equations import stick_limit
-from fecontact.integrate.nonsmooth.problem import CREEP
+from fecontact.laws.friction_curve import CREEP
 from fecontact.system.kernels import body_acceleration, prescribed_at
 from fecontact.system.node_forces import (
     NodeForces,

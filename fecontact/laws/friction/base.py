@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
-from fecontact.laws import base
+from fecontact.laws import base, friction_curve
 from fecontact.laws.base import NodeLaw, Positive
 
 Smoothing = Literal["arctan", "tanh", "square-root"]
@@ -20,32 +20,10 @@ class MemorylessFriction(base.FrictionLaw):
     :mod:`fecontact.laws.friction_curve`, which take any law without memory.
     """
 
-    def coefficient(self, velocity: Array | float) -> Array:
-        """R/F at slip velocities [m/s], with their sign; (..., n) with parameters per node."""
-        from fecontact.laws import friction_curve
-
-        return friction_curve.coefficient(self, velocity)
-
-    def slope(self, velocity: Array | float) -> Array:
-        """d(R/F)/dv [s/m] at slip velocities [m/s]; negative where steady sliding is excited."""
-        from fecontact.laws import friction_curve
-
-        return friction_curve.slope(self, velocity)
-
-    def largest_coefficient(self) -> tuple[Array, Array]:
-        """Largest maximum (n,) of R/F and its slip velocity (n,) [m/s].
-
-        Without a maximum the velocity is infinite and the coefficient the limit of R/F.
-        """
-        from fecontact.laws import friction_curve
-
-        return friction_curve.largest_coefficient(self)
-
-    def velocity_of_minimum(self) -> Array:
-        """Smallest slip velocity (n,) at which R/F has a minimum [m/s], infinite without one."""
-        from fecontact.laws import friction_curve
-
-        return friction_curve.velocity_of_minimum(self)
+    coefficient = friction_curve.coefficient
+    slope = friction_curve.slope
+    largest_coefficient = friction_curve.largest_coefficient
+    velocity_of_minimum = friction_curve.velocity_of_minimum
 
 
 class SmoothedFriction(MemorylessFriction):

@@ -96,7 +96,7 @@ def _planar_dahl(law, v1, v2, F, z, p, force, rates):
 
 @helper
 def _lugre(v, e, speed, F, z, p, force, rates):
-    """R = F [sigma_0 z + sigma_1(|v|) z' + sigma_2 v], z' = v - sigma_0 |v| z / g(|v|), v = |v| e."""
+    """R = F [sigma_0 z + sigma_1(|v|) z' + sigma_2 v], z' = v - sigma_0 |v| z / g; v = |v| e."""
     static, kinetic, stribeck, exponent = p[0], p[1], p[2], p[3]
     stiffness, damping, viscous, decay = p[4], p[5], p[6], p[7]
     x = (speed / stribeck) ** exponent
