@@ -122,6 +122,12 @@ def as_count(value: Any, what: str, least: int = 1) -> int:
     return int(value)
 
 
+def require_rtol(rtol: float, name: str = "rtol", most: float = 1e-2) -> None:
+    """Raise :class:`InputError` unless a tolerance is a number from 1e-13 to ``most``."""
+    if not (isinstance(rtol, Real) and 1e-13 <= rtol <= most):
+        raise InputError(f"{name} = {rtol!r} must be a number from 1e-13 to {most:g}.")
+
+
 def whole_number(text: str) -> int | None:
     """The number that a text of decimal digits stands for, None for any other text."""
     # Superscripts are digits too, and thousands of digits are not converted.

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.core.checks import as_count, as_floats, require_kind
+from fecontact.core.checks import as_count, as_floats, require_kind, require_rtol
 from fecontact.core.errors import InputError, require_positive
 from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
@@ -146,8 +146,7 @@ def ensemble(
     """
     require_solver(solver)
     members, starts, instants = _members(systems, initial, times)
-    if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
-        raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
+    require_rtol(rtol)
     require_max_step(max_step)
     chain = as_count(chain, "chain")
     workers = None if workers is None else as_count(workers, "workers")
@@ -246,8 +245,8 @@ def ensemble(
             raise
     for one in together:
         states[one.numbers], steps[one.numbers] = one.runs.states, one.steps
-        for index, ended in zip(one.numbers, one.status, strict=True):
-            status[index] = ended
+        for index, outcome in zip(one.numbers, one.status, strict=True):
+            status[index] = outcome
     return Ensemble(instants, states, tuple(status), steps, tuple(seen) if watched else None)
 
 

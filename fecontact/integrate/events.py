@@ -8,7 +8,7 @@ import numpy as np
 
 from fecontact.core.checks import require_flags
 from fecontact.core.compiled import CompiledLaw, compile_law
-from fecontact.core.errors import InputError, choices, nearest, require_choice, require_finite
+from fecontact.core.errors import InputError, choices, require_choice, require_finite
 from fecontact.core.types import Array
 from fecontact.integrate.event_table import CONTACT_EVENTS
 from fecontact.integrate.rodas5p.event_kernels import EVENT
@@ -62,9 +62,7 @@ class ContactEvents:
                              f"{choices(CONTACT_EVENTS)}, or () for none.")
         given = (self.stop,) if isinstance(self.stop, str) else tuple(self.stop)
         for name in given:
-            if name not in CONTACT_EVENTS:
-                raise InputError(f"ContactEvents: stop = {name!r} must be one of "
-                                 f"{choices(CONTACT_EVENTS)}{nearest(str(name), CONTACT_EVENTS)}.")
+            require_choice("ContactEvents", "stop", name, CONTACT_EVENTS)
         object.__setattr__(self, "stop", given)
 
 
@@ -178,11 +176,9 @@ class Crossing:
 
 def require_quantity(owner: str, component: Any, of: Any) -> None:
     """Raise InputError unless these are a component, or None, and a displacement or velocity."""
-    for name, value, names in (("component", component, COMPONENTS),
-                               ("of", of, ("displacement", "velocity"))):
-        if value not in names and not (name == "component" and value is None):
-            raise InputError(f"{owner}: {name} = {value!r} must be one of {choices(names)}"
-                             f"{nearest(str(value), names)}.")
+    if component is not None:
+        require_choice(owner, "component", component, COMPONENTS)
+    require_choice(owner, "of", of, ("displacement", "velocity"))
 
 
 def quantity_row(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.checks import require_kind
+from fecontact.core.checks import require_kind, require_rtol
 from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
@@ -163,11 +163,9 @@ def sensitivity(
     """
     require_kind("sensitivity", ContactSystem, system=system)
     times = output_times(t_start, t_end, outputs)
-    if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
-        raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
-    if derivative_rtol is not None and not (isinstance(derivative_rtol, Real)
-                                            and 1e-13 <= derivative_rtol <= 1.0):
-        raise InputError(f"derivative_rtol = {derivative_rtol!r} must be a number from 1e-13 to 1.")
+    require_rtol(rtol)
+    if derivative_rtol is not None:
+        require_rtol(derivative_rtol, "derivative_rtol", 1.0)
     require_max_step(max_step)
     require_solver(solver, "derivatives")
     state = initial_state(system, initial, t_start)

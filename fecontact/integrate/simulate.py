@@ -9,7 +9,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from fecontact.core.checks import require_kind
+from fecontact.core.checks import require_kind, require_rtol
 from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
@@ -123,8 +123,7 @@ def simulate(
     times = output_times(t_start, t_end, outputs)
     if isinstance(moving, ContactSystem) and isinstance(initial, FieldRun):
         initial = initial.states[-1]
-    if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
-        raise InputError(f"rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
+    require_rtol(rtol)
     require_max_step(max_step)
     require_kind("simulate", bool, keep_steps=keep_steps)
     require_solver(solver, *(["events"] if events is not None else []))

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.core.checks import as_floats, as_path, require_kind
-from fecontact.core.errors import InputError, choices, nearest, shown
+from fecontact.core.errors import InputError, choices, nearest, require_choice, shown
 from fecontact.integrate.coefficients import Coefficient
 from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Solution, Status
@@ -235,10 +235,7 @@ class SetValued(Solver):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, _coefficient(owner, name, value, most))
-        if self.impact_law not in self.impact_laws:
-            raise InputError(f"{owner}: impact_law = {self.impact_law!r} must be one of "
-                             f"{choices(self.impact_laws)}"
-                             f"{nearest(str(self.impact_law), self.impact_laws)}.")
+        require_choice(owner, "impact_law", self.impact_law, self.impact_laws)
         if self.impact_law == "poisson" and self.tangential_restitution != 0.0:
             raise InputError(f"{owner}: tangential_restitution = "
                              f"{self.tangential_restitution!r} is for impact_law = 'newton' "
@@ -313,9 +310,7 @@ class Scipy(Solver):
     abilities: ClassVar[frozenset[str]] = frozenset({"events"})
 
     def __post_init__(self) -> None:
-        if self.method not in self.methods:
-            raise InputError(f"Scipy: method = {self.method!r} must be one of "
-                             f"{choices(self.methods)}{nearest(str(self.method), self.methods)}.")
+        require_choice("Scipy", "method", self.method, self.methods)
 
     @property
     def name(self) -> str:

@@ -6,7 +6,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from fecontact.core.checks import require_kind
+from fecontact.core.checks import as_count, require_kind
 from fecontact.core.errors import (
     AnalysisError,
     InputError,
@@ -171,9 +171,7 @@ def wear_history(
     require_positive("wear_history", acceleration=acceleration, thickness=across)
     for name, count, least in (("blocks", blocks, 1), ("periods", periods, 1),
                                ("settling", settling, 0)):
-        if isinstance(count, bool) or not isinstance(count, int) or count < least:
-            raise InputError(f"wear_history: {name} = {count!r} must be a whole number, at least "
-                             f"{least}.")
+        as_count(count, f"wear_history: {name}", least)
     if period is not None:
         require_positive("wear_history", period=period)
     cycle = forcing_period(system) if period is None else float(period)

@@ -14,7 +14,7 @@ from typing_extensions import TypeAliasType
 
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.docstrings import inherit_documentation
-from fecontact.core.errors import LARGEST, InputError, choices, nearest, shown
+from fecontact.core.errors import LARGEST, InputError, require_choice, shown
 from fecontact.core.types import Array
 from fecontact.laws.friction_curve import stick_velocity
 from fecontact.laws.sampling import stored_energy
@@ -89,10 +89,7 @@ class NodeLaw:
         for entry in fields(self):
             given = getattr(self, entry.name)
             if entry.name in self.choices:
-                names = self.choices[entry.name]
-                if not isinstance(given, str) or given not in names:
-                    raise InputError(f"{self._title(entry.name)} = {given!r} must be one of "
-                                     f"{choices(names)}{nearest(str(given), names)}.")
+                require_choice(type(self).__name__, entry.name, given, self.choices[entry.name])
                 continue
             try:
                 array = np.asarray(given)

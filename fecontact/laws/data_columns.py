@@ -1,13 +1,14 @@
 """Checked reading of sequences of numbers and two-column files."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fecontact.core.checks import require_regular_file
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, shown
 from fecontact.core.types import Array
 
 
@@ -24,7 +25,7 @@ def numbers(owner: str, name: str, given: Any, least: int = 0) -> tuple[float, .
     except (TypeError, ValueError, OverflowError):
         array = np.empty((0, 0))
     if array.ndim != 1 or isinstance(given, str):
-        raise InputError(f"{owner}: {name} = {_short(given)} must be a list of numbers.")
+        raise InputError(f"{owner}: {name} = {shown(given)} must be a list of numbers.")
     if not np.isfinite(array).all():
         place = int(np.argmin(np.isfinite(array)))
         raise InputError(f"{owner}: {name}[{place}] = {array[place]} must be finite; repair or "
@@ -35,7 +36,7 @@ def numbers(owner: str, name: str, given: Any, least: int = 0) -> tuple[float, .
     return tuple(array.tolist())
 
 
-def require_growing(owner: str, name: str, values: tuple[float, ...]) -> None:
+def require_growing(owner: str, name: str, values: Sequence[float] | Array) -> None:
     """Raise :class:`InputError` at the first value that is not larger than the one before it."""
     steps = np.diff(values)
     if (steps <= 0.0).any():
@@ -50,10 +51,10 @@ def require_resolved(owner: str, first: str, x: Array, second: str, y: Array) ->
 
     x must increase by at least 1e-60 between points, and both be within -1e60 to 1e60.
     """
-    for shown, value in ((first, float(x[0])), (first, float(x[-1])),
+    for name, value in ((first, float(x[0])), (first, float(x[-1])),
                          (second, float(y[np.argmax(np.abs(y))]))):
         if not abs(value) <= 1e60:
-            raise InputError(f"{owner}: {shown} reaches {value:g}; its values must be within "
+            raise InputError(f"{owner}: {name} reaches {value:g}; its values must be within "
                              f"-1e60 to 1e60.")
     steps = np.diff(x)
     if not steps.min() >= 1e-60:
@@ -123,14 +124,14 @@ def read_columns(
         if len(words) not in widths or len(values) < len(words) or not np.isfinite(values).all():
             found = (f"has {len(words)} column{'s' * (len(words) != 1)}"
                      if len(words) not in widths else "has a value that is no finite number")
-            raise InputError(f"{owner}: file = '{file}', line {place}, {_short(line.strip())}, "
+            raise InputError(f"{owner}: file = '{file}', line {place}, {shown(line.strip())}, "
                              f"{found}; each line must hold {wanted}, like the first.")
         rows.append(values)
     if not rows:
         first = next((line.strip() for line in lines if line.strip()), None)
-        shown = "" if first is None else f"; it begins with {_short(first)}"
+        begin = "" if first is None else f"; it begins with {shown(first)}"
         raise InputError(f"{owner}: file = '{file}' has no line of just the numbers {wanted}"
-                         f"{shown}.")
+                         f"{begin}.")
     return tuple(np.array(rows).T)
 
 
@@ -168,8 +169,3 @@ def number(word: str) -> float | None:
         return None if "_" in word else float(word)
     except ValueError:
         return None
-
-
-def _short(given: Any) -> str:
-    text = repr(given)
-    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -11,8 +11,6 @@ import numpy as np
 from fecontact.core.checks import as_direction, as_floats, as_place, require_kind
 from fecontact.core.errors import (
     InputError,
-    choices,
-    nearest,
     require_choice,
     require_finite,
     require_not_negative,
@@ -182,10 +180,8 @@ class PointLoad:
         if isinstance(self.component, tuple | list | np.ndarray):
             object.__setattr__(self, "component",
                                as_direction(self.component, "PointLoad: component"))
-        elif self.component not in _COMPONENTS:
-            raise InputError(f"PointLoad: component = {self.component!r} must be one of "
-                             f"{choices(_COMPONENTS)}"
-                             f"{nearest(str(self.component), _COMPONENTS)}.")
+        else:
+            require_choice("PointLoad", "component", self.component, _COMPONENTS)
         if isinstance(self.signal, Real) and not isinstance(self.signal, bool):
             object.__setattr__(self, "signal", Constant(float(self.signal)))
         _require_signal("PointLoad", "signal", self.signal, ", or a number")

@@ -260,7 +260,7 @@ def _find_end(step, data):
     for look in range(_LOOKS):
         for k in range(len(watch.own)):
             note_own(k, look / _LOOKS, (look + 1) / _LOOKS, view, watch)
-    return first_stop(step, begun, watch)
+    return (first_stop(begun, watch) - step.t) / step.h
 
 
 @routine

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law, helper, routine
-from fecontact.integrate.bernstein import NOWHERE, from_nested, sign_changes
+from fecontact.integrate.bernstein import from_nested, sign_changes
 from fecontact.integrate.nonsmooth.dop853 import PARTS, interpolate
 from fecontact.integrate.nonsmooth.equations import derivative
 from fecontact.integrate.nonsmooth.event_search import Workspace
@@ -31,14 +31,15 @@ from fecontact.integrate.rodas5p.event_kernels import (
     LIFT_OFF,
     NODES,
     OPEN,
-    SLIP_BEGINS,
     SLIPPING,
     STICKING,
     TOUCH_DOWN,
     Watch,
     event_at,
+    first_stop,
+    note,
+    note_zone,
 )
-from fecontact.integrate.rodas5p.event_kernels import STICK as STICK_BEGINS
 from fecontact.integrate.step_polynomials import MOST
 
 # Kinds of notes: the state at the start, a step or a part of it, a change of contact.
@@ -65,32 +66,6 @@ def full(watch):
     """Whether the events of one more step may find no place."""
     most = (_LOOKS + 2) * (3 * len(watch.zones) + len(watch.own))
     return watch.counts[FOUND] + most > len(watch.found)
-
-
-@routine
-def _note(watch, t, kind, node, y):
-    row = watch.counts[FOUND]
-    watch.found[row, 0], watch.found[row, 1], watch.found[row, 2] = t, kind, node
-    for i in range(watch.states.shape[1]):
-        watch.states[row, i] = y[i]
-    watch.counts[FOUND] = row + 1
-
-
-@routine
-def _note_zone(j, zone, t, y, watch):
-    """Note what a node does that is in a state from now on."""
-    old = watch.zones[j]
-    watch.zones[j] = zone
-    if old == zone:
-        return
-    if old == OPEN:
-        _note(watch, t, TOUCH_DOWN, j, y)
-    if zone == OPEN:
-        _note(watch, t, LIFT_OFF, j, y)
-    elif zone == STICKING:
-        _note(watch, t, STICK_BEGINS, j, y)
-    elif old == STICKING:
-        _note(watch, t, SLIP_BEGINS, j, y)
 
 
 @helper
@@ -142,7 +117,7 @@ def _note_linear(k, upto, view):
         sign = -sign
         if places[i] <= upto and _counts(sign > 0.0, k, watch):
             t = _look(places[i], view)
-            _note(watch, t, FIRST_OWN + k, -1, workspace.state)
+            note(watch, t, FIRST_OWN + k, -1, workspace.state)
 
 
 @routine
@@ -164,7 +139,7 @@ def _note_own(k, left, right, new, view):
         else:
             low = middle
     t = _look(high, view)
-    _note(watch, t, FIRST_OWN + k, -1, workspace.state)
+    note(watch, t, FIRST_OWN + k, -1, workspace.state)
 
 
 @routine
@@ -180,7 +155,7 @@ def _note_touch(j, left, right, view):
         else:
             high = middle
     t = _look(high, view)
-    _note_zone(j, _zone(j, p, progress, w), t, view.workspace.state, watch)
+    note_zone(j, _zone(j, p, progress, w), t, view.workspace.state, watch)
 
 
 @routine
@@ -223,21 +198,21 @@ def _note_change(begin, view):
             watch.zones[j] = OPEN if workspace.touched[j] else zone
         if watch.counts[NODES] != 0:
             if workspace.touched[j] and watch.zones[j] == OPEN and zone == OPEN:
-                _note(watch, t, TOUCH_DOWN, j, Y)
-                _note(watch, t, LIFT_OFF, j, Y)
+                note(watch, t, TOUCH_DOWN, j, Y)
+                note(watch, t, LIFT_OFF, j, Y)
             workspace.touched[j] = False
-            _note_zone(j, zone, t, Y, watch)
+            note_zone(j, zone, t, Y, watch)
     for k in range(len(watch.own)):
         old = watch.own_values[k]
         new = event_at(watch.own[k])(t, Y[:size], watch.own_parameters[k])
         rising = old < 0.0 < new
         if not begin and (rising or old > 0.0 > new) and _counts(rising, k, watch):
-            _note(watch, t, FIRST_OWN + k, -1, Y)
+            note(watch, t, FIRST_OWN + k, -1, Y)
         watch.own_values[k] = new
 
 
 def _note_events(step, upto, what, p, progress, w, workspace, watch):
-    """Note events; the part of the step after which the run ends, or NOWHERE.
+    """Note events; the part of the step after which the run ends, or inf.
 
     Events after the first at which the run ends are dropped.
     """
@@ -247,20 +222,8 @@ def _note_events(step, upto, what, p, progress, w, workspace, watch):
         _note_step(upto, view)
     else:
         _note_change(what == BEGIN, view)
-    stop = NOWHERE
-    for row in range(begun, watch.counts[FOUND]):
-        if watch.stops[int(watch.found[row, 1])] != 0:
-            part = (watch.found[row, 0] - step.t) / step.h if what == WITHIN else 0.0
-            stop = min(stop, max(part, 0.0))
-    if stop <= 1.0 and what == WITHIN:
-        kept = begun
-        for row in range(begun, watch.counts[FOUND]):
-            if (watch.found[row, 0] - step.t) / step.h <= stop:
-                watch.found[kept, :] = watch.found[row, :]
-                watch.states[kept, :] = watch.states[row, :]
-                kept += 1
-        watch.counts[FOUND] = kept
-    return stop
+    stop = first_stop(begun, watch)
+    return max((stop - step.t) / step.h, 0.0) if what == WITHIN else max(stop - step.t, 0.0)
 
 
 # By its address, so that it is not compiled into the loop over the steps.

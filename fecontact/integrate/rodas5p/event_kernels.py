@@ -176,12 +176,30 @@ def _zone(j, part, y, view, watch):
 
 
 @helper
-def _note(watch, t, kind, node, y):
+def note(watch, t, kind, node, y):
+    """Note an event of a state, whose first entries are y."""
     row = watch.counts[FOUND]
     watch.found[row, 0], watch.found[row, 1], watch.found[row, 2] = t, kind, node
-    for k in range(len(y)):
+    for k in range(watch.states.shape[1]):
         watch.states[row, k] = y[k]
     watch.counts[FOUND] = row + 1
+
+
+@routine
+def note_zone(j, zone, t, y, watch):
+    """Note what node j does that is in a zone from now on."""
+    old, new = watch.zones[j] % DEEP, zone % DEEP
+    watch.zones[j] = zone
+    if old == new:
+        return
+    if old == OPEN:
+        note(watch, t, TOUCH_DOWN, j, y)
+    if new == OPEN:
+        note(watch, t, LIFT_OFF, j, y)
+    elif new == STICKING:
+        note(watch, t, STICK, j, y)
+    elif old == STICKING:
+        note(watch, t, SLIP_BEGINS, j, y)
 
 
 @helper
@@ -243,19 +261,17 @@ def _own(k, left, right, view, watch):
         else:
             low = middle
     _look(high, view)
-    _note(watch, _time(high, view.step), FIRST_OWN + k, -1, view.y)
+    note(watch, _time(high, view.step), FIRST_OWN + k, -1, view.y)
     return new
 
 
 @helper
-def first_stop(step, begun, watch):
-    """Drop the events after the first at which the run stops; its part of the step, or 2."""
+def first_stop(begun, watch):
+    """Drop the events after the first at which the run stops; its time, inf if none does."""
     stop = np.inf
     for row in range(begun, watch.counts[FOUND]):
         if watch.stops[int(watch.found[row, 1])] != 0:
             stop = min(stop, watch.found[row, 0])
-    if stop == np.inf:
-        return 2.0
     kept = begun
     for row in range(begun, watch.counts[FOUND]):
         if watch.found[row, 0] <= stop:
@@ -264,7 +280,7 @@ def first_stop(step, begun, watch):
                     table[kept, k] = table[row, k]
             kept += 1
     watch.counts[FOUND] = kept
-    return (stop - step.t) / step.h
+    return stop
 
 
 @routine
@@ -364,19 +380,10 @@ def _note_changes(j, zone, left, right, view, watch):
     """Note what node j does between two parts of a step, at whose right end it is in a zone."""
     low = left
     for _ in range(_MOST_A_NODE):
-        old = watch.zones[j] % DEEP
-        if old == zone % DEEP:
+        if watch.zones[j] % DEEP == zone % DEEP:
             break
-        low, watch.zones[j] = _changed(j, low, right, view, watch)
-        at, new = _time(low, view.step), watch.zones[j] % DEEP
-        if old == OPEN:
-            _note(watch, at, TOUCH_DOWN, j, view.y)
-        if new == OPEN:
-            _note(watch, at, LIFT_OFF, j, view.y)
-        elif new == STICKING:
-            _note(watch, at, STICK, j, view.y)
-        elif old == STICKING:
-            _note(watch, at, SLIP_BEGINS, j, view.y)
+        low, new = _changed(j, low, right, view, watch)
+        note_zone(j, new, _time(low, view.step), view.y, watch)
     watch.zones[j] = zone
 
 
@@ -418,7 +425,7 @@ def _note_node(j, left, right, view, watch):
 
 
 def _note_events(step, problem, progress, workspace, watch):
-    """Note the events of an accepted step; the part of it after which the run ends, or 2."""
+    """Note the events of an accepted step; the part of it after which the run ends, or inf."""
     view = _view(step, problem, progress, workspace)
     begun = watch.counts[FOUND]
     looks = _MORE_LOOKS if view.system.rows.shape[1] > 2 else _LOOKS
@@ -434,7 +441,7 @@ def _note_events(step, problem, progress, workspace, watch):
         # The others stay open.
         for place in range(workspace.near.used[0]):
             _note_node(workspace.near.nodes[place], left, right, view, watch)
-    return first_stop(step, begun, watch)
+    return (first_stop(begun, watch) - step.t) / step.h
 
 
 # By its address, so that it is not compiled into every step of runs that watch for nothing.

@@ -18,11 +18,12 @@ from fecontact.integrate.rodas5p import state
 from fecontact.integrate.rodas5p.error_control import take_scales
 from fecontact.integrate.rodas5p.event_kernels import (
     FOUND,
-    LIFT_OFF,
     NODES,
-    STICK,
-    TOUCH_DOWN,
+    OPEN,
+    STICKING,
     Watch,
+    first_stop,
+    note_zone,
 )
 from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, SWITCHES, WORST_NODE
 from fecontact.integrate.series.branches import (
@@ -244,26 +245,14 @@ def _set_state(step, series, state):
 
 
 @helper
-def _note(kind, step, series, watch):
-    row = watch.counts[FOUND]
-    watch.found[row, 0], watch.found[row, 1] = step.target, kind
-    watch.found[row, 2] = step.node
-    _set_state(step, series, watch.states[row])
-    watch.counts[FOUND] = row + 1
-
-
-@helper
 def _note_change(change, step, series, watch):
     """Note that the force of the node begins or ends; whether the run stops there."""
-    stops = False
-    if change > 0:
-        _note(TOUCH_DOWN, step, series, watch)
-        _note(STICK, step, series, watch)
-        stops = watch.stops[TOUCH_DOWN] != 0 or watch.stops[STICK] != 0
-    elif change < 0:
-        _note(LIFT_OFF, step, series, watch)
-        stops = watch.stops[LIFT_OFF] != 0
-    return stops
+    row = watch.counts[FOUND]
+    state = watch.states[row]
+    _set_state(step, series, state)
+    watch.zones[step.node] = OPEN if change > 0 else STICKING
+    note_zone(step.node, STICKING if change > 0 else OPEN, step.target, state, watch)
+    return first_stop(row, watch) < np.inf
 
 
 @helper
@@ -356,7 +345,7 @@ def _find_end(step, data):
     if step.meets != MET_RELEASE:
         _set_speeds(step.part, step.unit, series)
     change = _switch(step.node, step.meets, step.unit, series)
-    stops = watch.counts[NODES] != 0 and _note_change(change, step, series, watch)
+    stops = change != 0 and watch.counts[NODES] != 0 and _note_change(change, step, series, watch)
     return 1.0 if stops else BEYOND
 
 

@@ -6,7 +6,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.core.errors import InputError, require_finite, require_positive
+from fecontact.core.checks import require_flags
+from fecontact.core.errors import require_finite, require_positive
 from fecontact.core.types import Array
 from fecontact.laws.data_columns import read_or_given, require_closed, require_resolved
 from fecontact.laws.ground.profile import Profile
@@ -69,10 +70,7 @@ class MeasuredProfile(Profile):
     def __post_init__(self) -> None:
         require_finite("MeasuredProfile", scale=self.scale)
         require_positive("MeasuredProfile", abscissa_scale=self.abscissa_scale)
-        for name in ("periodic", "remove_mean"):
-            if not isinstance(getattr(self, name), bool):
-                raise InputError(f"MeasuredProfile: {name} = {getattr(self, name)!r} must be true "
-                                 f"or false.")
+        require_flags("MeasuredProfile", periodic=self.periodic, remove_mean=self.remove_mean)
         x, y = read_or_given("MeasuredProfile", self.file, abscissa=self.abscissa,
                              heights=self.heights, least=3)
         if self.periodic:

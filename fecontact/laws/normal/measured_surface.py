@@ -8,11 +8,12 @@ from typing import Annotated, Any, ClassVar, Self, cast
 
 import numpy as np
 
-from fecontact.core.errors import InputError, require_positive
+from fecontact.core.errors import InputError, require_positive, shown
+from fecontact.core.tables import located
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import PerNode
-from fecontact.laws.data_columns import read_columns
+from fecontact.laws.data_columns import numbers, read_columns, require_growing
 from fecontact.laws.normal.rough_surface import RoughSurface, bed_of_asperities
 from fecontact.laws.signatures import normal_law
 
@@ -107,17 +108,17 @@ class MeasuredSurface(RoughSurface):
                              "of the surface [m]; give it, or the file of a profile.")
         for name, value in vars(self._bed).items():
             object.__setattr__(self, name, value)
-        h = _numbers(self.bearing, "bearing")
+        h = numbers("MeasuredSurface", "bearing", self.bearing)
         if len(h) < 3 or h[0] != 0.0 or h[-1] != 1.0 or (np.diff(h) < 0.0).any():
-            raise InputError(f"MeasuredSurface: bearing = {_shown(h)} must be at least three "
+            raise InputError(f"MeasuredSurface: bearing = {shown(list(h))} must be at least three "
                              f"numbers that start with 0, never fall and end with 1.")
-        s = _numbers(self.depths, "depths")
+        s = numbers("MeasuredSurface", "depths", self.depths)
         if len(s) and (len(s) != len(h) or s[0] != 0.0 or s[-1] != 1.0
                        or (np.diff(s) <= 0.0).any()):
-            raise InputError(f"MeasuredSurface: depths = {_shown(s)} must be as many numbers as "
-                             f"bearing has, growing from 0 to 1.")
-        object.__setattr__(self, "bearing", tuple(h.tolist()))
-        object.__setattr__(self, "depths", tuple(s.tolist()))
+            raise InputError(f"MeasuredSurface: depths = {shown(list(s))} must be as many "
+                             f"numbers as bearing has, growing from 0 to 1.")
+        object.__setattr__(self, "bearing", h)
+        object.__setattr__(self, "depths", s)
 
     def _read(self, file: str) -> None:
         defaults = {entry.name: entry.default for entry in fields(self)}
@@ -163,17 +164,14 @@ class MeasuredSurface(RoughSurface):
             For fewer than three heights, heights that are all equal or not finite, or an abscissa
             that is not ascending.
         """
-        z = _numbers(heights, "heights")
-        x = np.arange(len(z), dtype=float) if abscissa is None else _numbers(abscissa, "abscissa")
-        if len(z) < 3:
-            raise InputError(f"MeasuredSurface: heights has {len(z)} values; a profile needs at "
-                             f"least three.")
-        if len(x) != len(z):
-            raise InputError(f"MeasuredSurface: abscissa has {len(x)} values for {len(z)} heights.")
-        if (np.diff(x) <= 0.0).any():
-            place = int(np.argmax(np.diff(x) <= 0.0)) + 1
-            raise InputError(f"MeasuredSurface: abscissa[{place}] = {x[place]:g} must be "
-                             f"larger than the value before it, {x[place - 1]:g}.")
+        owner = "MeasuredSurface"
+        z = np.array(numbers(owner, "heights", heights, least=3))
+        x = np.arange(len(z), dtype=float)
+        if abscissa is not None:
+            x = np.array(numbers(owner, "abscissa", abscissa))
+            if len(x) != len(z):
+                raise InputError(f"{owner}: abscissa has {len(x)} values for {len(z)} heights.")
+            require_growing(owner, "abscissa", x)
         if np.ptp(z) == 0.0:
             raise InputError(f"MeasuredSurface: all heights are {z[0]:g}; a rough surface has at "
                              f"least two different ones.")
@@ -216,12 +214,9 @@ class MeasuredSurface(RoughSurface):
         columns = read_columns("MeasuredSurface", file, ("abscissa", "height"),
                                first_optional=True)
         heights = scale * columns[-1]
-        try:
+        with located(f"MeasuredSurface: file = '{file}':", "MeasuredSurface"):
             return cls.from_heights(heights, None if len(columns) == 1 else columns[0],
                                     stiffness=stiffness, **options)
-        except InputError as error:
-            raise InputError(f"MeasuredSurface: file = '{file}': "
-                             f"{str(error).removeprefix('MeasuredSurface: ')}") from None
 
     def table(self, share: Array) -> Array:
         """Parameters (n, 3 + 3 k): c, R_Z, beta c, and f, h, h' at k depths."""
@@ -253,20 +248,3 @@ class MeasuredSurface(RoughSurface):
 class _Bed(RoughSurface):
     def _title(self, name: str) -> str:
         return f"{MeasuredSurface.__name__}: {name}"
-
-
-def _numbers(given: Any, name: str) -> Array:
-    try:
-        values = np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        values = np.empty((0, 0))
-    if values.ndim != 1:
-        raise InputError(f"MeasuredSurface: {name} must be a list of numbers.")
-    if not np.isfinite(values).all():
-        place = int(np.argmin(np.isfinite(values)))
-        raise InputError(f"MeasuredSurface: {name}[{place}] = {values[place]} must be finite.")
-    return values
-
-
-def _shown(values: Array) -> str:
-    return str(values.tolist()) if len(values) <= 8 else f"[{values[0]}, ..., {values[-1]}]"

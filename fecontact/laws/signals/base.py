@@ -7,7 +7,6 @@ import numpy as np
 
 from fecontact.core.checks import as_floats
 from fecontact.core.compiled import CompiledLaw, kernel
-from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array, ArrayLike
 from fecontact.laws.signatures import signal_at
@@ -72,10 +71,3 @@ def between(times: ArrayLike, t0: float, t1: float) -> tuple[float, ...]:
     """Distinct times between t0 and t1, ascending."""
     found = np.unique(np.asarray(times, dtype=float))
     return tuple(found[(found > t0) & (found < t1)].tolist())
-
-
-def require_one_of(owner: str, name: str, value: object, names: tuple[str, ...]) -> None:
-    """Raise :class:`InputError` unless a value is one of the names."""
-    if value not in names:
-        raise InputError(f"{owner}: {name} = {value!r} must be one of {choices(names)}"
-                         f"{nearest(str(value), names)}.")

@@ -6,12 +6,18 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
-from fecontact.core.errors import InputError, require_finite, require_not_negative, require_positive
+from fecontact.core.errors import (
+    InputError,
+    require_choice,
+    require_finite,
+    require_not_negative,
+    require_positive,
+)
 from fecontact.core.types import Array, ArrayLike
 from fecontact.core.units import Unit
 from fecontact.laws.data_columns import numbers
 from fecontact.laws.elementary import sine_and_cosine
-from fecontact.laws.signals.base import Signal, between, require_one_of
+from fecontact.laws.signals.base import Signal, between
 from fecontact.laws.signals.transient import Pulse, Step, Tabulated
 from fecontact.laws.signatures import signal
 
@@ -244,7 +250,7 @@ class SweptSine(Signal):
 
     def __post_init__(self) -> None:
         require_finite("SweptSine", amplitude=self.amplitude)
-        require_one_of("SweptSine", "kind", self.kind, ("linear", "logarithmic"))
+        require_choice("SweptSine", "kind", self.kind, ("linear", "logarithmic"))
         require = require_not_negative if self.kind == "linear" else require_positive
         require("SweptSine", start_frequency_hz=self.start_frequency_hz,
                 end_frequency_hz=self.end_frequency_hz)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
-from fecontact.core.errors import InputError, require_finite, require_positive
+from fecontact.core.errors import InputError, require_choice, require_finite, require_positive
 from fecontact.core.simd.functions import select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
@@ -19,7 +19,7 @@ from fecontact.laws.piecewise_polynomial import (
     piecewise_parameters,
     steep_pieces,
 )
-from fecontact.laws.signals.base import Signal, between, require_one_of
+from fecontact.laws.signals.base import Signal, between
 from fecontact.laws.signatures import signal
 
 _PULSES = ("half-sine", "rectangle", "triangle", "haversine")
@@ -126,7 +126,7 @@ class Pulse(Signal):
     rise: Annotated[float | None, Unit("s")] = None
 
     def __post_init__(self) -> None:
-        require_one_of("Pulse", "kind", self.kind, _PULSES)
+        require_choice("Pulse", "kind", self.kind, _PULSES)
         require_finite("Pulse", amplitude=self.amplitude, start=self.start)
         require_positive("Pulse", duration=self.duration)
         if self.rise is None:
@@ -208,8 +208,8 @@ class Tabulated(Signal):
 
     def __post_init__(self) -> None:
         owner = "Tabulated"
-        require_one_of(owner, "interpolation", self.interpolation, ("linear", "cubic"))
-        require_one_of(owner, "outside", self.outside, ("hold", "repeat"))
+        require_choice(owner, "interpolation", self.interpolation, ("linear", "cubic"))
+        require_choice(owner, "outside", self.outside, ("hold", "repeat"))
         require_finite(owner, scale=self.scale)
         times, values = read_or_given(owner, self.file, times=self.times, values=self.values,
                                       least=3 if self.interpolation == "cubic" else 2)

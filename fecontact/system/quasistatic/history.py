@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError, require_choice
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, quantity
@@ -279,9 +279,8 @@ class LoadHistory(Summarised):
         found = {name: (place[part], force[part]) for name, place, force in self._actions()}
         if action is None:
             action = max(found, key=lambda name: _turnover(*found[name]))
-        elif action not in found:
-            raise InputError(f"loop: action = {action!r} must be one of {choices(found)}"
-                             f"{nearest(str(action), found)}.")
+        else:
+            require_choice("loop", "action", action, found)
         loss = self.loss[part]
         return Loop(action, *found[action], float(loss[-1] - loss[0]))
 

@@ -2,12 +2,11 @@
 
 import warnings
 from collections.abc import Sequence
-from numbers import Real
 
 import numpy as np
 
-from fecontact.core.checks import require_kind
-from fecontact.core.errors import AnalysisError, InputError, ModelWarning
+from fecontact.core.checks import require_kind, require_rtol
+from fecontact.core.errors import AnalysisError, ModelWarning
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.core.units import count
@@ -82,8 +81,7 @@ def load_history(
     """
     require_kind("load_history", ContactSystem, system=system)
     require_kind("load_history", LoadPath, path=path)
-    if not (isinstance(rtol, Real) and 1e-13 <= rtol <= 1e-2):
-        raise InputError(f"load_history: rtol = {rtol!r} must be a number from 1e-13 to 0.01.")
+    require_rtol(rtol, "load_history: rtol")
     system.require_compliance("load_history")
     require_sliders(system)
     system, path = with_named_forces(system, path)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.checks import require_kind
+from fecontact.core.checks import as_count
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
@@ -89,9 +89,7 @@ def buckling_loads(
     """
     import scipy.sparse as sp
 
-    require_kind("buckling_loads", int, count=count)
-    if count < 1:
-        raise InputError(f"buckling_loads: count = {count!r} must be at least 1.")
+    count = as_count(count, "buckling_loads: count")
     state = static_solution(body, load, points=points, time=time, temperature=temperature)
     system = FreeSystem.of(body, "direct")
     if system.rigid.shape[1]:
