@@ -8,7 +8,7 @@ import pytest
 from fecontact.core.compiled import kernel
 from fecontact.core.records import Block, Matrix
 from fecontact.core.simd import functions
-from fecontact.core.simd.vectors import bits, chosen, mask_of, read, write
+from fecontact.core.simd.vectors import bits, mask_of, read, select, write
 
 
 @kernel
@@ -53,7 +53,7 @@ def sines(x: Matrix, sine: Matrix, cosine: Matrix) -> None:
 def both(x: Matrix, given: int) -> int:
     """Lanes above zero that are among the given ones; x becomes -1 in all others."""
     where = (read(x[0]) > 0.0) & mask_of(given)
-    write(x[0], chosen(where, read(x[0]), -1.0))
+    write(x[0], select(where, read(x[0]), -1.0))
     return bits(where)
 
 

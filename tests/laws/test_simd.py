@@ -10,8 +10,7 @@ import pytest
 
 from fecontact.core.compiled import kernel
 from fecontact.core.records import Matrix, Vector
-from fecontact.core.simd.functions import select
-from fecontact.core.simd.vectors import read, write
+from fecontact.core.simd.vectors import read, select, write
 from fecontact.laws import (
     BilateralPiecewise,
     BilateralPlay,

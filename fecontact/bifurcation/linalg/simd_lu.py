@@ -7,7 +7,7 @@ for 48. What is left in place of a matrix is the same; arrays have a last axis o
 """
 
 from fecontact.core.compiled import helper
-from fecontact.core.simd.vectors import WIDTH, magnitude, read, spread, where_larger, write
+from fecontact.core.simd.vectors import WIDTH, magnitude, read, select, spread, write
 
 
 @helper
@@ -17,8 +17,9 @@ def _with_pivot(a, k, order, workspace):
     largest, place = magnitude(read(a[k, k])), spread(float(k))
     for i in range(k + 1, rows):
         size = magnitude(read(a[i, k]))
-        place = where_larger(size, largest, spread(float(i)), place)
-        largest = where_larger(size, largest, size, largest)
+        above = size > largest
+        place = select(above, float(i), place)
+        largest = select(above, size, largest)
     write(workspace, place)
     row, same = int(workspace[0]), True
     for lane in range(1, WIDTH):

@@ -27,8 +27,8 @@ from fecontact.core.compiled import helper
 from fecontact.core.simd.vectors import (
     _VECTOR,
     WIDTH,
+    _code,
     _spread,
-    chosen,
     exponent,
     fused,
     lanes,
@@ -36,6 +36,7 @@ from fecontact.core.simd.vectors import (
     mask,
     root,
     scaled,
+    select,
     signed,
     spread,
     whole,
@@ -58,7 +59,7 @@ _C1, _C2, _C3, _C4, _C5, _C6, _C7, _C8 = _C[1:]
 @helper
 def exponential(x):
     """e^x; beyond +-708 as there."""
-    x = chosen(x > _LARGEST, _LARGEST, chosen(x < -_LARGEST, -_LARGEST, x))
+    x = select(x > _LARGEST, _LARGEST, select(x < -_LARGEST, -_LARGEST, x))
     power = whole(x * _PER_OCTAVE + 0.5)
     r = fused(power, spread(-_OCTAVE[1]), fused(power, spread(-_OCTAVE[0]), x))
     r2 = r * r
@@ -76,8 +77,8 @@ def logarithm(x):
     power = exponent(x)
     part = scaled(x, -power)
     above = part > 1.4142135623730951
-    part = chosen(above, part * 0.5, part)
-    power = chosen(above, power + 1.0, power)
+    part = select(above, part * 0.5, part)
+    power = select(above, power + 1.0, power)
     # log(part) = 2 artanh(z), |z| < 0.172.
     z = (part - 1.0) / (part + 1.0)
     y = z * z
@@ -112,9 +113,9 @@ def sine_and_cosine(x):
     odd = half - whole(half) > 0.25
     part = quarters * 0.25
     turn = part - whole(part)
-    first, second = chosen(odd, cosine, sine), chosen(odd, sine, cosine)
-    return (chosen(turn > 0.375, -first, first),
-            chosen((turn > 0.125) & (turn < 0.625), -second, second))
+    first, second = select(odd, cosine, sine), select(odd, sine, cosine)
+    return (select(turn > 0.375, -first, first),
+            select((turn > 0.125) & (turn < 0.625), -second, second))
 
 
 @helper
@@ -122,8 +123,8 @@ def arctangent(x):
     """Arctangent [rad]."""
     size = magnitude(x)
     far, middle = size > 2.414213562373095, size > 0.66
-    above = chosen(far, -1.0, chosen(middle, size - 1.0, size))
-    below = chosen(far, size, chosen(middle, size + 1.0, spread(1.0)))
+    above = select(far, -1.0, select(middle, size - 1.0, size))
+    below = select(far, size, select(middle, size + 1.0, spread(1.0)))
     r = above / below
     z = r * r
     p = spread(-8.750608600031904122785e-1)
@@ -136,8 +137,8 @@ def arctangent(x):
     q = q * z + 4.328810604912902668951e2
     q = q * z + 4.853903996359136964868e2
     q = q * z + 1.945506571482613964425e2
-    base = chosen(far, _QUARTER[0], chosen(middle, 0.5 * _QUARTER[0], spread(0.0)))
-    rest = chosen(far, _QUARTER[1], chosen(middle, 0.5 * _QUARTER[1], spread(0.0)))
+    base = select(far, _QUARTER[0], select(middle, 0.5 * _QUARTER[0], spread(0.0)))
+    rest = select(far, _QUARTER[1], select(middle, 0.5 * _QUARTER[1], spread(0.0)))
     return signed(base + (r + (r * z * (p / q) + rest)), x)
 
 
@@ -154,19 +155,13 @@ def hyperbolic_tangent(x):
     q = q * z + 4.84406305325125486048e3
     near = x + x * z * (p / q)
     far = 1.0 - 2.0 / (exponential(2.0 * size) + 1.0)
-    return chosen(size < 0.625, near, signed(far, x))
+    return select(size < 0.625, near, signed(far, x))
 
 
 @helper
 def reciprocal_fifth_root(x):
     """x^(-1/5) of normal x above zero."""
     return exponential(-0.2 * logarithm(x))
-
-
-@helper
-def reciprocal_root(x):
-    """1 / sqrt(x)."""
-    return 1.0 / root(x)
 
 
 # A float where eight numbers are wanted, in a result or at the end of a branch.
@@ -177,25 +172,6 @@ _JIT = {"error_model": "numpy", "forceinline": True}
 @lower_cast(types.float64, lanes)
 def _float_to_lanes(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
     return _spread(builder, value)
-
-
-@intrinsic
-def _select(typingctx: Any, where: Any, then: Any, otherwise: Any) -> Any:
-    kind = lanes if lanes in (then, otherwise) or where == mask else types.float64
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        values = [_spread(builder, value) if kind == lanes != given else value
-                  for given, value in zip(signature.args[1:], args[1:], strict=True)]
-        return builder.select(args[0], *values)
-
-    numbers = [number if number == lanes else types.float64 for number in (then, otherwise)]
-    return kind(where, *numbers), codegen
-
-
-@helper
-def select(where, then, otherwise):
-    """``then`` where a condition holds, else ``otherwise``; both are computed."""
-    return _select(where, then, otherwise)
 
 
 def _folded(all_lanes: bool) -> Any:
@@ -245,21 +221,21 @@ def by_kind(one: Callable[..., Any], eight: Callable[..., Any]) -> Callable[...,
 
 @helper
 def _smaller(a, b):
-    return chosen(b < a, b, a)
+    return select(b < a, b, a)
 
 
 @helper
 def _larger(a, b):
-    return chosen(b > a, b, a)
+    return select(b > a, b, a)
 
 
 @helper
 def _logarithm(x):
     """The natural logarithm; of zero -inf, below NaN."""
     small = x < 1e-290
-    found = logarithm(chosen(small, x * 2.0**100, x)) - chosen(small, 100.0 * math.log(2.0), 0.0)
-    found = chosen(x > 0.0, found, chosen(x == 0.0, -np.inf, np.nan))
-    return chosen(x < np.inf, found, x)
+    found = logarithm(select(small, x * 2.0**100, x)) - select(small, 100.0 * math.log(2.0), 0.0)
+    found = select(x > 0.0, found, select(x == 0.0, -np.inf, np.nan))
+    return select(x < np.inf, found, x)
 
 
 @helper
@@ -267,15 +243,15 @@ def _power(x, exponent):
     """x^exponent; of x below zero for whole exponents, else NaN."""
     size = magnitude(x)
     usual = (size > 1e-290) & (size < np.inf)
-    log = exponent * logarithm(chosen(usual, size, 1.0))
-    power = chosen(log > 709.78, np.inf, chosen(log < -708.0, 0.0, exponential(log)))
+    log = exponent * logarithm(select(usual, size, 1.0))
+    power = select(log > 709.78, np.inf, select(log < -708.0, 0.0, exponential(log)))
     grows = ((exponent > 0.0) & (size > 1.0)) | ((exponent < 0.0) & (size < 1.0))
-    extreme = chosen(exponent == 0.0, 1.0, chosen(grows, np.inf, spread(0.0)))
-    power = chosen(size == size, chosen(usual, power, extreme), x)
+    extreme = select(exponent == 0.0, 1.0, select(grows, np.inf, spread(0.0)))
+    power = select(size == size, select(usual, power, extreme), x)
     half = exponent * 0.5
-    signed_power = chosen(whole(half) == half, power, -power)
-    of_negative = chosen(whole(exponent) == exponent, signed_power, np.nan)
-    return chosen(x < 0.0, of_negative, power)
+    signed_power = select(whole(half) == half, power, -power)
+    of_negative = select(whole(exponent) == exponent, signed_power, np.nan)
+    return select(x < 0.0, of_negative, power)
 
 
 @helper
@@ -369,18 +345,11 @@ def _typed_row(table, i):
 @intrinsic
 def lane_of(typingctx: Any, numbers: Any, lane: Any) -> Any:
     """One of eight numbers."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.extract_element(*args)
-
-    return types.float64(lanes, types.int64), codegen
+    return types.float64(lanes, types.int64), _code(ir.IRBuilder.extract_element)
 
 
 @intrinsic
 def with_lane(typingctx: Any, numbers: Any, lane: Any, number: Any) -> Any:
     """Eight numbers, one of which is replaced."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.insert_element(args[0], args[2], args[1])
-
-    return lanes(lanes, types.int64, types.float64), codegen
+    return lanes(lanes, types.int64, types.float64), _code(
+        lambda builder, numbers, lane, number: builder.insert_element(numbers, number, lane))

@@ -15,6 +15,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, overload, register_model
 
+from fecontact.core.compiled import helper
+
 WIDTH = 8
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _TRUTHS = ir.VectorType(ir.IntType(1), WIDTH)
@@ -55,6 +57,11 @@ def _spread(builder: Any, number: Any, kind: Any = _VECTOR) -> Any:
     empty, index = ir.Constant(kind, ir.Undefined), ir.IntType(32)
     first = builder.insert_element(empty, number, ir.Constant(index, 0))
     return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(index, WIDTH), None))
+
+
+def _code(build: Callable[..., Any]) -> Callable[..., Any]:
+    """What makes the code of an intrinsic by a builder from its arguments alone."""
+    return lambda context, builder, signature, args: build(builder, *args)
 
 
 @intrinsic
@@ -100,68 +107,47 @@ def gather(typingctx: Any, values: Any, places: Any, further: Any) -> Any:
 @intrinsic
 def spread(typingctx: Any, number: Any) -> Any:
     """Vector with a number in each of its eight SIMD lanes."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return _spread(builder, args[0])
-
-    return lanes(types.float64), codegen
+    return lanes(types.float64), _code(_spread)
 
 
-def _library(name: str, builder: Any, args: Any) -> Any:
-    function = cgutils.get_or_insert_function(
-        builder.module, ir.FunctionType(_VECTOR, [_VECTOR] * len(args)),
-        f"llvm.{name}.v{WIDTH}f64")
-    return builder.call(function, args)
+def _library(name: str) -> Callable[..., Any]:
+    def build(builder: Any, *args: Any) -> Any:
+        function = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(_VECTOR, [_VECTOR] * len(args)),
+            f"llvm.{name}.v{WIDTH}f64")
+        return builder.call(function, args)
+
+    return _code(build)
 
 
 @intrinsic
 def magnitude(typingctx: Any, numbers: Any) -> Any:
     """Absolute values."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return _library("fabs", builder, args)
-
-    return lanes(lanes), codegen
+    return lanes(lanes), _library("fabs")
 
 
 @intrinsic
 def root(typingctx: Any, numbers: Any) -> Any:
     """Square roots."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return _library("sqrt", builder, args)
-
-    return lanes(lanes), codegen
+    return lanes(lanes), _library("sqrt")
 
 
 @intrinsic
 def whole(typingctx: Any, numbers: Any) -> Any:
     """Largest whole numbers not above."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return _library("floor", builder, args)
-
-    return lanes(lanes), codegen
+    return lanes(lanes), _library("floor")
 
 
 @intrinsic
 def signed(typingctx: Any, sizes: Any, signs: Any) -> Any:
     """Numbers of these sizes with the signs of others."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return _library("copysign", builder, args)
-
-    return lanes(lanes, lanes), codegen
+    return lanes(lanes, lanes), _library("copysign")
 
 
 @intrinsic
 def fused(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
     """The sum a b + c, rounded once."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return _library("fma", builder, args)
-
-    return lanes(lanes, lanes, lanes), codegen
+    return lanes(lanes, lanes, lanes), _library("fma")
 
 
 @intrinsic
@@ -197,92 +183,67 @@ def _constant(value: Any, kind: Any = _VECTOR) -> Any:
 
 
 @intrinsic
-def where_larger(typingctx: Any, a: Any, b: Any, then: Any, otherwise: Any) -> Any:
-    """``then`` where a > b, else ``otherwise``."""
+def _select(typingctx: Any, where: Any, then: Any, otherwise: Any) -> Any:
+    kind = lanes if lanes in (then, otherwise) or where == mask else types.float64
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.select(builder.fcmp_ordered(">", args[0], args[1]), args[2], args[3])
+        values = [_spread(builder, value) if kind == lanes != given else value
+                  for given, value in zip(signature.args[1:], args[1:], strict=True)]
+        return builder.select(args[0], *values)
 
-    return lanes(lanes, lanes, lanes, lanes), codegen
-
-
-@intrinsic
-def _chosen(typingctx: Any, where: Any, then: Any, otherwise: Any) -> Any:
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        then, otherwise = (
-            value if kind == lanes else _spread(builder, value)
-            for kind, value in zip(signature.args[1:], args[1:], strict=True))
-        return builder.select(args[0], then, otherwise)
-
-    return lanes(mask, then, otherwise), codegen
+    numbers = [number if number == lanes else types.float64 for number in (then, otherwise)]
+    return kind(where, *numbers), codegen
 
 
-def chosen(where: Any, then: Any, otherwise: Any) -> Any:
-    """``then`` where the mask is true, else ``otherwise``; either may be a number."""
-    raise NotImplementedError
-
-
-@overload(chosen)
-def _typed_chosen(where, then, otherwise):
-    return lambda where, then, otherwise: _chosen(where, then, otherwise)
+@helper
+def select(where, then, otherwise):
+    """``then`` where a condition holds, else ``otherwise``; both are computed."""
+    return _select(where, then, otherwise)
 
 
 @intrinsic
 def bits(typingctx: Any, where: Any) -> Any:
     """A mask as an integer with one bit per lane; zero where none is true."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.zext(builder.bitcast(args[0], _BYTE), ir.IntType(64))
-
-    return types.int64(mask), codegen
+    return types.int64(mask), _code(
+        lambda builder, where: builder.zext(builder.bitcast(where, _BYTE), ir.IntType(64)))
 
 
 @intrinsic
 def mask_of(typingctx: Any, given: Any) -> Any:
     """The mask of an integer with one bit per lane."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.bitcast(builder.trunc(args[0], _BYTE), _TRUTHS)
-
-    return mask(types.int64), codegen
+    return mask(types.int64), _code(
+        lambda builder, given: builder.bitcast(builder.trunc(given, _BYTE), _TRUTHS))
 
 
-def _provide(operation: Any, result: Any, build: Callable[[Any, Any, Any], Any]) -> None:
-    """Let lanes take an operator with two operands, one of which may be a number."""
+def _provide(operation: Any, result: Any, build: Callable[[Any, Any, Any], Any],
+             operand: Any = lanes) -> None:
+    """Let lanes, or masks, take an operator of two; beside lanes one may be a number."""
+    operands = (lanes, types.float64) if operand == lanes else (mask,)
 
     @intrinsic
     def combined(typingctx: Any, a: Any, b: Any) -> Any:
         def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            given = [value if kind == lanes else _spread(builder, value)
-                     for kind, value in zip(signature.args, args, strict=True)]
-            return build(builder, *given)
+            return build(builder, *(
+                _spread(builder, value) if kind == types.float64 else value
+                for kind, value in zip(signature.args, args, strict=True)))
 
         return result(a, b), codegen
 
     # numba compares the annotations of this one with those of what it returns.
     def typed(a, b):
-        kinds = (a, b)
-        if lanes in kinds and all(kind in (lanes, types.float64) for kind in kinds):
+        if operand in (a, b) and a in operands and b in operands:
             return lambda a, b: combined(a, b)
         return None
 
     overload(operation)(typed)
 
 
-def _provide_for_masks(operation: Any, build: Callable[[Any, Any, Any], Any]) -> None:
+def _provide_for_one(operation: Any, operand: Any, build: Callable[[Any, Any], Any]) -> None:
     @intrinsic
-    def combined(typingctx: Any, a: Any, b: Any) -> Any:
-        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            return build(builder, *args)
+    def changed(typingctx: Any, a: Any) -> Any:
+        return operand(operand), _code(build)
 
-        return mask(mask, mask), codegen
-
-    def typed(a, b):
-        if isinstance(a, _Mask) and isinstance(b, _Mask):
-            return lambda a, b: combined(a, b)
-        return None
-
-    overload(operation)(typed)
+    overload(operation)(lambda a: (lambda a: changed(a)) if a == operand else None)
 
 
 def _compared(sign: str) -> Callable[[Any, Any, Any], Any]:
@@ -297,30 +258,6 @@ for _operation, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt,
                           (operator.ge, ">="), (operator.eq, "==")):
     _provide(_operation, mask, _compared(_sign))
 for _operation, _build in ((operator.and_, ir.IRBuilder.and_), (operator.or_, ir.IRBuilder.or_)):
-    _provide_for_masks(_operation, _build)
-
-
-@intrinsic
-def _negative(typingctx: Any, numbers: Any) -> Any:
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.fneg(args[0])
-
-    return lanes(lanes), codegen
-
-
-@intrinsic
-def _opposite(typingctx: Any, where: Any) -> Any:
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.not_(args[0])
-
-    return mask(mask), codegen
-
-
-@overload(operator.neg)
-def _typed_negative(a):
-    return (lambda a: _negative(a)) if isinstance(a, _Lanes) else None
-
-
-@overload(operator.invert)
-def _typed_opposite(a):
-    return (lambda a: _opposite(a)) if isinstance(a, _Mask) else None
+    _provide(_operation, mask, _build, operand=mask)
+_provide_for_one(operator.neg, lanes, ir.IRBuilder.fneg)
+_provide_for_one(operator.invert, mask, ir.IRBuilder.not_)

@@ -9,11 +9,11 @@ import numpy as np
 
 from fecontact.core.compiled import helper, routine
 from fecontact.core.simd.vectors import (
-    chosen,
     magnitude,
     mask_of,
     read,
     root,
+    select,
     signed,
     spread,
     write,
@@ -51,7 +51,7 @@ def state_error(control, progress, w):
     error, finite = modal_error(w.stages[STAGES - 1], control, progress, w), ~mask_of(0)
     for k in range(2 * m):
         finite = finite & (magnitude(read(w.after[k])) < np.inf)
-    return chosen(finite & (error < np.inf), error, np.inf)
+    return select(finite & (error < np.inf), error, np.inf)
 
 
 @helper
@@ -80,7 +80,7 @@ def slip_error(error, speed, s, control, w):
         distance = magnitude(read(w.speeds[j]) - read(s.sliding[j, 0, 0]) * speed)
         part = magnitude(slip) / (_SLIP_PART * (read(control.slip_scale[j]) + distance))
         touching = magnitude(read(w.forces[j, FORCE])) > 0.0
-        error = chosen(touching & (part > error), part, error)
+        error = select(touching & (part > error), part, error)
     return error
 
 
@@ -89,8 +89,8 @@ def _crossing(u, v, a, within):
     """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier."""
     q = -(v + signed(root(v * v - 2.0 * a * u), v))
     one, other = q / a, 2.0 * u / q
-    within = chosen((one > 0.0) & (one < within), one, within)
-    return chosen((other > 0.0) & (other < within), other, within)
+    within = select((one > 0.0) & (one < within), one, within)
+    return select((other > 0.0) & (other < within), other, within)
 
 
 @routine
@@ -111,12 +111,12 @@ def next_kink(s, control, progress, within):
         pressed = force > 0.0
         fall = (read(progress.forces[j, BY_PLACE]) * v + read(progress.forces[j, BY_RATE]) * a)
         lift = -force / fall
-        first = chosen(pressed & (fall < 0.0) & (lift < first), lift, first)
+        first = select(pressed & (fall < 0.0) & (lift < first), lift, first)
         slip = read(progress.speeds[j]) - read(s.sliding[j, 0, 0]) * speed
-        towards = chosen(slip > 0.0, -x, x)
+        towards = select(slip > 0.0, -x, x)
         slow, size = read(control.slow[j]), magnitude(slip)
         stop = (size - slow) / towards
-        first = chosen(pressed & (size > 1.5 * slow) & (towards > 0.0) & (stop < first), stop,
+        first = select(pressed & (size > 1.5 * slow) & (towards > 0.0) & (stop < first), stop,
                        first)
     return first
 

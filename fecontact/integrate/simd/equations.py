@@ -7,10 +7,10 @@ has no memory.
 from fecontact.core.compiled import helper, routine
 from fecontact.core.simd.vectors import (
     bits,
-    chosen,
     magnitude,
     mask_of,
     read,
+    select,
     spread,
     write,
 )
@@ -118,14 +118,14 @@ def set_rate_and_forces(y, speed, s, load, places, speeds, forces, rate):
         write(forces[j, FORCE], F)
         write(forces[j, BY_PLACE], by_place)
         write(forces[j, BY_RATE], by_rate)
-        write(forces[j, BY_SLIP], chosen(closed, by_slip, 0.0))
-        write(forces[j, BY_FORCE], chosen(F >= 0.0, by_force, -by_force))
+        write(forces[j, BY_SLIP], select(closed, by_slip, 0.0))
+        write(forces[j, BY_FORCE], select(F >= 0.0, by_force, -by_force))
         _add_node_force(j, F, R, s, rate)
 
 
 @helper
 def _sign_of(force):
-    return chosen(force > 0.0, 1.0, chosen(force < 0.0, -1.0, 0.0))
+    return select(force > 0.0, 1.0, select(force < 0.0, -1.0, 0.0))
 
 
 @helper
@@ -165,7 +165,7 @@ def set_time_rate(t, later, speed, s, forces, out):
     ``later`` is a little after t, for differences of rates.
     """
     n, m = s.rows.shape[0], s.rows.shape[2]
-    per_time = chosen(later > t, 1.0 / (later - t), 0.0)
+    per_time = select(later > t, 1.0 / (later - t), 0.0)
     for i in range(m):
         write(out[i], spread(0.0))
     for axis in range(len(s.drive)):

@@ -5,7 +5,7 @@ size of the modes as in :mod:`fecontact.integrate.rodas5p.stage_solver`.
 """
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.simd.vectors import chosen, magnitude, mask_of, read, spread, write
+from fecontact.core.simd.vectors import magnitude, mask_of, read, select, spread, write
 from fecontact.integrate.rodas5p.error_control import DEFECT_POINTS, DEFECT_WEIGHTS
 from fecontact.integrate.rodas5p.tableau import DENSE, GAMMA, NODES, STAGES, TIME, A, C
 from fecontact.integrate.simd import equations
@@ -26,12 +26,12 @@ def _set_inverse(work, inverse):
             larger = magnitude(read(work[i, k])) > magnitude(read(work[k, k]))
             for c in range(k, m):
                 above, below = read(work[k, c]), read(work[i, c])
-                write(work[k, c], chosen(larger, below, above))
-                write(work[i, c], chosen(larger, above, below))
+                write(work[k, c], select(larger, below, above))
+                write(work[i, c], select(larger, above, below))
             for c in range(m):
                 above, below = read(inverse[k, c]), read(inverse[i, c])
-                write(inverse[k, c], chosen(larger, below, above))
-                write(inverse[i, c], chosen(larger, above, below))
+                write(inverse[k, c], select(larger, below, above))
+                write(inverse[i, c], select(larger, above, below))
         pivot = 1.0 / read(work[k, k])
         for c in range(k + 1, m):
             write(work[k, c], read(work[k, c]) * pivot)

@@ -12,10 +12,10 @@ from fecontact.core.simd.functions import reciprocal_fifth_root
 from fecontact.core.simd.vectors import (
     WIDTH,
     bits,
-    chosen,
     magnitude,
     mask_of,
     read,
+    select,
     spread,
     write,
 )
@@ -117,7 +117,7 @@ def _fill(b, runs):
 def _take(where, values, out):
     """Fill the lanes of a table with values where the mask is true."""
     for k in range(len(values)):
-        write(out[k], chosen(where, read(values[k]), read(out[k])))
+        write(out[k], select(where, read(values[k]), read(out[k])))
 
 
 @routine
@@ -129,7 +129,7 @@ def _begin(b):
     speed = equations.ground_speed(t, s)
     equations.set_rate_and_forces(progress.state, speed, s, w.load, w.places, w.speeds, w.forces,
                                   w.base)
-    write(progress.ground, chosen(new, speed, read(progress.ground)))
+    write(progress.ground, select(new, speed, read(progress.ground)))
     _take(new, w.base, progress.rate)
     _go_to_end(new, progress, w)
     m, quickest = len(w.load), spread(1e-300)
@@ -137,7 +137,7 @@ def _begin(b):
         quickest = max(magnitude(read(w.base[m + i])) * read(b.control.largest[i]), quickest)
     limits, numbers = b.control.numbers, progress.numbers
     first = min(0.01 * read(limits[LONGEST]), 0.1 * read(limits[LEAST_SPEED]) / quickest)
-    write(numbers[STEP], chosen(new, first, read(numbers[STEP])))
+    write(numbers[STEP], select(new, first, read(numbers[STEP])))
     progress.fresh[0] = 0
 
 
@@ -156,9 +156,9 @@ def _next_target(t, b):
     progress, numbers = b.progress, b.progress.numbers
     h, stop = read(numbers[STEP]), read(numbers[END])
     target = t + h
-    near = chosen(target + 0.01 * h >= stop, stop,
-                  chosen(target + h > stop, t + 0.5 * (stop - t), target))
-    target = chosen(read(numbers[EXACTLY]) > 0.0, min(stop, target), near)
+    near = select(target + 0.01 * h >= stop, stop,
+                  select(target + h > stop, t + 0.5 * (stop - t), target))
+    target = select(read(numbers[EXACTLY]) > 0.0, min(stop, target), near)
     limit = read(numbers[CAUTIOUS])
     careful = limit > 0.0
     caution = spread(0.0)
@@ -166,8 +166,8 @@ def _next_target(t, b):
         reach = max(limit, target - t)
         kink = checks.next_kink(b.system, b.control, progress, reach)
         cut = careful & (kink > 1e-3 * limit) & (kink < 0.9 * reach)
-        target = chosen(cut, min(stop, t + 1.0003 * kink), target)
-        caution = chosen(cut, limit, 0.0)
+        target = select(cut, min(stop, t + 1.0003 * kink), target)
+        caution = select(cut, limit, 0.0)
         write(numbers[CAUTIOUS], spread(0.0))
     return target, caution
 
@@ -250,20 +250,20 @@ def _set_next(h, error, caution, good, missed, part, b):
     last, last_root = read(numbers[LAST_STEP]), read(numbers[LAST_ROOT])
     # Steps that had to shrink will have to shrink on (predictive control, Gustafsson).
     predicted = min(factor * (h / last) * (root / last_root), factor)
-    grown = chosen(last > 0.0, max(_SMALLEST_FACTOR, predicted), factor)
-    grown = chosen(read(numbers[REJECTED_LAST]) > 0.0, min(spread(1.0), grown), grown)
+    grown = select(last > 0.0, max(_SMALLEST_FACTOR, predicted), factor)
+    grown = select(read(numbers[REJECTED_LAST]) > 0.0, min(spread(1.0), grown), grown)
     longer = min(read(b.control.numbers[LONGEST]), h * grown)
     failed = ~(good | missed)
-    write(numbers[STEP], chosen(good, longer, h * chosen(missed, part, factor)))
-    write(numbers[LAST_STEP], chosen(good, h, last))
-    write(numbers[LAST_ROOT], chosen(good, min(spread(_LARGEST_ROOT), root),
+    write(numbers[STEP], select(good, longer, h * select(missed, part, factor)))
+    write(numbers[LAST_STEP], select(good, h, last))
+    write(numbers[LAST_ROOT], select(good, min(spread(_LARGEST_ROOT), root),
                                      last_root))
     write(numbers[REJECTED_LAST],
-          chosen(failed, 1.0, chosen(good, 0.0, read(numbers[REJECTED_LAST]))))
-    after_failure = chosen(failed & ~(caution > 0.0), h, 0.0)
-    write(numbers[CAUTIOUS], chosen(good, caution, after_failure))
-    write(numbers[EXACTLY], chosen(missed, spread(1.0), 0.0))
-    write(numbers[AGAIN], chosen(good, 0.0, chosen(missed, read(numbers[AGAIN]) + 1.0,
+          select(failed, 1.0, select(good, 0.0, read(numbers[REJECTED_LAST]))))
+    after_failure = select(failed & ~(caution > 0.0), h, 0.0)
+    write(numbers[CAUTIOUS], select(good, caution, after_failure))
+    write(numbers[EXACTLY], select(missed, spread(1.0), 0.0))
+    write(numbers[AGAIN], select(good, 0.0, select(missed, read(numbers[AGAIN]) + 1.0,
                                                    read(numbers[AGAIN]))))
 
 
@@ -279,7 +279,7 @@ def _attempt(active, b, runs, problem, progress, workspace):
     speed, switched = stages.step(t, h, target, s, mine, w)
     equations.set_rate_and_forces(w.after, speed, s, w.load, w.places, w.speeds, w.forces, w.base)
     error = checks.state_error(control, mine, w)
-    error = chosen(error <= 1.0, checks.slip_error(error, speed, s, control, w), error)
+    error = select(error <= 1.0, checks.slip_error(error, speed, s, control, w), error)
     passed = (error <= 1.0) & mask_of(active)
     stages.set_dense(w)
     part, missed = spread(1.0), mask_of(0)
@@ -299,7 +299,7 @@ def _attempt(active, b, runs, problem, progress, workspace):
     if bits(switched) != 0:
         stages.set_defect(t, h, s, mine, w)
         found = checks.modal_error(w.stages[0], control, mine, w) / _SWITCH_PART
-        error = chosen(switched, max(found, error), error)
+        error = select(switched, max(found, error), error)
     good = passed & ~missed & (error <= 1.0)
     outputs = bits(good & (read(numbers[NEXT_OUTPUT]) <= target))
     complete = 0
@@ -314,8 +314,8 @@ def _attempt(active, b, runs, problem, progress, workspace):
     _take(good, w.after, mine.state)
     _take(good, w.base, mine.rate)
     _go_to_end(good, mine, w)
-    write(mine.ground, chosen(good, speed, read(mine.ground)))
-    write(numbers[TIME], chosen(good, target, t))
+    write(mine.ground, select(good, speed, read(mine.ground)))
+    write(numbers[TIME], select(good, target, t))
     _set_next(h, error, caution, good, missed, part, b)
     stopped = active & bits(~(good | missed) & ~(read(numbers[STEP]) >= read(numbers[SMALLEST])))
     accepted = bits(good)

@@ -12,7 +12,7 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.errors import InputError
-from fecontact.core.simd.functions import select
+from fecontact.core.simd.vectors import select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw, NotNegative, PerNode, Positive

@@ -3,7 +3,8 @@
 import math
 
 from fecontact.core.compiled import helper
-from fecontact.core.simd.functions import everywhere, select
+from fecontact.core.simd.functions import everywhere
+from fecontact.core.simd.vectors import select
 
 
 @helper

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from fecontact.core.compiled import helper
-from fecontact.core.simd.functions import select
+from fecontact.core.simd.vectors import select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NormalLaw, NotNegative, PerNode, Positive

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from fecontact.core.errors import InputError, require_choice, require_finite, require_positive
-from fecontact.core.simd.functions import select
+from fecontact.core.simd.vectors import select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.data_columns import read_or_given, require_closed, require_resolved
