@@ -344,7 +344,7 @@ def test_smallest_and_largest_traces_have_curves():
     (lambda: MeasuredProfile((0, 1, 2), (0, 1, -1e290), scale=1e50),
      r"scale = 1e\+50 reaches -inf; its va"),
     (lambda: MeasuredProfile((0, 1, 2), (0, 1, 2), periodic="yes"),
-     "periodic = 'yes' must be true or fal"),
+     "periodic = 'yes' must be True or Fal"),
     (lambda: MeasuredProfile(file=3), "file = 3 must be the name of a file"),
     (lambda: RandomRoughness(-1.0, 0.5, 0.1, 0.01, 1.0), "RandomRoughness: rms_height"),
     (lambda: RandomRoughness(1.0, 1.5, 0.1, 0.01, 1.0), r"hurst_exponent = 1\.5 must be from 0"),

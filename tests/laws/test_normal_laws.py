@@ -275,7 +275,7 @@ def test_energy_of_a_body_far_above_the_surface():
     (lambda: MeasuredSurface.from_heights([0.0, 1e-6, 0.0], [0.0, 1.0], stiffness=1e6),
      "2 values for 3 heights"),
     (lambda: MeasuredSurface.from_heights("abc", stiffness=1e6),
-     "heights must be a list of numbers"),
+     "heights = 'abc' must be a list of numbers"),
     (lambda: LinearContact(0.0), r"LinearContact: stiffness = 0\.0 must be above zero"),
     (lambda: LinearContact(1.0, -1.0), "damping = -1.0 must be zero or above"),
     (lambda: PowerContact(1.0, "lin"), "exponent = 'lin' must be .*did you mean 'line'"),

@@ -191,7 +191,7 @@ def test_number_of_nodes_is_not_that_of_the_curve():
     ("1 2 3\n", "numbers abscissa and height, or height alone; it begins with '1 2 3'"),
     ("# nothing\n", "has no line of just the numbers"),
     ("0 1\n1 2\n1 3\n", r"abscissa\[2\] = 1 must be larger than the value before it, 1"),
-    ("1\n1\n1\n", "all heights are 1"), ("1\n2\n", "2 values; a profile needs at least three"),
+    ("1\n1\n1\n", "all heights are 1"), ("1\n2\n", "has 2 values; at least 3 are needed"),
     ("1\nnan\n2\n", "line 2, 'nan', has a value that is no finite number"),
 ])
 def test_files_that_are_no_profile(tmp_path, text, message):

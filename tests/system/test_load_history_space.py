@@ -8,6 +8,7 @@ from systems import TURN
 
 import fecontact as fc
 from fecontact import AnalysisError, InputError, LoadPath, load_history
+from fecontact.core.records import allocate
 from fecontact.laws import (
     ConstantFriction,
     ExponentialFriction,
@@ -23,7 +24,7 @@ from fecontact.laws import (
 from fecontact.system.nodes import GroundMotion
 from fecontact.system.quasistatic.given import travelling
 from fecontact.system.quasistatic.increment import evaluate
-from fecontact.system.quasistatic.pose import pose_for, workspace_for
+from fecontact.system.quasistatic.pose import Pose, Workspace, sizes_of
 from fecontact.system.quasistatic.sliders import sliders_of
 
 C, LIMIT = 2e4, 4.0  # of `jenkins()`
@@ -321,7 +322,8 @@ def test_the_matrix_is_the_derivative_of_the_balance(ground, friction):
     arrays, n, m = travelling(system), 4, 6
     sliders = sliders_of(system, 0.82, None, np.full(n, 1e7))
     e = sliders.limit.shape[1]
-    pose, workspace = pose_for(m, n, e, 2), workspace_for(m, n, e, 2, np.ones(m))
+    sizes = sizes_of(m, n, e, 2)
+    pose, workspace = allocate(Pose, sizes), allocate(Workspace, sizes, scale=np.ones(m))
     rng = np.random.default_rng(4)
     body = np.array([1e-4, -2e-4, -4e-5, 5e-5, -4e-5, 1e-4])
     pose.q[:] = np.linalg.solve(system.basis.T[0], body)

@@ -4,15 +4,16 @@ The Jacobian J = df/dx of each step is the field's own; df/dt is a one-sided dif
 order over a ten thousandth of the step.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise, solve
-from fecontact.core.records import IntegerVector, Matrix, Vector
-from fecontact.core.types import Array
-from fecontact.integrate.field_runs.variational import Varied, propagate, steepest
+from fecontact.core.records import Matrix, Vector
+from fecontact.core.types import Array, Integers
+from fecontact.integrate.bernstein import DEPTH
+from fecontact.integrate.field_runs.variational import STATES, Varied, propagate, steepest
 from fecontact.integrate.rodas5p import tableau
 from fecontact.integrate.rodas5p.event_kernels import (
     FOUND,
@@ -32,6 +33,7 @@ from fecontact.integrate.rodas5p.step_length import (
 )
 from fecontact.integrate.step_loop import (
     BEYOND,
+    COUNTS,
     CUT,
     FAILED,
     NOT_A_NUMBER,
@@ -43,9 +45,12 @@ from fecontact.integrate.step_loop import (
     Method,
     step_loop,
 )
+from fecontact.integrate.step_polynomials import COEFFICIENTS
 from fecontact.system.fields.one_place import FieldKernel, derive_at, evaluate_at
 
 _LOOKS = 16
+# Entries of `Progress.numbers`.
+NUMBERS = 5
 
 
 class Step(NamedTuple):
@@ -62,39 +67,39 @@ class Progress(NamedTuple):
 
     Attributes
     ----------
-    numbers, counts : (5,), (8,) arrays
+    numbers, counts
         Time, length of the next step and so on; numbers of steps and so on.
-    state, rate, sizes : (d,) arrays
+    state, rate, sizes
         The state, its rate, and the largest size of each state so far, or its floor.
-    J : (d, d) array
+    J
         Jacobian at the state.
     """
 
-    numbers: Vector
-    counts: IntegerVector
-    state: Vector
-    rate: Vector
-    sizes: Vector
-    J: Matrix
+    numbers: Annotated[Array, NUMBERS]
+    counts: Annotated[Integers, COUNTS]
+    state: Annotated[Array, STATES]
+    rate: Annotated[Array, STATES]
+    sizes: Annotated[Array, STATES]
+    J: Annotated[Array, STATES, STATES]
 
 
 class Workspace(NamedTuple):
     """Workspace for a step: its end, stages, factors, and what events are sought with."""
 
-    after: Vector
-    rate_after: Vector
-    J_after: Matrix
-    stages: Matrix
-    stage: Vector
-    right: Vector
-    base: Vector
-    time_rate: Vector
-    factors: Matrix
-    pivots: IntegerVector
-    dense: Matrix
-    inner: Matrix
-    bound: Matrix
-    halves: Matrix
+    after: Annotated[Array, STATES]
+    rate_after: Annotated[Array, STATES]
+    J_after: Annotated[Array, STATES, STATES]
+    stages: Annotated[Array, tableau.STAGES, STATES]
+    stage: Annotated[Array, STATES]
+    right: Annotated[Array, STATES]
+    base: Annotated[Array, STATES]
+    time_rate: Annotated[Array, STATES]
+    factors: Annotated[Array, STATES, STATES]
+    pivots: Annotated[Integers, STATES]
+    dense: Annotated[Array, 3, STATES]
+    inner: Annotated[Array, 3, STATES]
+    bound: Annotated[Array, 3, COEFFICIENTS]
+    halves: Annotated[Array, DEPTH, COEFFICIENTS + 1]
 
 
 class Output(NamedTuple):

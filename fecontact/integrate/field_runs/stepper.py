@@ -6,22 +6,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fecontact.core.checks import require_state
+from fecontact.core.records import allocate
 from fecontact.core.types import Array
-from fecontact.integrate.bernstein import DEPTH
 from fecontact.integrate.event_arrays import watch_for
 from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.field_runs.method import Data, Output, Progress, Workspace, advance
 from fecontact.integrate.field_runs.python_functions import PythonFunction
-from fecontact.integrate.field_runs.variational import Varied, varied_for
-from fecontact.integrate.rodas5p import tableau
+from fecontact.integrate.field_runs.variational import STATES, Varied
 from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.integrate.step_loop import (
-    COUNTS,
     RUNNING,
     STEP,
     TIME,
 )
-from fecontact.integrate.step_polynomials import COEFFICIENTS
 from fecontact.integrate.step_runs import StepRun
 from fecontact.system.fields.one_place import FieldKernel, python_field
 from fecontact.system.fields.vector_field import VectorField
@@ -129,17 +126,14 @@ def start_field(
         longest = min(longest, 0.25 * period)
     if max_step is not None:
         longest = min(longest, float(max_step))
-    numbers = np.zeros(5)
-    numbers[TIME], numbers[STEP] = times[0], min(0.01 * whole, longest)
-    vectors, squares = np.zeros((6, d)), np.zeros((2, d, d))
+    sizes = {STATES: d}
+    progress = allocate(Progress, sizes, state=np.array(state, dtype=float))
+    progress.sizes[:] = _FLOOR * np.asarray(field.state_scales(values), dtype=float)
+    progress.numbers[TIME], progress.numbers[STEP] = times[0], min(0.01 * whole, longest)
+    columns = d if vary else 0
+    varied = allocate(Varied, {STATES: columns}, columns=np.eye(columns),
+                      transitions=np.zeros((len(times) if vary else 0, columns, columns)))
     return FieldSteps(
-        field, kernel, function,
-        Progress(numbers, np.zeros(COUNTS, dtype=np.int64), np.array(state, dtype=float),
-                 np.zeros(d), _FLOOR * np.array(field.state_scales(values), dtype=float),
-                 np.zeros((d, d))),
-        Workspace(vectors[0], vectors[1], squares[0], np.zeros((tableau.STAGES, d)), vectors[2],
-                  vectors[3], vectors[4], vectors[5], squares[1], np.zeros(d, dtype=np.int64),
-                  np.zeros((3, d)), np.zeros((3, d)), np.zeros((3, COEFFICIENTS)),
-                  np.zeros((DEPTH, COEFFICIENTS + 1))),
+        field, kernel, function, progress, allocate(Workspace, sizes),
         Output(times, np.zeros((len(times), d)), float(rtol), longest),
-        varied_for(d if vary else 0, len(times)), watch_for(field, events, False))
+        varied, watch_for(field, events, False))

@@ -12,13 +12,14 @@ References
 E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., section IV.5.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise, solve_rows
-from fecontact.core.records import Block, IntegerVector, Matrix, Vector
+from fecontact.core.records import Block, Size
+from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p import tableau
 from fecontact.system.fields.one_place import derive_at
 
@@ -33,42 +34,35 @@ _WEIGHTS = np.array([
 # Change of differences over a part of a step, at most, and the most parts.
 _LARGEST, _MOST_PARTS = 0.5, 64.0
 
+STATES = Size("states")
+
 
 class Varied(NamedTuple):
     """Derivatives that go with a run of d states, or nothing where they are empty.
 
     Attributes
     ----------
-    columns : (d, d) array
+    columns
         Y since the last output time.
     transitions : (N, d, d) array
         Y from each output time to the next; the first is not used.
-    J, slopes : (3, d, d), (3, d, d) arrays
+    J, slopes
         Jacobians at the stages, and J Y.
-    factors, increments : (3 d, 3 d), (3 d, d) arrays
+    factors, increments, pivots
         The system of the stages, and its solution.
-    pivots : (3 d,) array
-    x, f : (d,) arrays
+    x, f
         A state of the step, and its rates.
     """
 
-    columns: Matrix
+    columns: Annotated[Array, STATES, STATES]
     transitions: Block
-    J: Block
-    slopes: Block
-    factors: Matrix
-    increments: Matrix
-    pivots: IntegerVector
-    x: Vector
-    f: Vector
-
-
-def varied_for(states: int, outputs: int) -> Varied:
-    """Derivatives for a run of so many states and output times; none for no states."""
-    d = states
-    return Varied(np.eye(d), np.zeros((outputs if d else 0, d, d)), np.zeros((3, d, d)),
-                  np.zeros((3, d, d)), np.zeros((3 * d, 3 * d)), np.zeros((3 * d, d)),
-                  np.zeros(3 * d, dtype=np.int64), np.zeros(d), np.zeros(d))
+    J: Annotated[Array, 3, STATES, STATES]
+    slopes: Annotated[Array, 3, STATES, STATES]
+    factors: Annotated[Array, 3 * STATES, 3 * STATES]
+    increments: Annotated[Array, 3 * STATES, STATES]
+    pivots: Annotated[Integers, 3 * STATES]
+    x: Annotated[Array, STATES]
+    f: Annotated[Array, STATES]
 
 
 @helper

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.errors import InputError, choices
+from fecontact.core.records import allocate
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.coefficients import Coefficient, node_values
 from fecontact.integrate.event_arrays import watch_for
@@ -219,10 +220,10 @@ def start(
     data = problem, limits, progress, output, kept
     if solid and restitution is not None:
         from fecontact.integrate.nonsmooth import impact_steps
-        from fecontact.integrate.nonsmooth.space_impulses import impact_workspace_for
+        from fecontact.integrate.nonsmooth.space_impulses import ImpactWorkspace
         _require_no_events(events)
         loop = partial(impact_steps.run_impact_steps,
-                       impact_steps.Data(*data, impact_workspace_for(problem)))
+                       impact_steps.Data(*data, allocate(ImpactWorkspace, kinds.sizes_of(problem))))
     elif method == "event-driven":
         from fecontact.integrate.nonsmooth.event_driven import Data, run_for
         from fecontact.integrate.nonsmooth.event_search import workspace_for

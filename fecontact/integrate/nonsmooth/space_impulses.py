@@ -22,15 +22,13 @@ non-smooth contact dynamics method, Computer Methods in Applied Mechanics and En
 """
 
 import math
-from typing import NamedTuple
-
-import numpy as np
+from typing import Annotated, NamedTuple
 
 from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise, solve
-from fecontact.core.records import IntegerMatrix, IntegerVector, Matrix, Vector
-from fecontact.integrate.nonsmooth.problem import NonsmoothProblem
-from fecontact.system.nodes import ground_motion, node_contact, node_motion
+from fecontact.core.types import Array, Integers
+from fecontact.integrate.nonsmooth.problem import WITH_WORK
+from fecontact.system.nodes import MODES, NODES, ground_motion, node_contact, node_motion
 from fecontact.system.powers import POWER_COUNT
 
 _SWEEPS = 20000
@@ -41,79 +39,61 @@ _MARGIN = 1e-12
 
 
 class ImpactWorkspace(NamedTuple):
-    """Workspace for steps of impulses, for n nodes and m modes.
+    """Workspace for steps of impulses.
 
     Entries of the nodes are normal ones (n,), then those along the first and the second tangents.
 
     Attributes
     ----------
-    rows, pushes : (3 n, m) arrays
+    rows, impulse_responses
         Changes of [-u', s] by the modes, and of the velocities by unit impulses.
-    coupling : (3 n, 3 n) array
+    coupling
         Changes of [-u', s] by unit impulses [L, P].
-    given, before, after, impulses, rest : (3 n,) arrays
+    given, before, after, impulses, rest
         [-u', s] without contact, and at both ends of a step; [L, P]; what is left of the
         conditions.
-    slopes, sides : (2 n,), (2 n,) arrays
+    slopes, sides
         Of the ground, and velocities of the other side.
-    weights, grip : (n,) arrays
+    weights, grip
         kappa, and what friction sees of a unit normal force.
-    sticking, slipping : (n,) arrays
+    sticking, slipping
         Coefficients of friction.
-    matrix : (m, m) array
+    matrix
         1 + h C / 2 + h^2 K / 4, factorised.
-    middle, change, rates, largest : (2 m,), (m,), (p + n,), (2 m,) arrays
+    middle, change, rates, largest
         State in the middle, change of the velocities, powers, largest coordinates so far.
-    whole, half, end : (size,) arrays
+    whole, half, end
         Y after a whole step, and after one and two halves.
-    forces : (3, 3 n) array
-        Forces in the whole step, and in the halves.
-    closed : (3, n) array
-        Contacts after a whole step, and after one and two halves.
-    touching, pivots : (n,), (m,) arrays
+    forces, closed
+        Forces and contacts in the whole step, and in the halves.
     """
 
-    rows: Matrix
-    impulse_responses: Matrix
-    coupling: Matrix
-    given: Vector
-    before: Vector
-    after: Vector
-    impulses: Vector
-    rest: Vector
-    slopes: Vector
-    sides: Vector
-    weights: Vector
-    grip: Vector
-    sticking: Vector
-    slipping: Vector
-    matrix: Matrix
-    middle: Vector
-    change: Vector
-    rates: Vector
-    largest: Vector
-    whole: Vector
-    half: Vector
-    end: Vector
-    forces: Matrix
-    closed: IntegerMatrix
-    touching: IntegerVector
-    pivots: IntegerVector
-
-
-def impact_workspace_for(problem: NonsmoothProblem) -> ImpactWorkspace:
-    """Workspace for a problem."""
-    n, _, m = problem.system.rows.shape
-    flags = np.zeros((3, n), dtype=np.int64)
-    given, before, after, impulses, rest = np.zeros((5, 3 * n))
-    slopes, sides = np.zeros((2, 2 * n))
-    weights, grip, sticking, slipping = np.zeros((4, n))
-    whole, half, end = np.zeros((3, 2 * m + POWER_COUNT + n))
-    return ImpactWorkspace(
-        np.zeros((3 * n, m)), np.zeros((3 * n, m)), np.zeros((3 * n, 3 * n)), given, before, after,
-        impulses, rest, slopes, sides, weights, grip, sticking, slipping, np.zeros((m, m)),
-        np.zeros(2 * m), np.zeros(m), np.zeros(POWER_COUNT + n), np.zeros(2 * m), whole, half, end,
-        np.zeros((3, 3 * n)), flags, np.zeros(n, dtype=np.int64), np.zeros(m, dtype=np.int64))
+    rows: Annotated[Array, 3 * NODES, MODES]
+    impulse_responses: Annotated[Array, 3 * NODES, MODES]
+    coupling: Annotated[Array, 3 * NODES, 3 * NODES]
+    given: Annotated[Array, 3 * NODES]
+    before: Annotated[Array, 3 * NODES]
+    after: Annotated[Array, 3 * NODES]
+    impulses: Annotated[Array, 3 * NODES]
+    rest: Annotated[Array, 3 * NODES]
+    slopes: Annotated[Array, 2 * NODES]
+    sides: Annotated[Array, 2 * NODES]
+    weights: Annotated[Array, NODES]
+    grip: Annotated[Array, NODES]
+    sticking: Annotated[Array, NODES]
+    slipping: Annotated[Array, NODES]
+    matrix: Annotated[Array, MODES, MODES]
+    middle: Annotated[Array, 2 * MODES]
+    change: Annotated[Array, MODES]
+    rates: Annotated[Array, NODES + POWER_COUNT]
+    largest: Annotated[Array, 2 * MODES]
+    whole: Annotated[Array, WITH_WORK]
+    half: Annotated[Array, WITH_WORK]
+    end: Annotated[Array, WITH_WORK]
+    forces: Annotated[Array, 3, 3 * NODES]
+    closed: Annotated[Integers, 3, NODES]
+    touching: Annotated[Integers, NODES]
+    pivots: Annotated[Integers, MODES]
 
 
 @helper

@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.core.checks import require_kind, require_rtol
 from fecontact.core.errors import AnalysisError, ModelWarning
+from fecontact.core.records import allocate
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.core.units import count
@@ -16,14 +17,14 @@ from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 from fecontact.system.nodes import SystemArrays
 from fecontact.system.quasistatic.given import given_rows, travelled, travelling, with_named_forces
 from fecontact.system.quasistatic.history import LoadHistory
-from fecontact.system.quasistatic.march import CUT, JUMPS, SOLVED, WORKS, Kept, kept_for, march
+from fecontact.system.quasistatic.march import CUT, JUMPS, ROWS, SOLVED, WORKS, Kept, march
 from fecontact.system.quasistatic.path import LoadPath
 from fecontact.system.quasistatic.pose import (
     PENETRATION,
     Pose,
     Sliders,
-    pose_for,
-    workspace_for,
+    Workspace,
+    sizes_of,
 )
 from fecontact.system.quasistatic.rest_state import RestState
 from fecontact.system.quasistatic.sliders import components, require_sliders, sliders_of
@@ -150,9 +151,11 @@ def _marched(
     """Number of rows reached, and results."""
     n, _, m = arrays.rows.shape
     e, tangents = sliders.limit.shape[1], _tangents(pose, sliders)
-    kept = kept_for(len(given), m, n, e, tangents)
-    reached = march(arrays, sliders, np.ascontiguousarray(given), rtol, pose,
-                    pose_for(m, n, e, tangents), workspace_for(m, n, e, tangents, scale), kept)
+    sizes = sizes_of(m, n, e, tangents) | {ROWS: len(given)}
+    kept = allocate(Kept, sizes)
+    reached = march(
+        arrays, sliders, np.ascontiguousarray(given), rtol, pose, allocate(Pose, sizes),
+        allocate(Workspace, sizes, scale=np.ascontiguousarray(scale, dtype=float)), kept)
     return int(reached), kept
 
 
@@ -172,7 +175,7 @@ def _pose(q: Array, sliders: Sliders, left: Array, force: Array | None = None) -
     """A pose with places of the sliders (n, e), in space (n, e, 2), and forces likewise."""
     n, e = sliders.limit.shape
     tangents = components(left).shape[-1]
-    pose = pose_for(len(q), n, e, tangents)
+    pose = allocate(Pose, sizes_of(len(q), n, e, tangents))
     pose.q[:], pose.left[:] = q, left.reshape(n, e * tangents)
     if force is not None:
         pose.force[:] = force.reshape(n, e * tangents)

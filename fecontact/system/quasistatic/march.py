@@ -9,14 +9,15 @@ itself.
 """
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
-from fecontact.core.records import Block, IntegerVector, Matrix, Vector
+from fecontact.core.records import Matrix, Size, Vector
+from fecontact.core.types import Array, Integers
 from fecontact.system.node_forces import normal_force
-from fecontact.system.nodes import GroundMotion, SystemArrays, ground_moved
+from fecontact.system.nodes import MODES, NODES, GroundMotion, SystemArrays, ground_moved
 from fecontact.system.polynomial_forces import (
     add_polynomial_forces,
     has_polynomial,
@@ -27,6 +28,8 @@ from fecontact.system.quasistatic.pose import (
     AGAINST,
     ALONG_SURFACE,
     FORCE,
+    FORCES,
+    NODE_COLUMNS,
     PENETRATION,
     PER_TANGENT,
     PLACE,
@@ -34,7 +37,6 @@ from fecontact.system.quasistatic.pose import (
     Pose,
     Sliders,
     Workspace,
-    node_columns,
 )
 
 # Works that a path does, and the columns of `march` in which they stand before the losses.
@@ -54,28 +56,22 @@ _PLACES = (0.046910077030668, 0.230765344947158, 0.5, 0.769234655052842, 0.95308
 _WEIGHTS = (0.118463442528095, 0.239314335249683, 0.284444444444444, 0.239314335249683,
             0.118463442528095)
 
+ROWS = Size("rows")
+
 
 class Kept(NamedTuple):
     """Results of a march.
 
-    q (N, m), nodes (N, n, 6), forces and places of the sliders (N, n, e), in space (N, n, 9) and
-    (N, n, 2 e), work (N, 4 + n): that of :data:`WORKS` and the loss of each node so far; and
-    numbers of increments.
+    Poses, and the work: that of :data:`WORKS` and the loss of each node so far; and numbers of
+    increments.
     """
 
-    q: Matrix
-    node: Block
-    force: Block
-    left: Block
-    work: Matrix
-    counts: IntegerVector
-
-
-def kept_for(rows: int, m: int, n: int, sliders: int, tangents: int) -> Kept:
-    """Arrays for the results."""
-    force, left = np.zeros((2, rows, n, sliders * tangents))
-    return Kept(np.zeros((rows, m)), np.zeros((rows, n, node_columns(tangents))), force, left,
-                np.zeros((rows, len(WORKS) + n)), np.zeros(COUNTS, dtype=np.int64))
+    q: Annotated[Array, ROWS, MODES]
+    node: Annotated[Array, ROWS, NODES, NODE_COLUMNS]
+    force: Annotated[Array, ROWS, NODES, FORCES]
+    left: Annotated[Array, ROWS, NODES, FORCES]
+    work: Annotated[Array, ROWS, NODES + len(WORKS)]
+    counts: Annotated[Integers, COUNTS]
 
 
 @helper
@@ -264,14 +260,7 @@ def _copy(source, target):
 @helper
 def _keep(row, pose, total, kept):
     """Write a pose, and works and losses so far, as a row of the results."""
-    for i in range(len(pose.q)):
-        kept.q[row, i] = pose.q[i]
-    for j in range(len(pose.node)):
-        for k in range(pose.node.shape[1]):
-            kept.node[row, j, k] = pose.node[j, k]
-        for k in range(pose.force.shape[1]):
-            kept.force[row, j, k] = pose.force[j, k]
-            kept.left[row, j, k] = pose.left[j, k]
+    _copy(pose, Pose(kept.q[row], kept.node[row], kept.force[row], kept.left[row]))
     for i in range(len(total)):
         kept.work[row, i] = total[i]
 

@@ -1,15 +1,18 @@
 """Sliders of contact nodes and poses of a body in equilibrium, as compiled functions see them."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-import numpy as np
-
-from fecontact.core.records import Block, IntegerVector, Matrix, Vector
-from fecontact.core.types import Array
+from fecontact.core.records import Matrix, Size
+from fecontact.core.types import Array, Integers
+from fecontact.system.nodes import AXES, MODES, NODES
 
 # Columns of `Pose.node`; in space the last three follow for the second tangent.
 FORCE, PRESSING, PENETRATION, PLACE, AGAINST, ALONG_SURFACE = range(6)
 PER_TANGENT = 3
+
+SLIDERS = Size("sliders")
+NODE_COLUMNS = PLACE + PER_TANGENT * (AXES - 1)
+FORCES = (AXES - 1) * SLIDERS
 
 
 class Sliders(NamedTuple):
@@ -26,55 +29,40 @@ class Sliders(NamedTuple):
 class Pose(NamedTuple):
     """A body in equilibrium, or on the way to it.
 
-    ``q`` (m,); ``node`` (n, 6), in space (n, 9), with F, the force that friction sees, u, and per
-    tangent g, the force against it and its part F y_R'; ``force`` and ``left`` (n, e) are R and z
-    of the sliders, in space (n, 2 e), both components of each one after the other.
+    ``node`` has F, the force that friction sees, u, and per tangent g, the force against it and its
+    part F y_R'; ``force`` and ``left`` are R and z of the sliders, in space both components of each
+    one after the other.
     """
 
-    q: Vector
-    node: Matrix
-    force: Matrix
-    left: Matrix
+    q: Annotated[Array, MODES]
+    node: Annotated[Array, NODES, NODE_COLUMNS]
+    force: Annotated[Array, NODES, FORCES]
+    left: Annotated[Array, NODES, FORCES]
 
 
 class Workspace(NamedTuple):
-    """Workspace of Newton's method; ``scale`` (m,) are typical stiffnesses of the modes.
+    """Workspace of Newton's method; ``scale`` are typical stiffnesses of the modes.
 
-    ``acting`` (m,) sums the magnitudes of the forces on each mode; ``flexibility`` (n, d, m) are
-    minus the forces on the nodes along their axes by the modes, ``partial`` (d + 1, 2 d) the
-    derivatives of T, F, T across and the pressing force of a node to its displacements and
-    velocities, and ``total`` (d - 1,) the forces of its sliders.
+    ``acting`` sums the magnitudes of the forces on each mode; ``flexibility`` are minus the forces
+    on the nodes along their axes by the modes, ``partial`` the derivatives of T, F, T across and
+    the pressing force of a node to its displacements and velocities, and ``total`` the forces of
+    its sliders.
     """
 
-    scale: Vector
-    start: Vector
-    acting: Vector
-    residual: Vector
-    step: Vector
-    before: Vector
-    multiplier: Matrix
-    flexibility: Block
-    matrix: Matrix
-    partial: Matrix
-    total: Vector
-    pivots: IntegerVector
+    scale: Annotated[Array, MODES]
+    start: Annotated[Array, MODES]
+    acting: Annotated[Array, MODES]
+    residual: Annotated[Array, MODES]
+    step: Annotated[Array, MODES]
+    before: Annotated[Array, MODES]
+    multiplier: Annotated[Array, NODES, FORCES]
+    flexibility: Annotated[Array, NODES, AXES, MODES]
+    matrix: Annotated[Array, MODES, MODES]
+    partial: Annotated[Array, AXES + 1, 2 * AXES]
+    total: Annotated[Array, AXES - 1]
+    pivots: Annotated[Integers, MODES]
 
 
-def node_columns(tangents: int) -> int:
-    """Number of columns of `Pose.node`."""
-    return PLACE + PER_TANGENT * tangents
-
-
-def pose_for(m: int, n: int, sliders: int, tangents: int) -> Pose:
-    """An empty pose."""
-    force, left = np.zeros((2, n, sliders * tangents))
-    return Pose(np.zeros(m), np.zeros((n, node_columns(tangents))), force, left)
-
-
-def workspace_for(m: int, n: int, sliders: int, tangents: int, scale: Array) -> Workspace:
-    """Workspace for a body of m modes and n contact nodes."""
-    start, acting, residual, step, before = np.zeros((5, m))
-    return Workspace(np.ascontiguousarray(scale, dtype=float), start, acting, residual, step,
-                     before, np.zeros((n, sliders * tangents)), np.zeros((n, 1 + tangents, m)),
-                     np.zeros((m, m)), np.zeros((2 + tangents, 2 * (1 + tangents))),
-                     np.zeros(tangents), np.zeros(m, np.int64))
+def sizes_of(m: int, n: int, sliders: int, tangents: int) -> dict[Size, int]:
+    """Sizes of the records of a body with m modes and n contact nodes."""
+    return {MODES: m, NODES: n, SLIDERS: sliders, AXES: 1 + tangents}
