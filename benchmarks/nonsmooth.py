@@ -30,9 +30,11 @@ from integrator import time_at
 from integrator_problems import Problem, friction_oscillator, shortened
 from numpy.typing import NDArray
 
+from fecontact.integrate import EventDriven, SetValued, TimeStepping
 from fecontact.integrate.nonsmooth import driver as set_valued
 from fecontact.integrate.rodas5p import driver as smoothed
 from fecontact.integrate.step_loop import RUNNING
+from fecontact.integrate.task import Task
 
 Array = NDArray[np.float64]
 Prepared = Callable[[float], Callable[[], Array]]
@@ -47,12 +49,11 @@ QUICK_PART, QUICK_TOLERANCES = 0.25, (4.0, 7.0)
 FINEST, PATIENCE = 1e-11, 60.0
 
 
-def by_method(problem: Problem, method: str) -> Prepared:
+def by_method(problem: Problem, solver: SetValued) -> Prepared:
     """Set-valued runs."""
 
     def prepare(rtol: float) -> Callable[[], Array]:
-        run = set_valued.start(problem.system, problem.state, problem.times, rtol=rtol,
-                               method=method)
+        run = set_valued.start(Task(problem.system, problem.state, problem.times, rtol), solver)
 
         def solve() -> Array:
             while run.advance(10**9) == RUNNING:
@@ -104,8 +105,8 @@ def siconos(problem: Problem, wanted: Array, quick: bool) -> list[Point]:
 
 def measure(problem: Problem, quick: bool) -> list[str]:
     """Print what was measured on a problem; rows of a table of times at equal errors."""
-    solvers = {EVENTS: by_method(problem, "event-driven"),
-               STEPPING: by_method(problem, "time-stepping"),
+    solvers = {EVENTS: by_method(problem, EventDriven()),
+               STEPPING: by_method(problem, TimeStepping()),
                SMOOTHED: by_smoothing(problem)}
     exact = solvers[EVENTS](FINEST)()
     wanted = {EVENTS: exact, STEPPING: exact, SMOOTHED: solvers[SMOOTHED](FINEST)()}

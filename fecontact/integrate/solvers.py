@@ -11,8 +11,7 @@ import numpy as np
 
 from fecontact.core.checks import as_floats, as_path, require_kind
 from fecontact.core.errors import InputError, choices, nearest, require_choice, shown
-from fecontact.integrate.coefficients import Coefficient
-from fecontact.integrate.task import Task
+from fecontact.integrate.task import SetValuedOptions, Task
 from fecontact.integrate.trajectory import Solution, Status
 
 # Abilities that not all solvers have, and the verb and object of a sentence about them.
@@ -183,7 +182,7 @@ def _coefficient(owner: str, name: str, given: Any, most: float) -> Any:
 
 
 @dataclass(frozen=True)
-class SetValued(Solver):
+class SetValued(SetValuedOptions, Solver):
     r"""Friction without smoothing, sticking by constraint, and rigid stops.
 
     .. math::
@@ -218,11 +217,6 @@ class SetValued(Solver):
         For values out of range.
     """
 
-    restitution: Coefficient | None = None
-    static_coefficient: Coefficient | None = None
-    impact_law: str = "newton"
-    tangential_restitution: Coefficient = 0.0
-
     method: ClassVar[str] = "set-valued"
     abilities: ClassVar[frozenset[str]] = frozenset({"events", "derivatives"})
     smooth: ClassVar[bool] = False
@@ -253,14 +247,8 @@ class SetValued(Solver):
     def run(self, task: Task) -> Solution:
         """See :meth:`Solver.run`; InputError for a system that it cannot run."""
         from fecontact.integrate.nonsmooth.driver import integrate_set_valued
-        from fecontact.integrate.run_limits import longest_step
 
-        found = integrate_set_valued(
-            task.system, task.state, task.times, rtol=task.rtol, restitution=self.restitution,
-            impact_law=self.impact_law, tangential_restitution=self.tangential_restitution,
-            static_coefficient=self.static_coefficient, method=self.method,
-            longest=longest_step(task.system, task.times, task.max_step), max_step=task.max_step,
-            events=task.events, progress=task.progress, keep_steps=task.keep_steps)
+        found = integrate_set_valued(task, self)
         # Options in the statistics make the run reproducible.
         counted = {name: getattr(self, name) for name in (
             "restitution", "impact_law", "tangential_restitution", "static_coefficient")}

@@ -134,3 +134,29 @@ def finish(
             keep()
         steps = int(np.clip(done * seconds / max(passed, 1e-9), _FEWEST,
                             min(10 * steps, _MOST_STEPS)))
+
+
+def complete(
+    run: StepRun, progress: Callable[[float], None] | None = None,
+    keep: Callable[[], None] | None = None,
+) -> Status:
+    """Go on like :func:`finish`, or to an interrupt if there are results by then; how it ended."""
+    try:
+        return ENDS[finish(run, progress, keep=keep)]
+    except KeyboardInterrupt:
+        if not run.outputs:  # nothing was computed that could be kept
+            raise
+        return Status.INTERRUPTED
+
+
+def until_end(run: StepRun, *columns: tuple[Array, Array]) -> list[Array]:
+    """Output times passed, and rows there of ``columns``; also of the time reached, if later.
+
+    Each column is its rows at the output times, and the row at the time reached.
+    """
+    done = run.outputs
+    found = [run.times[:done], *(rows[:done] for rows, _ in columns)]
+    if run.time > found[0][-1] and np.isfinite(run.progress.state).all():
+        last = [run.time, *(row for _, row in columns)]
+        found = [np.concatenate([rows, [row]]) for rows, row in zip(found, last, strict=True)]
+    return found

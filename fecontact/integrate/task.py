@@ -2,8 +2,10 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from fecontact.core.types import Array
+from fecontact.integrate.coefficients import Coefficient
 from fecontact.integrate.events import AnyEvent
 from fecontact.system.contact_system import ContactSystem
 
@@ -40,3 +42,15 @@ class Task:
     events: Sequence[AnyEvent] = ()
     keep_steps: bool = False
     progress: Callable[[float], None] | None = None
+
+
+@dataclass(frozen=True)
+class SetValuedOptions:
+    """Options of runs with set-valued friction, see :class:`fecontact.integrate.SetValued`."""
+
+    restitution: Coefficient | None = None
+    static_coefficient: Coefficient | None = None
+    impact_law: str = "newton"
+    tangential_restitution: Coefficient = 0.0
+
+    method: ClassVar[str]

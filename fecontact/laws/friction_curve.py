@@ -6,34 +6,15 @@ They are found by sampling the compiled law, so that user-defined laws work as w
 from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import lru_cache
-from typing import Any, ClassVar, Protocol, cast
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
 
 from fecontact.core.checks import as_floats
-from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.laws.sampling import law_values
-
-
-class Curve(Protocol):
-    """A friction law as needed here: compiled function, parameters and velocity scale."""
-
-    kernel: ClassVar[CompiledLaw]
-
-    @property
-    def memory(self) -> int:
-        """Number of internal variables; laws with any have no curve."""
-
-    @property
-    def velocity_scale(self) -> float:
-        """Slip velocity over which the force rises [m/s]."""
-
-    def table(self, share: Array) -> Array:
-        """Parameters (n, k) of n nodes."""
-
 
 # Smoothing slope and slip velocity at which every smoothed sign is 1 to the last digit while the
 # curve of the coefficient has not begun to change.
@@ -42,7 +23,7 @@ STEEP, CREEP = 1e36, 1e-18
 _SEARCHED = np.geomspace(1e-6, 1e12, 4001)
 
 
-def coefficient(law: Curve, velocity: Array | float) -> Array:
+def coefficient(law: Any, velocity: Array | float) -> Array:
     """R/F at slip velocities [m/s]; it has the sign of the velocity.
 
     Parameters
@@ -59,12 +40,12 @@ def coefficient(law: Curve, velocity: Array | float) -> Array:
     return _curve(law, velocity, 0)
 
 
-def slope(law: Curve, velocity: Array | float) -> Array:
+def slope(law: Any, velocity: Array | float) -> Array:
     """d(R/F)/dv [s/m] at slip velocities [m/s]; arguments as for :func:`coefficient`."""
     return _curve(law, velocity, 1)
 
 
-def largest_coefficient(law: Curve) -> tuple[Array, Array]:
+def largest_coefficient(law: Any) -> tuple[Array, Array]:
     """Largest maximum of R/F over slip velocity, and the velocity where it lies [m/s].
 
     Without a maximum the velocity is infinite, and the coefficient is the limit of R/F, which is
@@ -78,15 +59,15 @@ def largest_coefficient(law: Curve) -> tuple[Array, Array]:
     return _largest(law, _nodes(law))
 
 
-def static_coefficient(law: Curve, nodes: int) -> Array:
+def static_coefficient(law: Any, nodes: int) -> Array:
     """Coefficient (n,) that limits friction at rest: mu(0+) of the law without its smoothing.
 
     For laws without a ``smoothing_slope`` it is the largest maximum of R/F. InputError if R/F grows
     without bound.
     """
-    names = [entry.name for entry in fields(cast(Any, law))]
+    names = [entry.name for entry in fields(law)]
     if "smoothing_slope" in names:
-        steep = replace(cast(Any, law), smoothing_slope=STEEP)
+        steep = replace(law, smoothing_slope=STEEP)
         return _per_node(steep, nodes, lambda single, row: [
             _sampled(single, np.array([CREEP]), row)[0, 0]])[:, 0]
     found = _largest(law, nodes)[0]
@@ -97,29 +78,29 @@ def static_coefficient(law: Curve, nodes: int) -> Array:
     return found
 
 
-def velocity_of_minimum(law: Curve) -> Array:
+def velocity_of_minimum(law: Any) -> Array:
     """Smallest slip velocity (n,) at which R/F has a minimum [m/s], infinite without one.
 
     Between the maximum and this minimum friction decreases with slip velocity, and steady sliding
     may be unstable.
     """
-    def smallest(single: Curve, row: Array) -> list[float]:
+    def smallest(single: Any, row: Array) -> list[float]:
         minima = _turning_points(single, row, falling_before=True)
         return [min(minima, default=np.inf)]
 
     return _per_node(law, _nodes(law), smallest)[:, 0]
 
 
-def stick_velocity(law: Curve, nodes: int) -> Array:
+def stick_velocity(law: Any, nodes: int) -> Array:
     """Slip velocity (n,) of the largest maximum of R/F, else ten times the velocity scale."""
     try:
         hash(law)
     except TypeError:
         return _stick_velocity(law, nodes)
-    return _kept_stick_velocity(cast(Any, law), nodes)
+    return _kept_stick_velocity(law, nodes)
 
 
-def _stick_velocity(law: Curve, nodes: int) -> Array:
+def _stick_velocity(law: Any, nodes: int) -> Array:
     velocity = _largest(law, nodes)[1]
     width = _per_node(law, nodes, lambda single, _: [10.0 * single.velocity_scale])[:, 0]
     found = np.where(np.isfinite(velocity), velocity, width)
@@ -131,8 +112,8 @@ def _stick_velocity(law: Curve, nodes: int) -> Array:
 _kept_stick_velocity = lru_cache(maxsize=64)(_stick_velocity)
 
 
-def _largest(law: Curve, nodes: int) -> tuple[Array, Array]:
-    def largest(single: Curve, row: Array) -> list[float]:
+def _largest(law: Any, nodes: int) -> tuple[Array, Array]:
+    def largest(single: Any, row: Array) -> list[float]:
         maxima = _turning_points(single, row, falling_before=False)
         if maxima:
             values = _sampled(single, np.array(maxima), row)[:, 0]
@@ -147,7 +128,7 @@ def _largest(law: Curve, nodes: int) -> tuple[Array, Array]:
 
 
 def _turning_points(
-    law: Curve, row: Array, *, falling_before: bool
+    law: Any, row: Array, *, falling_before: bool
 ) -> list[float]:
     """Speeds at which the slope of the curve changes its sign."""
     speeds = law.velocity_scale * _SEARCHED
@@ -162,7 +143,7 @@ def _turning_points(
     ]
 
 
-def _curve(law: Curve, velocity: Array | float, column: int) -> Array:
+def _curve(law: Any, velocity: Array | float, column: int) -> Array:
     nodes = _nodes(law)
     v = as_floats(velocity, f"{type(law).__name__}: velocity")
     if nodes == 1:
@@ -175,7 +156,7 @@ def _curve(law: Curve, velocity: Array | float, column: int) -> Array:
     return values
 
 
-def _sampled(law: Curve, v: Array, row: Array) -> Array:
+def _sampled(law: Any, v: Array, row: Array) -> Array:
     if law.memory:
         raise InputError(f"{type(law).__name__} has memory: its force is not a curve over slip "
                          f"velocity.")
@@ -183,18 +164,18 @@ def _sampled(law: Curve, v: Array, row: Array) -> Array:
     return law_values(law.kernel.address, row, v, np.ones(v.size))[:, :2]
 
 
-def _nodes(law: Curve) -> int:
+def _nodes(law: Any) -> int:
     """Number of nodes with parameters of their own, else 1."""
-    given = (getattr(law, entry.name) for entry in fields(cast(Any, law)))
+    given = (getattr(law, entry.name) for entry in fields(law))
     return max((len(value) for value in given if isinstance(value, tuple)), default=1)
 
 
-def _table(law: Curve, nodes: int) -> Array:
+def _table(law: Any, nodes: int) -> Array:
     return law.table(np.full(nodes, 1.0 / max(nodes, 1)))
 
 
 def _per_node(
-    law: Curve, nodes: int, answer: Callable[[Curve, Array], list[float]]
+    law: Any, nodes: int, answer: Callable[[Any, Array], list[float]]
 ) -> Array:
     """Results (n, ...) from the law and parameters of one node, computed once for equal nodes."""
     # Of one node without any: the shape of a result is known from one only.
@@ -202,7 +183,7 @@ def _per_node(
                                      return_inverse=True)
     found = []
     for row, node in zip(rows, first, strict=True):
-        own = {entry.name: value[node] for entry in fields(cast(Any, law))
+        own = {entry.name: value[node] for entry in fields(law)
                if isinstance(value := getattr(law, entry.name), tuple)}
-        found.append(answer(replace(cast(Any, law), **own), np.ascontiguousarray(row)))
+        found.append(answer(replace(law, **own), np.ascontiguousarray(row)))
     return np.array(found)[inverse.reshape(-1)[:nodes]]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from set_valued_runs import integrate_set_valued
 from systems import TURN
 
 from fecontact import (
@@ -15,7 +16,6 @@ from fecontact import (
     basis_from_matrices,
 )
 from fecontact.integrate import ContactEvents, SetValued
-from fecontact.integrate.nonsmooth.driver import integrate_set_valued
 from fecontact.laws import (
     Constant,
     ConstantFriction,

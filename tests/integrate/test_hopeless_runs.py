@@ -5,12 +5,12 @@ from functools import partial
 
 import numpy as np
 import pytest
+from set_valued_runs import start_set_valued
 from systems import TURN, friction_oscillator, impact_oscillator
 
 import fecontact as fc
 from fecontact.core.errors import InputError
 from fecontact.integrate import Auto, Radau, Rodas5P, Scipy, SetValued
-from fecontact.integrate.nonsmooth import driver
 from fecontact.integrate.step_loop import MINIMUM_STEP, RUNNING, STEP
 
 SOLVERS = (Auto(), Rodas5P(), Radau(), Scipy("LSODA"))
@@ -58,7 +58,7 @@ def test_short_runs_of_fast_drives_end():
 def test_set_valued_runs_whose_steps_stay_too_short_end_with_a_status(method):
     """Steps of at most 1e-14 s, as where impacts follow each other ever closer."""
     system = friction_oscillator()
-    run = driver.start(system, np.zeros(system.size), np.linspace(0.0, 1.0, 11), rtol=1e-6,
+    run = start_set_valued(system, np.zeros(system.size), np.linspace(0.0, 1.0, 11), rtol=1e-6,
                        method=method)
     data, = run.loop.args
     slow = data._replace(limits=data.limits._replace(longest=1e-13))

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from set_valued_runs import integrate_set_valued
 
 import fecontact as fc
 from fecontact import Trajectory
 from fecontact.integrate import Rodas5P, Scipy, SetValued
-from fecontact.integrate.nonsmooth.driver import integrate_set_valued
 from fecontact.laws import (
     ConstantFriction,
     PrescribedForce,

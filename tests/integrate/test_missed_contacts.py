@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from set_valued_runs import start_set_valued
 from systems import TURN, basis
 
 from fecontact import (
@@ -19,7 +20,7 @@ from fecontact import (
     sensitivity,
     simulate,
 )
-from fecontact.integrate import ContactEvents, Crossing, Rodas5P, Scipy, SetValued
+from fecontact.integrate import ContactEvents, Crossing, Rodas5P, Scipy
 from fecontact.laws import (
     ExponentialFriction,
     HarmonicSpeed,
@@ -185,19 +186,12 @@ def test_longest_step(solver):
     assert run.states[-1] == pytest.approx([-5.0, -10.0], rel=1e-4)
 
 
-def test_longest_step_of_set_valued_runs(monkeypatch):
+@pytest.mark.parametrize(("step", "longest"), [(None, 0.02), (1e-3, 1e-3), (10.0, 0.02)])
+def test_longest_step_of_set_valued_runs(step, longest):
     """The longest step is handed on, unless signals or the run ask for a shorter one."""
-    handed = []
-
-    def run(*_, longest, **__):
-        handed.append(longest)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("fecontact.integrate.nonsmooth.driver.integrate_set_valued", run)
-    for step in (None, 1e-3, 10.0):
-        with pytest.raises(KeyboardInterrupt):
-            simulate(thrown(), 1.0, initial=np.zeros(2), solver=SetValued(), max_step=step)
-    assert handed == [pytest.approx(0.02), 1e-3, pytest.approx(0.02)]
+    run = start_set_valued(thrown(), np.zeros(2), np.array([0.0, 1.0]), restitution=0.0,
+                           max_step=step)
+    assert run.loop.args[0].limits.longest == pytest.approx(longest)
 
 
 def test_longest_step_of_other_runs():

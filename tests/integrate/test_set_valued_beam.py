@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from meshes_for_tests import rectangle
+from set_valued_runs import integrate_set_valued
 
 from fecontact import (
     ContactSystem,
@@ -19,7 +20,6 @@ from fecontact import (
     simulate,
 )
 from fecontact.integrate import Scipy
-from fecontact.integrate.nonsmooth.driver import integrate_set_valued
 from fecontact.laws import ExponentialFriction, RoughSurface
 
 TIMES = np.linspace(0.0, 0.01, 201)

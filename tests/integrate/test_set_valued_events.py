@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from set_valued_runs import start_set_valued
 from systems import TURN
 from systems import belt_of_unit_mass as belt
 from systems import last_speed_of_stick_slip as last_speed
@@ -10,7 +11,6 @@ import fecontact as fc
 from fecontact import Status
 from fecontact.bifurcation import Axis, basins
 from fecontact.integrate import ContactEvents, Crossing, SetValued, strobe
-from fecontact.integrate.nonsmooth import driver
 from fecontact.integrate.nonsmooth.problem import AT_EVENT, IDLE
 from fecontact.integrate.step_loop import FINISHED, MINIMUM_STEP, RUNNING, STEP
 from fecontact.laws import ConstantFriction, LinearContact, RoughSurface
@@ -166,7 +166,7 @@ def test_runs_in_pieces_are_the_same_to_the_last_bit(system, end, options):
     times = np.linspace(0.0, end, 301)
     found = []
     for piece in (1, 7, 10**6):
-        run = driver.start(system, np.array([0.5, 0.2]), times, rtol=1e-6, **options)
+        run = start_set_valued(system, np.array([0.5, 0.2]), times, rtol=1e-6, **options)
         while (status := run.advance(piece)) == RUNNING:
             pass
         assert status == FINISHED
@@ -178,7 +178,7 @@ def test_runs_in_pieces_are_the_same_to_the_last_bit(system, end, options):
 
 
 def test_a_run_without_time_between_its_events_ends_whatever_its_pieces():
-    run = driver.start(belt(), np.array([0.5, 0.2]), np.linspace(0.0, 30.0, 301), rtol=1e-6)
+    run = start_set_valued(belt(), np.array([0.5, 0.2]), np.linspace(0.0, 30.0, 301), rtol=1e-6)
     run.advance(5)
     # State after many changes of contact without progress in time, in calls before.
     run.progress.counts[[IDLE, AT_EVENT]] = 200, 1

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from set_valued_runs import integrate_set_valued
 from systems import TURN
 
 import fecontact as fc
 from fecontact import Status
-from fecontact.integrate.nonsmooth.driver import integrate_set_valued
 from fecontact.laws import (
     ConstantFriction,
     ExponentialFriction,

@@ -4,11 +4,11 @@ from math import comb
 
 import numpy as np
 import pytest
+from set_valued_runs import start_set_valued
 from systems import TURN, two_mass_system
 
 from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
 from fecontact.integrate.bernstein import of_nested
-from fecontact.integrate.nonsmooth import driver
 from fecontact.integrate.nonsmooth.event_driven import SMALL, run_events
 from fecontact.integrate.nonsmooth.problem import EVENTS, Output
 from fecontact.integrate.step_loop import REJECTIONS, RUNNING
@@ -38,7 +38,7 @@ def system(modes, nodes):
 
 
 def run_of(system, end=2.0, **options):
-    return driver.start(system, np.zeros(2 * system.basis.modes), np.linspace(0.0, end, 401),
+    return start_set_valued(system, np.zeros(2 * system.basis.modes), np.linspace(0.0, end, 401),
                         **{"rtol": 1e-7, **options})
 
 

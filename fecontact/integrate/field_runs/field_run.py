@@ -15,8 +15,7 @@ from fecontact.core.types import Array
 from fecontact.core.units import Summarised
 from fecontact.integrate.event_table import Events
 from fecontact.integrate.events import AnyEvent
-from fecontact.integrate.step_loop import RUNNING
-from fecontact.integrate.step_runs import ENDS, finish
+from fecontact.integrate.step_runs import complete, until_end
 from fecontact.integrate.trajectory import Status, output_part
 from fecontact.system.fields.vector_field import VectorField
 
@@ -119,18 +118,8 @@ def run_field(
 
     begin = clock.perf_counter()
     run = start_field(moving, state, times, rtol=rtol, max_step=max_step, events=events)
-    ended, result = None, RUNNING
-    try:
-        result = finish(run, progress)
-    except KeyboardInterrupt:
-        if not run.outputs:  # nothing was computed that could be kept
-            raise
-        ended = Status.INTERRUPTED
-    ended = ENDS[result] if ended is None else ended
-    done, last = run.outputs, run.progress.state
-    reached, states = times[:done], run.states[:done]
-    if ended is not Status.FINISHED and run.time > reached[-1] and np.isfinite(last).all():
-        reached, states = np.append(reached, run.time), np.vstack([states, last])
+    ended = complete(run, progress)
+    reached, states = until_end(run, (run.states, run.progress.state))
     statistics = {"solver": "rodas5p", "rtol": rtol, **run.statistics,
                   "seconds": clock.perf_counter() - begin}
     return FieldRun(MappingProxyType(dict(moving.parameters)), moving.state_names, reached, states,

@@ -25,7 +25,8 @@ from fecontact.integrate.nonsmooth.steps.limits import floor_of, longest_between
 from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.integrate.run_limits import longest_step
 from fecontact.integrate.step_loop import REJECTIONS, STEPS
-from fecontact.integrate.step_runs import ENDS, StepRun, finish
+from fecontact.integrate.step_runs import StepRun, complete, until_end
+from fecontact.integrate.task import SetValuedOptions, Task
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.laws.friction.stribeck import Frictionless
@@ -37,79 +38,13 @@ from fecontact.system.powers import POWER_COUNT
 _FEW = 8
 
 
-def integrate_set_valued(
-    system: ContactSystem,
-    state: Array,
-    times: Array,
-    *,
-    rtol: float = 1e-6,
-    method: str = "set-valued",
-    restitution: Coefficient | None = None,
-    impact_law: str = "newton",
-    tangential_restitution: Coefficient = 0.0,
-    static_coefficient: Coefficient | None = None,
-    longest: float | None = None,
-    max_step: float | None = None,
-    events: Sequence[AnyEvent] = (),
-    keep_steps: bool = False,
-    progress: Callable[[float], None] | None = None,
-) -> Solution:
-    r"""Integrate with friction whose smoothing slope k_s is infinite.
-
-    .. math::
-
-        |R_j| \le \mu(0^+) F_j \ \text{ where } v_j = 0, \qquad
-        R_j = \mu(|v_j|) F_j\, \mathrm{sign}(v_j) \ \text{ else}
-
-    with the normal force F_j of the normal law, slip velocity v_j and the coefficient mu of the
-    friction law, unsmoothed. In space R_j and v_j are vectors along the tangents, and R_j acts
-    along v_j.
-
-    Parameters
-    ----------
-    system : ContactSystem
-        With friction laws that have a ``smoothing_slope``.
-    state : (2 m,) array
-        Its state [q, q'] at the first time.
-    times : (N,) array
-        Output times, ascending [s].
-    rtol : float
-        Relative tolerance.
-    method : 'set-valued', 'event-driven' or 'time-stepping'
-        As :class:`fecontact.integrate.SetValued`, ``EventDriven`` and ``TimeStepping``.
-    restitution : float, sequence or mapping, optional
-        Rigid stops in place of the normal law: the ground stops nodes (u <= 0), and a coefficient
-        e from 0 to 1 gives their rebound; one for all nodes, one for each, or by interfaces.
-        Penetration at the start is taken away. Friction has to be proportional to the normal force.
-    impact_law : 'newton' or 'poisson'
-        Whether e is a ratio of velocities, ``u'+ = -e u'-``, or of impulses; see
-        :mod:`fecontact.integrate.nonsmooth.rigid_stops`.
-    tangential_restitution : float, sequence or mapping
-        Newton's coefficient along the ground of contacts that stick in an impact, from 0 to 1.
-    static_coefficient : float, sequence or mapping, optional
-        Limit of \|R\|/F in stick, at least the law's mu(0+) [-]; default is that.
-    longest : float, optional
-        Longest step [s]; default from the run, the excitation and the ground. Event-driven runs
-        with compliant contact take longer ones if it is the default.
-    max_step : float, optional
-        Limit of these [s].
-    events : sequence of ContactEvents, Crossing and Event
-        Events to locate, from event to event only.
-    keep_steps : bool
-        Whether to keep rows between the outputs.
-    progress : callable, optional
-        Called with the time reached [s] now and then.
-
-    Returns
-    -------
-    Solution
-        Also of a run that ended early.
+def integrate_set_valued(task: Task, options: SetValuedOptions) -> Solution:
+    """Integrate by :class:`fecontact.integrate.SetValued`; also a run that ends early.
 
     Raises
     ------
     InputError
-        For friction that cannot be unsmoothed, or a method that cannot run the system; ranges are
-        checked by :class:`fecontact.integrate.SetValued`.
+        For friction that cannot be unsmoothed, or a method that cannot run the system.
 
     References
     ----------
@@ -117,19 +52,11 @@ def integrate_set_valued(
     Constraints, Springer 2008. V. Acary, B. Brogliato, Numerical Methods for Nonsmooth Dynamical
     Systems, Springer 2008.
     """
-    begin = clock.perf_counter()
-    run = start(system, state, times, rtol=rtol, method=method, restitution=restitution,
-                impact_law=impact_law, tangential_restitution=tangential_restitution,
-                static_coefficient=static_coefficient, longest=longest, max_step=max_step,
-                events=events, keep_steps=keep_steps)
-    output, times, counts = run.output, run.times, run.progress.counts
-    n, m, solid = system.basis.contact_nodes, system.basis.modes, system.basis.dimension == 3
-    try:
-        ended = ENDS[finish(run, progress)]
-    except KeyboardInterrupt:
-        if not run.outputs:  # nothing was computed that could be kept
-            raise
-        ended = Status.INTERRUPTED
+    begin, basis = clock.perf_counter(), task.system.basis
+    run = start(task, options)
+    output, counts = run.output, run.progress.counts
+    n, m, solid = basis.contact_nodes, basis.modes, basis.dimension == 3
+    ended = complete(run, task.progress)
     statistics: dict[str, Any] = {
         "method": run.method, "steps": int(counts[STEPS]),
         "rejected": int(counts[REJECTIONS]), "events": int(counts[kinds.EVENTS]),
@@ -137,13 +64,9 @@ def integrate_set_valued(
         "seconds": clock.perf_counter() - begin}
     if ended is Status.FINISHED and counts[kinds.GAINED]:
         ended = Status.IMPACT_GAINED
-    done, Y, last = run.outputs, run.progress.state, run.time
-    time, states = times[:done], output.states[:done]
-    friction, normal = output.friction[:done], output.normal[:done]
-    if done < len(times) and done and last > time[-1] and np.isfinite(Y).all():
-        time, states = np.append(time, last), np.vstack([states, Y])
-        friction = np.vstack([friction, friction[-1:]])
-        normal = np.vstack([normal, normal[-1:]])
+    last = run.outputs - 1
+    time, *found = until_end(run, (output.states, run.progress.state), *(
+        (rows, rows[last]) for rows in (output.friction, output.normal)))
     end = 2 * m + POWER_COUNT
 
     def columns(states: Array, friction: Array, normal: Array) -> dict[str, Array]:
@@ -155,9 +78,9 @@ def integrate_set_valued(
     between = [values[: run.kept_rows] for values in run.kept]
     kept = KeptSteps(between[0], **cast("dict[str, Any]", columns(*between[1:]))).before(time[-1])
     return Solution(time, status=ended, statistics=statistics,
-                    node_friction_work=states[:, end:].copy(), events=run.events,
-                    kept=kept if keep_steps else None,
-                    **columns(states, friction, normal))
+                    node_friction_work=found[0][:, end:].copy(), events=run.events,
+                    kept=kept if task.keep_steps else None,
+                    **columns(*found))
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,40 +100,25 @@ class Run(StepRun):
         return self.loop(most)
 
 
-def start(
-    system: ContactSystem,
-    state: Array,
-    times: Array,
-    *,
-    rtol: float,
-    method: str = "set-valued",
-    restitution: Coefficient | None = None,
-    impact_law: str = "newton",
-    tangential_restitution: Coefficient = 0.0,
-    static_coefficient: Coefficient | None = None,
-    longest: float | None = None,
-    max_step: float | None = None,
-    events: Sequence[AnyEvent] = (),
-    keep_steps: bool = False,
-) -> Run:
+def start(task: Task, options: SetValuedOptions) -> Run:
     """A run before its first step; see :func:`integrate_set_valued`."""
-    times = np.ascontiguousarray(times, dtype=float)
-    default = longest_step(system, times)
-    longest = default if longest is None else longest
-    problem, rubbing = nonsmooth_problem(system, restitution, static_coefficient, longest,
-                                         tangential=tangential_restitution)
-    problem = problem._replace(poisson=int(impact_law == "poisson"))
-    method = _chosen(problem, method)
+    system, state, events, restitution = task.system, task.state, task.events, options.restitution
+    times = np.ascontiguousarray(task.times, dtype=float)
+    default, longest = longest_step(system, times), longest_step(system, times, task.max_step)
+    problem, rubbing = nonsmooth_problem(system, restitution, options.static_coefficient, longest,
+                                         tangential=options.tangential_restitution)
+    problem = problem._replace(poisson=int(options.impact_law == "poisson"))
+    method = _chosen(problem, options.method)
     solid = system.basis.dimension == 3
     progress = kinds.progress_for(problem, rubbing, state, float(times[0]), 0.01 * longest)
     limits = kinds.Limits(
         stops_of(system, float(times[0]), float(times[-1])),
-        floor_of(system, state, times, longest), rtol, longest)
+        floor_of(system, state, times, longest), task.rtol, longest)
     if longest == default and method == "event-driven" and restitution is None:
-        most = np.inf if max_step is None else float(max_step)
+        most = np.inf if task.max_step is None else float(task.max_step)
         limits = limits._replace(longest=min(longest_between_events(system, times), most))
     sizes = len(progress.state), len(progress.carried), system.basis.contact_nodes
-    workspace = workspace_for_rows(keep_steps, sum(sizes))
+    workspace = workspace_for_rows(task.keep_steps, sum(sizes))
     output, kept = (kinds.Output(rows, *(np.empty((len(rows), size)) for size in sizes))
                     for rows in (times, np.zeros(workspace)))
     evaluation = kinds.evaluation_for(problem)

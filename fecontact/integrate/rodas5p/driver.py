@@ -44,7 +44,7 @@ from fecontact.integrate.run_limits import (
     work_of_jump,
 )
 from fecontact.integrate.series.branches import chosen_series, from_state
-from fecontact.integrate.step_runs import ENDS, finish
+from fecontact.integrate.step_runs import complete, until_end
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import (
@@ -309,27 +309,15 @@ def integrate(
     stored = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
     if stored is not None:
         stored.read()
-    ended, result = None, step_loop.RUNNING
-    try:
-        result = finish(run, progress, keep=None if stored is None else stored.keep)
-    except KeyboardInterrupt:
-        if not run.outputs:  # nothing was computed that could be kept
-            raise
-        ended = Status.INTERRUPTED
-        if stored is not None:
-            stored.write()
+    ended = complete(run, progress, None if stored is None else stored.keep)
+    if stored is not None and ended is Status.INTERRUPTED:
+        stored.write()
     statistics: dict[str, Any] = {"method": run.method, **run.statistics,
                                   "seconds": clock.perf_counter() - begin}
-    if ended is None:
-        ended = ENDS[result]
     if ended not in (Status.FINISHED, Status.EVENT):
         statistics["message"] = f"{_place(run, ended)}"
-    done = run.outputs
-    times, states, work = run.times[:done], run.states[:done], run.work[:done]
-    last = run.progress.state
-    if ended is not Status.FINISHED and run.time > times[-1] and np.isfinite(last).all():
-        times = np.append(times, run.time)
-        states, work = np.vstack([states, last]), np.vstack([work, run.progress.work])
+    times, states, work = until_end(
+        run, (run.states, run.progress.state), (run.work, run.progress.work))
     begun, counts = (float(times[0]), run.states[0]), run.problem.control.slider_counts
     time, *values = (column[: run.kept_rows] for column in run.kept)
     kept = KeptSteps(time, *booked(system, counts, time, values[0], values[1], begun))
