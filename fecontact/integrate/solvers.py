@@ -86,9 +86,7 @@ class CompiledSolver(Solver):
         if path is not None and not path.parent.is_dir():
             raise InputError(f"checkpoint = {str(path)!r} cannot be written: there is no folder "
                              f"{path.parent}.")
-        found = integrate(task.system, task.state, task.times, rtol=task.rtol,
-                          max_step=task.max_step, progress=task.progress, checkpoint=path,
-                          events=task.events, method=self.method, keep_steps=task.keep_steps)
+        found = integrate(task, self.method, path)
         if path is not None and not self.keep_checkpoint and found.status is not Status.INTERRUPTED:
             path.unlink(missing_ok=True)
         return found

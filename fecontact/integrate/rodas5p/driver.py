@@ -1,7 +1,7 @@
 """Running the compiled integrator: tolerances, pieces of a run, interrupts, checkpoints."""
 
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -45,6 +45,7 @@ from fecontact.integrate.run_limits import (
 )
 from fecontact.integrate.series.branches import chosen_series, from_state
 from fecontact.integrate.step_runs import complete, until_end
+from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import (
@@ -289,27 +290,15 @@ def _ground_bounds(system: ContactSystem, times: Array) -> Array:
                      sum(one.largest_acceleration(start, end) for one in motions)])
 
 
-def integrate(
-    system: ContactSystem,
-    state: Array,
-    times: Array,
-    *,
-    rtol: float,
-    max_step: float | None = None,
-    progress: Callable[[float], None] | None = None,
-    checkpoint: Path | None = None,
-    events: Sequence[AnyEvent] = (),
-    method: str = "auto",
-    keep_steps: bool = False,
-) -> Solution:
-    """Integrate from ``times[0]`` to ``times[-1]``; see :func:`fecontact.simulate`."""
-    begin = clock.perf_counter()
-    run = start(system, state, times, rtol=rtol, max_step=max_step, events=events, method=method,
-                keep_steps=keep_steps)
+def integrate(task: Task, method: str, checkpoint: Path | None) -> Solution:
+    """Integrate by a compiled method, with a checkpoint if it has a name."""
+    begin, system, state = clock.perf_counter(), task.system, task.state
+    run = start(system, state, task.times, rtol=task.rtol, max_step=task.max_step,
+                events=task.events, method=method, keep_steps=task.keep_steps)
     stored = None if checkpoint is None else Checkpoint.of(checkpoint, run, state)
     if stored is not None:
         stored.read()
-    ended = complete(run, progress, None if stored is None else stored.keep)
+    ended = complete(run, task.progress, None if stored is None else stored.keep)
     if stored is not None and ended is Status.INTERRUPTED:
         stored.write()
     statistics: dict[str, Any] = {"method": run.method, **run.statistics,
@@ -326,7 +315,7 @@ def integrate(
     lost, creep = np.split(work[:, POWER_COUNT:], NODE_POWERS, axis=1)
     return Solution(times, states, work[:, :POWER_COUNT], ended, statistics,
                     node_friction_work=lost, node_creep_work=creep, events=run.events,
-                    kept=kept if keep_steps else None)
+                    kept=kept if task.keep_steps else None)
 
 
 def _place(run: Run, ended: Status) -> str:
