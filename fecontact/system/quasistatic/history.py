@@ -8,22 +8,17 @@ import numpy as np
 
 from fecontact.core.errors import InputError, require_choice
 from fecontact.core.read_only import read_only_arrays
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array
 from fecontact.core.units import Summarised, quantity
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.polynomial_forces import polynomial_energy
 from fecontact.system.quasistatic.given import actions_of, travel_forces
 from fecontact.system.quasistatic.path import LoadPath
 from fecontact.system.quasistatic.pose import (
-    AGAINST,
-    FORCE,
     PENETRATION,
-    PER_TANGENT,
-    PLACE,
-    PRESSING,
     Sliders,
 )
-from fecontact.system.quasistatic.rest_state import STATES, RestState, total_friction
+from fecontact.system.quasistatic.rest_state import STATES, ContactPoses, RestState, total_friction
 from fecontact.system.quasistatic.sliders import components
 
 
@@ -69,7 +64,7 @@ class Loop(Summarised):
 
 @read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
-class LoadHistory(Summarised):
+class LoadHistory(ContactPoses, Summarised):
     r"""Equilibria along a path of quasi-static loading.
 
     The friction of a node is that of springs c with sliders,
@@ -159,54 +154,9 @@ class LoadHistory(Summarised):
         return len(self.modal_coordinates)
 
     @property
-    def normal_force(self) -> Array:
-        """F (N, n) [N]."""
-        return self.node[..., FORCE]
-
-    @property
-    def friction_force(self) -> Array:
-        """R (N, n), on the body in -x [N]; in space along the first tangent."""
-        return self.friction_forces[..., 0]
-
-    @property
-    def friction_forces(self) -> Array:
-        """Friction forces (N, n, 1), in space (N, n, 2), against the tangents [N]."""
-        return components(self.slider_force, 1).sum(axis=2)
-
-    @property
-    def friction_limit(self) -> Array:
-        """Largest friction force (N, n) under the normal forces [N]."""
-        return self.sliders.limit.sum(axis=-1) * self.node[..., PRESSING]
-
-    @property
-    def slip(self) -> Array:
-        """Displacement (N, n) of each node relative to the ground along the first tangent [m]."""
-        return self.node[..., PLACE]
-
-    @property
-    def slips(self) -> Array:
-        """Displacements (N, n, 1), in space (N, n, 2), relative to the ground [m]."""
-        return self.node[..., PLACE::PER_TANGENT]
-
-    @property
-    def tangential_forces(self) -> Array:
-        """Forces (N, n, 1), in space (N, n, 2), against the tangents, along the surface too [N]."""
-        return self.node[..., AGAINST::PER_TANGENT]
-
-    @property
-    def contact_state(self) -> Integers:
-        """State (N, n) of each node: 0 open, 1 stick, 2 slip."""
-        return np.array([self.state(k).contact_state for k in range(len(self))])
-
-    @property
     def travel(self) -> Array:
         """Travel (N,) of the ground along x, or of the interface that slides [m], [rad]."""
         return self.travels[:, 0]
-
-    @property
-    def travels(self) -> Array:
-        """The travel (N, 1), in space (N, 2) with that along y [m]."""
-        return self.given[:, 1 - self.system.basis.dimension :]
 
     @property
     def work(self) -> Array:

@@ -11,6 +11,7 @@ from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, count, quantity
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.quasistatic.pose import (
+    AGAINST,
     FORCE,
     PER_TANGENT,
     PLACE,
@@ -26,9 +27,74 @@ _KINDS = ("plane bodies", "solids")
 _AT_LIMIT = 1e-9
 
 
+class ContactPoses:
+    """Forces, slips and states of contact nodes in equilibria; of several with an axis (N, ...)."""
+
+    given: Array
+    node: Array
+    slider_force: Array
+    sliders: Sliders
+
+    @property
+    def normal_force(self) -> Array:
+        """F (n,) [N]."""
+        return self.node[..., FORCE]
+
+    @property
+    def friction_force(self) -> Array:
+        """R (n,), on the body in -x [N]; in space along the first tangent."""
+        return self.friction_forces[..., 0]
+
+    @property
+    def friction_forces(self) -> Array:
+        """Friction forces (n, 1), in space (n, 2), against the tangents [N]."""
+        return self._forces.sum(axis=-2)
+
+    @property
+    def friction_limit(self) -> Array:
+        """Largest friction force (n,) under the normal forces [N]."""
+        return self.sliders.limit.sum(axis=-1) * self.node[..., PRESSING]
+
+    @property
+    def tangential_forces(self) -> Array:
+        """Forces (n, 1), in space (n, 2), against the tangents, along the surface too [N]."""
+        return self.node[..., AGAINST::PER_TANGENT]
+
+    @property
+    def slip(self) -> Array:
+        """Displacement (n,) of each node relative to the ground along the first tangent [m]."""
+        return self.node[..., PLACE]
+
+    @property
+    def slips(self) -> Array:
+        """Displacements (n, 1), in space (n, 2), relative to the ground [m]."""
+        return self.node[..., PLACE::PER_TANGENT]
+
+    @property
+    def travels(self) -> Array:
+        """Travel (1,) of the ground along x, in space (2,) with that along y [m]."""
+        return self.given[..., -self._forces.shape[-1] :]
+
+    @property
+    def at_limit(self) -> Any:
+        """Whether each slider (n, e) is at its limit."""
+        limit = self.sliders.limit * self.node[..., PRESSING, None]
+        return np.linalg.norm(self._forces, axis=-1) >= (1.0 - _AT_LIMIT) * limit
+
+    @property
+    def contact_state(self) -> Integers:
+        """State (n,) of each node: 0 open, 1 stick, 2 slip (all its sliders at their limits)."""
+        return np.where(self.normal_force == 0.0, OPEN,
+                        np.where(self.at_limit.all(axis=-1), SLIP, STICK)).astype(np.int64)
+
+    @property
+    def _forces(self) -> Array:
+        return components(self.slider_force, self.node.ndim - 2)
+
+
 @read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
-class RestState(Summarised):
+class RestState(ContactPoses, Summarised):
     """Equilibrium of a body at rest, which depends on how it was loaded.
 
     Attributes
@@ -68,29 +134,9 @@ class RestState(Summarised):
         ]
 
     @property
-    def normal_force(self) -> Array:
-        """F (n,) [N]."""
-        return self.node[:, FORCE]
-
-    @property
-    def friction_force(self) -> Array:
-        """R (n,), on the body in -x [N]; in space along the first tangent."""
-        return self.friction_forces[:, 0]
-
-    @property
-    def friction_forces(self) -> Array:
-        """Friction forces (n, 1), in space (n, 2), against the tangents [N]."""
-        return components(self.slider_force).sum(axis=1)
-
-    @property
     def travel(self) -> float:
         """Travel of the ground along x, or of the interface that slides [m], [rad]."""
         return float(self.travels[0])
-
-    @property
-    def travels(self) -> Array:
-        """The travel (1,), in space (2,) with that along y [m]."""
-        return self.given[1 - self.slider_force.ndim :]
 
     @property
     def deflection(self) -> Array:
@@ -102,18 +148,6 @@ class RestState(Summarised):
         place = self.node[:, None, PLACE::PER_TANGENT].reshape(len(self.node), 1, *shape[2:])
         rigid = self.sliders.rigid.reshape(*shape[:2], *([1] * len(shape[2:])))
         return np.where(rigid > 0.0, 0.0, place - self.slider_place)
-
-    @property
-    def at_limit(self) -> Any:
-        """Whether each slider (n, e) is at its limit."""
-        limit = self.sliders.limit * self.node[:, PRESSING, None]
-        size = np.linalg.norm(components(self.slider_force), axis=-1)
-        return size >= (1.0 - _AT_LIMIT) * limit
-
-    @property
-    def contact_state(self) -> Integers:
-        """State (n,) of each node: 0 open, 1 stick, 2 slip (all its sliders at their limits)."""
-        return contact_states(self.node[:, FORCE], self.at_limit)
 
     def check(self, system: ContactSystem) -> None:
         """Raise InputError unless the state fits a system."""
@@ -149,9 +183,3 @@ def total_friction(forces: Array) -> float:
     """Sum of friction forces (n, k) against tangents [N]: in space the size of a vector."""
     total = forces.sum(axis=0)
     return float(total[0]) if len(total) == 1 else float(np.linalg.norm(total))
-
-
-def contact_states(normal_force: Array, at_limit: Any) -> Integers:
-    """States (..., n) of nodes from F (..., n) and their sliders at the limit (..., n, e)."""
-    return np.where(normal_force == 0.0, OPEN,
-                    np.where(at_limit.all(axis=-1), SLIP, STICK)).astype(np.int64)
