@@ -95,14 +95,17 @@ def bounded_period(system: ContactSystem, times: Array, max_step: float | None =
     return period
 
 
-def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
-    """Limit of the step [s]: 1/50 of the run, 1/20 of the shortest period, or ``max_step``.
+def longest_step(
+    system: ContactSystem, times: Array, max_step: float | None = None,
+    of_run: float = 50.0, of_period: float = 20.0,
+) -> float:
+    """Limit of the step [s]: a part of the run, one of the shortest period, or ``max_step``.
 
     The period is that of drive, loads and waves. Longer steps could miss an excitation that starts
     from rest.
     """
-    start, end = float(times[0]), float(times[-1])
-    longest = min((end - start) / 50.0, bounded_period(system, times, max_step) / 20.0)
+    longest = min((float(times[-1]) - float(times[0])) / of_run,
+                  bounded_period(system, times, max_step) / of_period)
     return longest if max_step is None else min(longest, float(max_step))
 
 

@@ -5,8 +5,8 @@ import pytest
 from systems import TURN
 
 import fecontact as fc
-from fecontact.integrate import Scipy, run_limits
-from fecontact.integrate.rodas5p import driver
+from fecontact.integrate import Scipy
+from fecontact.integrate.run_limits import longest_step
 from fecontact.laws import (
     Constant,
     ConstantFriction,
@@ -155,11 +155,10 @@ def test_longest_steps_resolve_what_is_given_in_time():
         np.inf: point(drive=fc.Drive(stiffness_x=1.0, frequency_hz=4.0 * np.pi / TURN)),
     }
     for period, system in cases.items():
-        assert driver.longest_step(system, times) == pytest.approx(min(10.0, period / 4.0))
-        assert driver.longest_step(system, times, 0.06) == pytest.approx(min(0.06, period / 4.0))
-        assert run_limits.longest_step(system, times) == pytest.approx(min(0.2, period / 20.0))
-        assert run_limits.longest_step(system, times, 0.02) == pytest.approx(
-            min(0.02, period / 20.0))
+        for most, parts in ((0.06, (1.0, 4.0)), (0.02, (50.0, 20.0))):
+            longest = min(10.0 / parts[0], period / parts[1])
+            assert longest_step(system, times, None, *parts) == pytest.approx(longest)
+            assert longest_step(system, times, most, *parts) == pytest.approx(min(most, longest))
     ramp = point(ground=fc.Ground(speed=0.2, amplitude=1e-6, wavelength=0.02,
                                   motion=SpeedRamp(0.8, start=1.0, duration=1.0)))
     assert ramp.shortest_period(0.0, 10.0) == pytest.approx(0.02 / 0.8)

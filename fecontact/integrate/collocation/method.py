@@ -36,10 +36,11 @@ from fecontact.integrate.rodas5p import dynamics, state
 from fecontact.integrate.rodas5p.error_control import take_scales
 from fecontact.integrate.rodas5p.method import add_jump
 from fecontact.integrate.rodas5p.step_length import (
-    LAST_ROOT,
     LAST_STEP,
     REJECTED_LAST,
+    SMALLEST_FACTOR,
     next_stop,
+    predicted,
     target_of,
 )
 from fecontact.integrate.rodas5p.variational import Vary, keep, restart_columns, write_columns
@@ -58,7 +59,7 @@ from fecontact.integrate.step_loop import (
 )
 from fecontact.system.nodes import ground_motion
 
-_SAFETY, _SMALLEST_FACTOR, _LARGEST_FACTOR = 0.85, 0.1, 2.0
+_SAFETY, _LARGEST_FACTOR = 0.85, 2.0
 _POWER = -1.0 / ERROR_POWER
 # Growth of a step by the iterations that the one before took: a longer one takes more.
 _EASY, _HARD = (3, 5), 1.5
@@ -185,7 +186,7 @@ def _go_on(step, h, data):
 @helper
 def _growth(error):
     """Factor of the length of the next step, by the error of this one."""
-    return min(_LARGEST_FACTOR, max(_SMALLEST_FACTOR, _SAFETY * max(error, 1e-12)**_POWER))
+    return min(_LARGEST_FACTOR, max(SMALLEST_FACTOR, _SAFETY * max(error, 1e-12)**_POWER))
 
 
 @helper
@@ -194,15 +195,7 @@ def _next_length(h, error, numbers, iterations):
     factor = _growth(error)
     if iterations >= _EASY[0]:
         factor = min(factor, _HARD if iterations < _EASY[1] else 1.0)
-    if numbers[LAST_STEP] > 0.0:
-        # Steps that had to shrink will have to shrink on (predictive control, Gustafsson).
-        factor = max(_SMALLEST_FACTOR, min(factor, factor * (h / numbers[LAST_STEP]) * (
-            max(error, 1e-6) ** _POWER / numbers[LAST_ROOT])))
-    if numbers[REJECTED_LAST] != 0.0:
-        factor = min(factor, 1.0)
-    numbers[LAST_STEP], numbers[LAST_ROOT] = h, max(error, 1e-2) ** _POWER
-    numbers[REJECTED_LAST] = 0.0
-    return h * factor
+    return h * predicted(factor, h, max(error, 1e-6) ** _POWER, 1e-2**_POWER, numbers)
 
 
 @helper

@@ -23,6 +23,7 @@ from fecontact.integrate.collocation.tableau import (
     TO_BERNSTEIN,
 )
 from fecontact.integrate.rodas5p import dynamics, stage_solver
+from fecontact.integrate.rodas5p.error_control import largest_energy
 from fecontact.integrate.rodas5p.state import ENERGY, WORST_NODE
 from fecontact.integrate.step_loop import RATES
 from fecontact.system.node_forces import normal_force
@@ -163,19 +164,6 @@ def powers_at(t, y, problem, workspace, out):
         set_losses(j, lost, speed, problem.control.stick_speed[j], out[POWER_COUNT:])
 
 
-@helper
-def _energy_scale(h, control, progress, c):
-    """Energy relative to which errors of work count: the largest so far, or of the step."""
-    m, kinetic = c.accelerations.shape[1], 0.0
-    for k in range(m):
-        kinetic += 0.5 * c.after[m + k] ** 2
-    energy = max(control.energy_scale, max(progress.numbers[ENERGY], kinetic))
-    for k in range(POWER_COUNT):
-        energy = max(energy, max(abs(progress.work[k]), h * abs(c.powers[STAGES, k])))
-    progress.numbers[ENERGY] = energy
-    return energy
-
-
 @routine
 def work_error(step, before, problem, progress, workspace, c):
     """Error of the work of a step in units of what is allowed; fills the powers and their works.
@@ -191,7 +179,10 @@ def work_error(step, before, problem, progress, workspace, c):
             move_back(before, h, c)
         powers_at(min(step.t + POINTS[i] * h, step.latest), c.y, problem, workspace,
                   c.powers[i + 1])
-    energy, missing = _energy_scale(h, problem.control, progress, c), 0.0
+    energy, missing = largest_energy(c.after, problem.control, progress), 0.0
+    for k in range(POWER_COUNT):
+        energy = max(energy, h * abs(c.powers[STAGES, k]))
+    progress.numbers[ENERGY] = energy
     for at in range(LOOKS):
         look(at, c)
         powers_at(min(step.t + PLACES[at] * h, step.latest), c.y, problem, workspace, c.looked)

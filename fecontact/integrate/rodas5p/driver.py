@@ -37,10 +37,10 @@ from fecontact.integrate.rodas5p.state import (
 )
 from fecontact.integrate.rodas5p.variational import Vary, variation_for
 from fecontact.integrate.run_limits import (
-    bounded_period,
     breaks,
     energy_scale,
     largest_motions,
+    longest_step,
     work_of_jump,
 )
 from fecontact.integrate.series.branches import chosen_series, from_state
@@ -245,23 +245,13 @@ def control_for(
         breaks=breaks(system, times)[1],
         levels=_levels(system), ground=bounds,
         rtol=float(rtol), slip_part=SLIP_PART, switch_part=SWITCH_PART,
-        longest=longest_step(system, times, max_step),
+        # The stages of a step meet what is given in time at five times.
+        longest=longest_step(system, times, max_step, 1.0, 4.0),
         speed_scale=system.velocity_scale, energy_scale=energy,
         work=int(work), missed=first_missed.address,
         near=take_near.address if n > FEW else 0,
         many=0 if counts_as_few(n, bounds) else modes_may_switch.address,
         sliders=attend.address if counts.any() else 0, slider_counts=counts)
-
-
-def longest_step(system: ContactSystem, times: Array, max_step: float | None = None) -> float:
-    """A quarter of the shortest period of drive, loads and waves, or the given limit [s].
-
-    The stages of a step meet what is given in time at five times; longer steps could miss it.
-    Contacts that they miss are found, however long they are.
-    """
-    start, end = float(times[0]), float(times[-1])
-    longest = min(end - start, bounded_period(system, times, max_step) / 4.0)
-    return longest if max_step is None else min(longest, float(max_step))
 
 
 def _levels(system: ContactSystem) -> Array:

@@ -159,12 +159,11 @@ def slip_error(error, problem, progress, workspace):
 
 
 @helper
-def _energy_scale(control, progress, workspace):
+def largest_energy(after, control, progress):
     """The largest of kinetic energy, work of a power and the energy scale so far [J]."""
-    m = len(control.largest)
     kinetic = 0.0
-    for i in range(m):
-        kinetic += 0.5 * workspace.after[m + i] ** 2
+    for i in range(len(control.largest), 2 * len(control.largest)):
+        kinetic += 0.5 * after[i] ** 2
     energy = max(max(progress.numbers[ENERGY], kinetic), control.energy_scale)
     for k in range(POWER_COUNT):
         energy = max(energy, abs(progress.work[k]))
@@ -289,7 +288,7 @@ def work_error(step, problem, progress, workspace):
     control = problem.control
     _set_powers(step, problem, progress, workspace)
     return _quadrature_error(step.h, workspace) / (
-        control.rtol * _energy_scale(control, progress, workspace))
+        control.rtol * largest_energy(workspace.after, control, progress))
 
 
 @routine

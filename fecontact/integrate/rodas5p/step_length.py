@@ -38,16 +38,21 @@ def growth(root):
 @helper
 def next_length(h, root, longest, numbers):
     """Length of the step after an accepted one of the length h, which ``numbers`` take note of."""
-    factor = growth(root)
+    return min(h * predicted(growth(root), h, root, _LARGEST_LAST_ROOT, numbers), longest)
+
+
+@helper
+def predicted(factor, h, root, largest_root, numbers):
+    """``factor`` of the length of the next step, or less by the trend; ``numbers`` take note."""
     if numbers[LAST_STEP] > 0.0:
         # Steps that had to shrink will have to shrink on.
         trend = h / numbers[LAST_STEP] * (root / numbers[LAST_ROOT])
         factor = max(SMALLEST_FACTOR, min(factor, factor * trend))
     if numbers[REJECTED_LAST] != 0.0:
         factor = min(factor, 1.0)
-    numbers[LAST_STEP], numbers[LAST_ROOT] = h, min(root, _LARGEST_LAST_ROOT)
+    numbers[LAST_STEP], numbers[LAST_ROOT] = h, min(root, largest_root)
     numbers[REJECTED_LAST] = 0.0
-    return min(h * factor, longest)
+    return factor
 
 
 @helper

@@ -116,8 +116,8 @@ def ground_points(
         raise InputError(f"deflection_path: gap has {np.size(given)} values for {count} contact "
                          f"nodes; give one number or one per node.")
     return [_points(face.matrix, face.positions, np.broadcast_to(given, count), FlatGround(d),
-                    _by_group("normal", NormalLaw, normal, face.groups),
-                    _by_group("friction", FrictionLaw, friction, face.groups), face.tributary)]
+                    [*_by_group("normal", NormalLaw, normal, face.groups)],
+                    [*_by_group("friction", FrictionLaw, friction, face.groups)], face.tributary)]
 
 
 def interface_points(
@@ -225,14 +225,10 @@ def _sliders(points: ContactPoints, groups: Sequence[LawGroup]) -> tuple[Array, 
 
 def _by_group(
     what: str, kind: type[Any], given: Any, groups: Sequence[tuple[str, int]]
-) -> list[tuple[int, Any]]:
-    """Number of points and law of each group, or of all with one law."""
-    return list(_named(what, kind, given, groups)) if given is not None else []
-
-
-def _named(
-    what: str, kind: type[Any], given: Any, groups: Sequence[tuple[str, int]]
 ) -> Iterator[tuple[int, Any]]:
+    """Number of points and law of each group, or of all with one law; nothing without laws."""
+    if given is None:
+        return
     require_kind("deflection_path", (kind, Mapping), **{what: given})
     if isinstance(given, kind):
         yield sum(count for _, count in groups), given
