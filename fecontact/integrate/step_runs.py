@@ -16,6 +16,8 @@ from fecontact.integrate.trajectory import Status
 
 # Steps of a piece of a run: at first, at least and at most.
 _FEWEST, _MOST_STEPS = 200, 10_000_000
+# Time between reports [s].
+_SECONDS = 0.2
 # How a run ended, by what the step loop returns.
 ENDS = {step_loop.FINISHED: Status.FINISHED, step_loop.MINIMUM_STEP: Status.MINIMUM_STEP,
         step_loop.NOT_FINITE: Status.NOT_FINITE, step_loop.STOPPED: Status.EVENT,
@@ -111,10 +113,10 @@ class StepRun:
 
 
 def finish(
-    run: StepRun, progress: Callable[[float], None] | None = None, seconds: float = 0.2,
+    run: StepRun, progress: Callable[[float], None] | None = None,
     keep: Callable[[], None] | None = None,
 ) -> int:
-    """Go on to the end or a failure, reporting about every ``seconds``; the status.
+    """Go on to the end or a failure, with reports now and then; the status.
 
     ``keep`` is called after every piece of the run.
     """
@@ -123,7 +125,7 @@ def finish(
         begin, first = clock.perf_counter(), run.attempts
         status, done, passed = step_loop.RUNNING, 0, 0.0
         # A call returns early when its events fill the table.
-        while status == step_loop.RUNNING and done < steps and passed < seconds:
+        while status == step_loop.RUNNING and done < steps and passed < _SECONDS:
             status = run.advance(steps - done)
             done, passed = run.attempts - first, clock.perf_counter() - begin
         if progress is not None:
@@ -132,7 +134,7 @@ def finish(
             return status
         if keep is not None:
             keep()
-        steps = int(np.clip(done * seconds / max(passed, 1e-9), _FEWEST,
+        steps = int(np.clip(done * _SECONDS / max(passed, 1e-9), _FEWEST,
                             min(10 * steps, _MOST_STEPS)))
 
 

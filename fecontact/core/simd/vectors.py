@@ -60,7 +60,7 @@ def _spread(builder: Any, number: Any, kind: Any = _VECTOR) -> Any:
 
 
 def _code(build: Callable[..., Any]) -> Callable[..., Any]:
-    """What makes the code of an intrinsic by a builder from its arguments alone."""
+    """Code of an intrinsic that a builder makes of its arguments alone."""
     return lambda context, builder, signature, args: build(builder, *args)
 
 
