@@ -1,15 +1,13 @@
 """The section ``[branch]`` of a study file."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
+from fecontact.bifurcation.range_settings import RangeSettings
 from fecontact.core.checks import as_count
-from fecontact.core.errors import InputError, choices, require_finite, require_positive
+from fecontact.core.errors import InputError, choices, require_positive
 from fecontact.core.tables import convert_fields
 from fecontact.core.units import Unit
-
-if TYPE_CHECKING:
-    from fecontact.bifurcation.continuation.problem import ContinuationOptions
 
 # Limits of the mesh intervals or segments and of the runs beneath a diagram, against typing errors.
 _MOST_PIECES, _MOST_RUNS = 10_000, 100_000
@@ -18,7 +16,7 @@ SWITCHES = ("Hopf", "period doubling", "branch point", "Neimark-Sacker")
 
 
 @dataclass(frozen=True)
-class BranchSettings:
+class BranchSettings(RangeSettings):
     """``[branch]``: solutions over a parameter.
 
     See :func:`fecontact.bifurcation.equilibrium_branch`.
@@ -119,30 +117,16 @@ class BranchSettings:
         if self.poincare_scan < 0 or self.poincare_scan == 1:
             raise InputError(f"BranchSettings: poincare_scan = {self.poincare_scan} must be zero, "
                              f"for none, or at least 2.")
-        if self.step > self.largest_step:
-            raise InputError(f"BranchSettings: step = {self.step:g} must not be above largest_step "
-                             f"= {self.largest_step:g}.")
+        self.require_range()
         for kind in self.switch:
             if kind not in SWITCHES:
                 raise InputError(f"BranchSettings: switch = '{kind}' is not known; choose from "
                                  f"{choices(SWITCHES)}.")
-        if self.start is not None:
-            require_finite("BranchSettings", start=self.start)
         for name, most in (("intervals", _MOST_PIECES), ("segments", _MOST_PIECES),
                            ("harmonics", _MOST_PIECES), ("poincare_scan", _MOST_RUNS)):
             if getattr(self, name) > most:
                 raise InputError(f"BranchSettings: {name} = {getattr(self, name)} must be at most "
                                  f"{most}.")
-        if self.bounds is None:
-            return
-        low, high = self.bounds
-        require_finite("BranchSettings: the bounds", low=low, high=high)
-        if not low < high:
-            raise InputError(f"BranchSettings: bounds = {list(self.bounds)} must be two values, "
-                             f"the smaller one first.")
-        if self.start is not None and not low <= self.start <= high:
-            raise InputError(f"BranchSettings: start = {self.start:g} must lie in the bounds, "
-                             f"{low:g} to {high:g}.")
 
     @property
     def checked_bounds(self) -> tuple[float, float]:
@@ -159,16 +143,3 @@ class BranchSettings:
             raise InputError("[branch] lacks the key 'parameter', the dotted name of the number "
                              "that changes, such as 'ground.speed'.")
         return self.parameter
-
-    @property
-    def first(self) -> float:
-        """Value at which the first branch begins."""
-        return self.checked_bounds[0] if self.start is None else self.start
-
-    def options(self) -> "ContinuationOptions":
-        """Options of the continuation."""
-        from fecontact.bifurcation.continuation.problem import ContinuationOptions
-
-        return ContinuationOptions(step=self.step, largest_step=self.largest_step,
-                                   points=self.points,
-                                   bounds=self.checked_bounds)

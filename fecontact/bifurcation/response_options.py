@@ -5,11 +5,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from fecontact.core.errors import InputError, require_finite, require_positive
+from fecontact.bifurcation.range_settings import RangeSettings
+from fecontact.core.errors import InputError, require_positive
 from fecontact.core.tables import convert_fields
 
 if TYPE_CHECKING:
-    from fecontact.bifurcation.continuation.problem import ContinuationOptions
     from fecontact.bifurcation.harmonic.method import HarmonicBalance
     from fecontact.bifurcation.orbit_methods import Method
 
@@ -17,7 +17,7 @@ _FREQUENCY = "frequency_hz"
 
 
 @dataclass(frozen=True)
-class ResponseSettings:
+class ResponseSettings(RangeSettings):
     """``[response]``: frequency responses, by default by harmonic balance.
 
     See :func:`fecontact.bifurcation.frequency_response`; harmonics, samples, preload and what is
@@ -112,13 +112,10 @@ class ResponseSettings:
         convert_fields(self)
         require_positive("ResponseSettings", step=self.step, largest_step=self.largest_step,
                          points=self.points)
-        if self.step > self.largest_step:
-            raise InputError(f"ResponseSettings: step = {self.step:g} must not be above "
-                             f"largest_step = {self.largest_step:g}.")
         self._check_levels()
         self._check_amplitudes()
         _ = self.also_observed
-        self._check_bounds()
+        self.require_range()
         self._check_engine_order()
         _ = self.harmonic_balance(), self.orbit_method()
 
@@ -167,22 +164,12 @@ class ResponseSettings:
                              "sector of a wheel, engine_order; leave it out, and see "
                              "wheel_stability in Python.")
 
-    def _check_bounds(self) -> None:
-        if self.bounds is None:
-            return
-        low, high = self.bounds
-        require_finite("ResponseSettings: bounds", low=low, high=high)
-        if not low < high:
-            raise InputError(f"ResponseSettings: bounds = {list(self.bounds)} must be two values, "
-                             f"the smaller one first.")
-        if self.over_frequency and low <= 0.0:
+    def require_range(self) -> None:
+        """Raise InputError unless the steps, the bounds and the start go together."""
+        super().require_range()
+        if self.bounds is not None and self.over_frequency and self.bounds[0] <= 0.0:
             raise InputError(f"ResponseSettings: bounds = {list(self.bounds)} must be frequencies "
                              f"above zero [Hz].")
-        if self.start is not None:
-            require_finite("ResponseSettings", start=self.start)
-            if not low <= self.start <= high:
-                raise InputError(f"ResponseSettings: start = {self.start:g} must lie in the "
-                                 f"bounds, {low:g} to {high:g}.")
 
     @property
     def over_frequency(self) -> bool:
@@ -196,11 +183,6 @@ class ResponseSettings:
             raise InputError(f"[response] lacks the key 'bounds', the least and largest value of "
                              f"{self.parameter}; give it, or --bounds LOW HIGH.")
         return self.bounds
-
-    @property
-    def first(self) -> float:
-        """First value of the parameter."""
-        return self.checked_bounds[0] if self.start is None else self.start
 
     @property
     def also_observed(self) -> tuple[tuple[str | int, str], ...]:
@@ -240,13 +222,6 @@ class ResponseSettings:
                                None if self.stability == "none" or self.engine_order is not None
                                else self.stability,
                                self.sampling_tolerance)
-
-    def options(self) -> "ContinuationOptions":
-        """Options of the continuation."""
-        from fecontact.bifurcation.continuation.problem import ContinuationOptions
-
-        return ContinuationOptions(step=self.step, largest_step=self.largest_step,
-                                   points=self.points, bounds=self.checked_bounds)
 
 
 def flat_levels(table: Any) -> Any:
