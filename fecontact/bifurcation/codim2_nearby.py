@@ -17,9 +17,10 @@ from fecontact.bifurcation.codim2_switch import (
     values_at,
     widths_of,
 )
+from fecontact.bifurcation.continuation.attempts import first_found
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
-from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
+from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint, attributes_of
 from fecontact.bifurcation.continuation.points import (
     DoubleHopfPoint,
     FoldPoint,
@@ -40,7 +41,7 @@ from fecontact.bifurcation.orbit_methods import Collocation
 from fecontact.bifurcation.orbits.branches import orbit_branch
 from fecontact.bifurcation.orbits.curves.codim2 import orbit_curve
 from fecontact.bifurcation.orbits.restored import over_first
-from fecontact.core.errors import AnalysisError, FecontactError, InputError, choices
+from fecontact.core.errors import InputError, choices
 from fecontact.core.ties import first_largest, first_least
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
@@ -68,19 +69,15 @@ def fold_at_bautin(field: VectorField, point: BranchPoint, parameter: str) -> Fo
         If no fold is found on either side.
     """
     values, index = values_at(field, point, parameter), field.index(parameter)
-    width, last = widths_of(point), None
-    for away in _AWAY:
-        for side in (1.0, -1.0):
-            values[index] = point.u[-2] + side * away * width[parameter]
-            try:
-                found = _fold(field, point, values.copy(), width[point.branch.parameter_name])
-            except FecontactError as error:
-                last = error
-                continue
-            if found is not None:
-                return found
-    raise AnalysisError(f"{point.place}: no fold of orbits was found beside it; follow orbits from "
-                        f"a Hopf point near it to their fold, and start from there.") from last
+    width = widths_of(point)
+
+    def find(away: float) -> FoldPoint | None:
+        values[index] = point.u[-2] + away * width[parameter]
+        return _fold(field, point, values.copy(), width[point.branch.parameter_name])
+
+    return first_found((side * away for away in _AWAY for side in (1.0, -1.0)), find,
+                       f"{point.place}: no fold of orbits was found beside it; follow orbits from "
+                       f"a Hopf point near it to their fold, and start from there.")
 
 
 def _fold(
@@ -162,7 +159,6 @@ def _first(
     AnalysisError
         If there is none; ``missing`` says so.
     """
-    last: FecontactError | None = None
     begin = other_curve(field, point, parameter)[0]
     width, first = widths_of(point), point.branch.parameter_name
     problem, u, _ = equilibrium_curve(begin, (first, parameter), square, width, None)
@@ -174,20 +170,18 @@ def _first(
     across = _across(tangent, first, parameter, width)
     tried = [(over, at) for over in sorted(width, key=lambda name: name != across)
              for at in beside]
-    for over, at in tried:
+
+    def find(attempt: tuple[str, BranchPoint]) -> BranchPoint | None:
+        over, at = attempt
         reach = _ABOUT * width[over]
-        try:
-            hopf_point = _hopf_at(field, begin, at, (first, parameter), over)
-            branch = orbit_branch(
-                field, hopf_point, method=Collocation(_INTERVALS), options=options,
-                bounds=(hopf_point.parameter - reach, hopf_point.parameter + reach),
-                width=width[over])
-        except FecontactError as error:
-            last = error
-            continue
-        if wanted(branch):
-            return _over(field, branch.points[-1], first, width[first])
-    raise AnalysisError(f"{point.place}: {missing}") from last
+        hopf_point = _hopf_at(field, begin, at, (first, parameter), over)
+        branch = orbit_branch(
+            field, hopf_point, method=Collocation(_INTERVALS), options=options,
+            bounds=(hopf_point.parameter - reach, hopf_point.parameter + reach),
+            width=width[over])
+        return _over(field, branch.points[-1], first, width[first]) if wanted(branch) else None
+
+    return first_found(tried, find, f"{point.place}: {missing}")
 
 
 def _across(tangent: Array, first: str, second: str, width: Mapping[str, float]) -> str:
@@ -231,9 +225,7 @@ def _hopf_at(
     there = Equilibrium(field, values, state)
     w = float(np.sqrt(at.u[field.dimension]))
     found = hopf(field, state, values, default_scales(there), 1j * w)
-    header = BranchHeader(over, {
-        "state_names": list(field.state_names), "parameter_names": list(field.parameters),
-        "parameter_values": values})
+    header = BranchHeader(over, attributes_of(field, values))
     u = np.append(state, values[field.index(over)])
     made = special_point(u, np.zeros_like(u), {"state": state}, "Hopf", {
         "angular_frequency": found.angular_frequency, "eigenvector": found.eigenvector,
@@ -243,9 +235,7 @@ def _hopf_at(
     return made
 
 
-def of_doubled(
-    field: VectorField, point: BranchPoint, parameter: str, kind: str
-) -> BranchPoint:
+def of_doubled(field: VectorField, point: BranchPoint, kind: str) -> BranchPoint:
     """A fold or a Neimark-Sacker point of the doubled orbits beside a point of codimension two.
 
     At a generalised period doubling, where the multiplier -1 obeys b a + c a^3 + e a^5 on the
@@ -265,38 +255,24 @@ def of_doubled(
     attributes |= {"parameters": [first, second]}
     tangent = tangent_at(problem, u, 1.0)
     over = _across(tangent, first, second, width)
-    reach, last = _ABOUT * width[over], None
-    for at in _along(problem, u, tangent, first, attributes=attributes):
+    reach = _ABOUT * width[over]
+
+    def find(at: BranchPoint) -> BranchPoint | None:
         begin = _over(field, over_first(at, "period doubling"), over, width[over])
-        try:
-            branch = orbit_branch(field, begin, options=replace(_TORI, stop_at=(kind,)),
-                                  bounds=(begin.parameter - reach, begin.parameter + reach))
-        except FecontactError as error:
-            last = error
-            continue
-        if branch.points[-1].kind == kind:
-            return _over(field, branch.points[-1], first, width[first])
-    raise AnalysisError(f"{point.place}: no {kind} of doubled orbits was found beside it; follow "
-                        f"these from a period doubling near it.") from last
+        branch = orbit_branch(field, begin, options=replace(_TORI, stop_at=(kind,)),
+                              bounds=(begin.parameter - reach, begin.parameter + reach))
+        end = branch.points[-1]
+        return _over(field, end, first, width[first]) if end.kind == kind else None
+
+    return first_found(_along(problem, u, tangent, first, attributes=attributes), find,
+                       f"{point.place}: no {kind} of doubled orbits was found beside it; follow "
+                       f"these from a period doubling near it.")
 
 
-def of_quadrupled(
-    field: VectorField, point: BranchPoint, parameter: str, side: float
-) -> BranchPoint:
-    """A fold of orbits of four periods at a side; see :func:`folds_at_quarter`."""
-    found = folds_at_quarter(field, point, parameter, side)
-    return _over(field, found, *_first_of(point))
-
-
-def of_tripled(field: VectorField, point: BranchPoint, parameter: str) -> BranchPoint:
-    """A fold of orbits of three periods; see :func:`fold_at_third`."""
-    return _over(field, fold_at_third(field, point, parameter), *_first_of(point))
-
-
-def _first_of(point: BranchPoint) -> tuple[str, float]:
-    """Name and width of the first parameter of a curve of orbits."""
-    return (point.branch.parameter_name,
-            float(np.asarray(point.branch.attributes["scales"])[-1]))
+def _over_that_of(field: VectorField, point: BranchPoint, found: BranchPoint) -> BranchPoint:
+    """An orbit beside a point of a curve, as one of a branch over the curve's first parameter."""
+    return _over(field, found, point.branch.parameter_name,
+                 float(np.asarray(point.branch.attributes["scales"])[-1]))
 
 
 _Found = Callable[[VectorField, BranchPoint, str], BranchPoint]
@@ -308,19 +284,23 @@ BEGIN: Mapping[str, Mapping[str, _Found]] = {
     "double Hopf": {"Neimark-Sacker": nearby_torus},
     "Bogdanov-Takens": {"homoclinic": nearby_homoclinic},
     "generalised period doubling": {
-        "fold": lambda field, point, parameter: of_doubled(field, point, parameter, "fold")},
+        "fold": lambda field, point, parameter: of_doubled(field, point, "fold")},
     "resonance 1:1": {
         "fold": lambda field, point, parameter: over_first(point, "fold"),
         "Neimark-Sacker": lambda field, point, parameter: over_first(point, "Neimark-Sacker")},
     "resonance 1:2": {
         "period doubling": lambda field, point, parameter: over_first(point, "period doubling"),
         "Neimark-Sacker": lambda field, point, parameter: of_doubled(
-            field, point, parameter, "Neimark-Sacker")},
+            field, point, "Neimark-Sacker")},
     "resonance 1:3": {
-        "fold": of_tripled, "neutral saddle": neutral_saddle_at_third},
+        "fold": lambda field, point, parameter: _over_that_of(
+            field, point, fold_at_third(field, point, parameter)),
+        "neutral saddle": neutral_saddle_at_third},
     "resonance 1:4": {
-        "fold": lambda field, point, parameter: of_quadrupled(field, point, parameter, 1.0),
-        "other fold": lambda field, point, parameter: of_quadrupled(field, point, parameter, -1.0)},
+        "fold": lambda field, point, parameter: _over_that_of(
+            field, point, folds_at_quarter(field, point, parameter, 1.0)),
+        "other fold": lambda field, point, parameter: _over_that_of(
+            field, point, folds_at_quarter(field, point, parameter, -1.0))},
 }
 # Points of which a curve of equilibria is followed without a curve being named.
 _OF_EQUILIBRIA = ("zero-Hopf", "double Hopf", "Bogdanov-Takens")

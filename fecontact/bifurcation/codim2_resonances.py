@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.attempts import first_found
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import FoldPoint, special_point
@@ -54,21 +55,18 @@ def folds_at_quarter(
     towards = at.towards(-C)
     place = first_least(np.abs(towards))
     turn = np.exp(0.25j * np.angle(D / C))
-    last: FecontactError | None = None
-    for away in AWAY:
+
+    def find(away: float) -> FoldPoint | None:
         shift = away * towards
         size = float(np.sqrt(abs(at.exponent(shift)) / (abs(C) + abs(D))))
-        try:
-            branch = _followed(at, at.motion(shift, size * turn), place)
-        except FecontactError as error:
-            last = error
-            continue
-        for end in branch.of_kind("fold"):
+        for end in _followed(at, at.motion(shift, size * turn), place).of_kind("fold"):
             shift[place] = (end.parameter - at.u[place - 2]) / at.widths[place]
             if (at.exponent(shift) / -C).imag * side > 0.0:
                 return end
-    raise AnalysisError(f"{point.place}: no fold of orbits of four periods was found beside it; "
-                        f"follow these from a run near it.") from last
+        return None
+
+    return first_found(AWAY, find, f"{point.place}: no fold of orbits of four periods was found "
+                                   f"beside it; follow these from a run near it.")
 
 
 def fold_at_third(field: VectorField, point: BranchPoint, parameter: str) -> FoldPoint:
@@ -121,18 +119,15 @@ def neutral_saddle_at_third(
     """
     at = StrongResonance(field, point, parameter, 3)
     towards = at.towards(1j)
-    last: FecontactError | None = None
-    for shift in (side * away * towards for away in AWAY for side in (1.0, -1.0)):
-        try:
-            branch = _followed(at, of_several(at, shift), 1, replace(_SEARCH, points=1))
-        except FecontactError as error:
-            last = error
-            continue
-        found = branch.points[0]
-        if not is_single(found, 3):
-            return special_point(found.u, found.tangent, found.values, "neutral saddle", {},
-                                 found.header)
-    raise AnalysisError(f"{point.place}: no saddle of three periods was found beside it.") from last
+
+    def find(away: float) -> BranchPoint | None:
+        motion = of_several(at, away * towards)
+        found = _followed(at, motion, 1, replace(_SEARCH, points=1)).points[0]
+        return None if is_single(found, 3) else special_point(
+            found.u, found.tangent, found.values, "neutral saddle", {}, found.header)
+
+    return first_found((side * away for away in AWAY for side in (1.0, -1.0)), find,
+                       f"{point.place}: no saddle of three periods was found beside it.")
 
 
 def _followed(

@@ -37,6 +37,12 @@ _NORMAL_FORMS: Mapping[str, tuple[str, ...]] = {
                     ("p11", "p12", "p21", "p22"))}
 
 
+def attributes_of(field: VectorField, values: Array) -> dict[str, Any]:
+    """Names of the states and parameters of a field, with their values, as a branch keeps them."""
+    return {"state_names": list(field.state_names), "parameter_names": list(field.parameters),
+            "parameter_values": values}
+
+
 def as_field(given: VectorField | ContactSystem, known: Mapping[str, Any]) -> VectorField:
     """The field of a branch with the attributes ``known``, from the field or its contact system.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch, regular, shortened
-from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint, attributes_of
 from fecontact.bifurcation.continuation.points import CrossingPoint
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
@@ -109,7 +109,7 @@ def equilibrium_branch(
     index = field.index(parameter)
     problem, chosen = _problem(field, begin, index, options, bounds, scales, width)
     u = np.append(begin.state, begin.values[index])
-    attributes = _attributes(field, begin)
+    attributes = attributes_of(field, begin.values)
     if crossed is not None and tangent is not None:
         return _crossing(problem, crossed, tangent, chosen, parameter, both is not False,
                          attributes)
@@ -171,8 +171,3 @@ def _problem(
     sizes = default_scales(begin) if scales is None else sizes_of(scales, begin.state)[0]
     limits = _GROWTH * sizes if scales is None else None
     return EquilibriumProblem(field, begin.values, index, sizes, width, limits), chosen
-
-
-def _attributes(field: VectorField, begin: Equilibrium) -> dict[str, Any]:
-    return {"state_names": list(field.state_names), "parameter_names": list(field.parameters),
-            "parameter_values": begin.values}

@@ -158,9 +158,7 @@ class EventOrbit(FreeParameters, FloquetTests, Problem):
         if linearisation.least.left > _CLEAR:
             self._require_return(u, float(np.abs(found.multipliers).max()))
         states = linearisation.samples
-        return {"period": self.period(u), "multipliers": found.multipliers,
-                "unstable": found.unstable, "stable": found.stable,
-                "trivial_error": found.trivial_error, "mesh": np.array([0.0, 1.0]),
+        return {"period": self.period(u), **found.stored, "mesh": np.array([0.0, 1.0]),
                 "minimum": states.min(axis=0), "maximum": states.max(axis=0)}
 
     def _require_return(self, u: Array, growth: float) -> None:
@@ -189,18 +187,6 @@ class EventOrbit(FreeParameters, FloquetTests, Problem):
         """Test functions of the multipliers, and the smallest margin of the phases' conditions."""
         return {**super().tests(u, linearisation, tangent),
                 ADMISSIBLE: linearisation.least.left}
-
-    def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
-        """Range of the number of unstable multipliers, given their errors."""
-        found: tuple[int, int] = linearisation.floquet.unstable_range
-        return found
-
-    def examine(
-        self, kind: str, u: Array, linearisation: Any, tangent: Array
-    ) -> dict[str, Any] | None:
-        """The kind of a torus bifurcation; None for a neutral saddle."""
-        found: dict[str, Any] | None = linearisation.floquet.confirmed(kind)
-        return found
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[EventOrbit, Array, Array]":
         """Problem with the parameter values of u; u and the tangent are unchanged."""

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.bifurcation.continuation.newton import Solution, completed, weighted_norm
-from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint, attributes_of
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
@@ -202,9 +202,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
             found["orders"] = np.array(self.orders)
         if self.waves is not None:
             found |= self.waves.repeats.attributes()
-        return {**found, "state_names": list(field.state_names),
-                "parameter_names": list(field.parameters),
-                "parameter_values": self.values, "scales": self.scales,
+        return {**found, **attributes_of(field, self.values), "scales": self.scales,
                 "harmonics": self.harmonics, "samples": self.samples,
                 "stability": self.stability or "none", "periods": self.periods,
                 "displacements": layout.displacements, "memory": layout.memory,
@@ -266,11 +264,8 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
         """Period, stability, the errors of the truncation and the extremes of the states."""
-        known: dict[str, Any] = {}
-        if self.stability is not None:
-            found = linearisation.floquet
-            known = {"multipliers": [found.multipliers], "unstable": [found.unstable],
-                     "stable": [found.stable], "trivial_error": [found.trivial_error]}
+        known = {} if self.stability is None else {
+            name: [value] for name, value in linearisation.floquet.stored.items()}
         forces, mean = linearisation._samples()
         return self.stored(u[None], linearisation.memory[None], forces[None], mean[None],
                            self.scales[None, self.layout.columns], known)[0]
@@ -374,10 +369,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Range of the number of unstable multipliers, given their errors."""
-        if self.stability is None:
-            return 0, 0
-        found: tuple[int, int] = linearisation.floquet.unstable_range
-        return found
+        return (0, 0) if self.stability is None else super().unstable_range(linearisation, values)
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
@@ -388,10 +380,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         """
         if kind == "branch point" and self._halves_meet(u, tangent):
             return {"kind": HALVING}
-        if kind == "fold":
-            return {}
-        found: dict[str, Any] | None = linearisation.floquet.confirmed(kind)
-        return found
+        return {} if kind == "fold" else super().examine(kind, u, linearisation, tangent)
 
     def _halves_meet(self, u: Array, tangent: Array) -> bool:
         """Whether an orbit has even harmonics alone, while the branch adds odd ones."""

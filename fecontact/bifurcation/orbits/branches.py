@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.attempts import first_that_goes
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import HopfPoint, require_no_family
@@ -27,7 +28,7 @@ from fecontact.bifurcation.orbits.curves.resonant import (
     is_single,
     of_several,
 )
-from fecontact.bifurcation.orbits.discretisation import Request, first_that_goes
+from fecontact.bifurcation.orbits.discretisation import Request
 from fecontact.bifurcation.orbits.discretisations import (
     DISCRETISATIONS,
     discretisation_by,
@@ -214,7 +215,7 @@ def _around(point: BranchPoint, name: str, request: Request) -> Branch:
         return branch
 
     def go(half: Request) -> Branch:
-        return first_that_goes(iter(AWAY), lambda away: beside(half, away))
+        return first_that_goes(AWAY, lambda away: beside(half, away))
 
     if not request.both:
         return go(chosen)

@@ -6,19 +6,19 @@ of them; :mod:`fecontact.bifurcation.orbits.discretisations` lists the methods.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.attempts import first_that_goes
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.orbits import starts
 from fecontact.bifurcation.orbits.orbit_points import OrbitPoints
-from fecontact.core.errors import FecontactError, InputError
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField
 
@@ -26,8 +26,6 @@ from fecontact.system.fields.vector_field import VectorField
 _FIRST_STEPS = (1.0, 0.2, 0.04)
 # Mesh on which a start is put for methods without a mesh of their own.
 _INTERVALS, _DEGREE = 200, 4
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,17 +130,6 @@ class Discretisation(OrbitPoints):
             (problem, u, tangent), method, options, None))
 
 
-def first_that_goes(attempts: Iterator[T], go: Callable[[T], Branch]) -> Branch:
-    """Branch of the first attempt that succeeds."""
-    failed: FecontactError = InputError("There is nothing to start from.")
-    for attempt in attempts:
-        try:
-            return go(attempt)
-        except FecontactError as error:
-            failed = error
-    raise failed
-
-
 def stepped_off(
     start: tuple[Any, Array, Array], request: Request,
     follow: Callable[[Array, Array, ContinuationOptions], Branch],
@@ -158,4 +145,4 @@ def stepped_off(
         step = max(part * request.options.step, request.options.smallest_step)
         return follow(u + step * tangent, tangent, replace(request.options, step=step))
 
-    return first_that_goes(iter(_FIRST_STEPS), go)
+    return first_that_goes(_FIRST_STEPS, go)

@@ -85,6 +85,12 @@ class Floquet:
         """Whether all perturbations decay."""
         return self.unstable == 0
 
+    @property
+    def stored(self) -> dict[str, Any]:
+        """Values that the points of branches store, by name."""
+        return {"multipliers": self.multipliers, "unstable": self.unstable,
+                "stable": self.stable, "trivial_error": self.trivial_error}
+
     def tests(self, slope: float) -> dict[str, float]:
         """Test functions of special points of a branch.
 
@@ -298,6 +304,18 @@ class FloquetTests:
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Test functions of 'period doubling', 'torus' and 'branch point'."""
         found: dict[str, float] = linearisation.floquet.tests(float(tangent[-1] / self.scales[-1]))
+        return found
+
+    def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
+        """Range of the number of unstable multipliers, given their errors."""
+        found: tuple[int, int] = linearisation.floquet.unstable_range
+        return found
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> dict[str, Any] | None:
+        """The kind of a torus bifurcation; None for a neutral saddle."""
+        found: dict[str, Any] | None = linearisation.floquet.confirmed(kind)
         return found
 
     def lost(self, values: Mapping[str, Any]) -> bool:

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.bifurcation.continuation.newton import weighted_norm, weighted_product
+from fecontact.bifurcation.continuation.point import attributes_of
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.linalg import condensation
@@ -109,10 +110,8 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
 
     def attributes(self) -> dict[str, Any]:
         """Attributes of a branch from which the problem of its points is restored."""
-        found = {"state_names": list(self.field.state_names),
-                 "parameter_names": list(self.field.parameters), "parameter_values": self.values,
-                 "scales": self.scales, "segments": len(self.mesh) - 1, "periods": self.periods,
-                 "rtol": self.rtol}
+        found = {**attributes_of(self.field, self.values), "scales": self.scales,
+                 "segments": len(self.mesh) - 1, "periods": self.periods, "rtol": self.rtol}
         if self.derivative_rtol is not None:
             found["derivative_rtol"] = self.derivative_rtol
         if self.limits is not None:
@@ -191,13 +190,10 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
         if not self.solver.smooth:
             self._require_return(u)
             linearisation.require_certain()
-        stability = linearisation.floquet
         states = linearisation.paths.reshape(-1, self.field.dimension)
         low, high = states.min(axis=0), states.max(axis=0)
         self.noted[:] = [(u, (high - low) / 2.0)]
-        return {"period": self.period(u), "multipliers": stability.multipliers,
-                "unstable": stability.unstable, "stable": stability.stable,
-                "trivial_error": stability.trivial_error, "mesh": self.mesh,
+        return {"period": self.period(u), **linearisation.floquet.stored, "mesh": self.mesh,
                 "minimum": low, "maximum": high}
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
@@ -223,17 +219,6 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
         gaps = self.linearise(u).residual[: len(u) - self.common].reshape(-1, d)
         if np.abs(gaps / self.scales[:d]).max() > _RETURNS:
             raise AnalysisError("The set-valued motion jumps there: an event appears or vanishes.")
-
-    def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
-        """Range of the number of unstable multipliers, given their errors."""
-        found: tuple[int, int] = linearisation.floquet.unstable_range
-        return found
-
-    def examine(
-        self, kind: str, u: Array, linearisation: Any, tangent: Array
-    ) -> dict[str, Any] | None:
-        """The kind of a torus bifurcation; None for a neutral saddle."""
-        return linearisation.floquet.confirmed(kind)
 
     def met_again(
         self, origin: "Problem", u: Array, tangent: Array, like: Array, heading: Array,

@@ -5,10 +5,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.attempts import first_that_goes
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.newton import damped_newton
-from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint, attributes_of
 from fecontact.bifurcation.continuation.points import NeimarkSackerPoint
 from fecontact.bifurcation.continuation.problem import (
     ContinuationOptions,
@@ -29,7 +30,7 @@ from fecontact.bifurcation.tori.motion import torus_motion
 from fecontact.bifurcation.tori.problem import TorusProblem
 from fecontact.bifurcation.tori.series import with_orders
 from fecontact.core.checks import require_flags, require_kind
-from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
+from fecontact.core.errors import AnalysisError, InputError, require_finite
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.field_runs.field_run import FieldRun
@@ -216,17 +217,15 @@ def _from_neimark_sacker(
     tangent = np.zeros_like(u)
     tangent[: problem.size] = leaving.reshape(-1)
     tangent /= np.sqrt(problem.weights() @ tangent**2)
-    failed: FecontactError = InputError("There is nothing to start from.")
-    for part in _FIRST_STEPS:
+
+    def go(part: float) -> Branch:
         step = min(max(part * options.step, options.smallest_step), options.largest_step)
         beside = u + step * tangent
-        try:
-            return _followed(replace(problem, reference=problem.coefficients(beside).copy()),
-                             beside, tangent, replace(options, step=step),
-                             point.branch.parameter_name, 1.0, False)
-        except FecontactError as error:
-            failed = error
-    raise failed
+        return _followed(replace(problem, reference=problem.coefficients(beside).copy()),
+                         beside, tangent, replace(options, step=step),
+                         point.branch.parameter_name, 1.0, False)
+
+    return first_that_goes(_FIRST_STEPS, go)
 
 
 def _from_motion(
@@ -307,10 +306,8 @@ def _followed(
     problem: TorusProblem, u: Array, tangent: Array | None, options: ContinuationOptions,
     name: str, direction: float, both: bool,
 ) -> Branch:
-    field = problem.field
     attributes: dict[str, Any] = {
-        "state_names": list(field.state_names), "parameter_names": list(field.parameters),
-        "parameter_values": problem.values, "scales": problem.scales,
+        **attributes_of(problem.field, problem.values), "scales": problem.scales,
         "torus_harmonics": np.array(problem.orders), "torus_samples": np.array(problem.samples),
         "torus_multipliers": int(problem.multipliers), "tolerance": problem.tolerance,
         "torus_displacements": problem.layout.displacements, "periods": problem.excitation.periods}
