@@ -26,8 +26,6 @@ class Rule:
         Gauss points and weights.
     values, slopes : (m, m + 1) array
         The basis polynomials and their derivatives there.
-    node_weights : (m + 1,) array
-        Integrals of the basis polynomials.
     top : (m + 1,) array
         Derivatives of order m of the basis polynomials.
     bump : float
@@ -40,7 +38,6 @@ class Rule:
     weights: Array
     values: Array
     slopes: Array
-    node_weights: Array
     top: Array
     bump: float
     fine: Array
@@ -61,7 +58,6 @@ def rule(degree: int) -> Rule:
         points, weights / 2.0,
         np.array([[p(x) for p in basis] for x in points]),
         np.array([[p.deriv()(x) for p in basis] for x in points]),
-        np.array([p.integ()(1.0) - p.integ()(0.0) for p in basis]),
         np.array([p.deriv(degree)(0.0) for p in basis]), highest,
         np.array([[p(x) for p in basis] for x in np.linspace(0.0, 1.0, 8 * degree + 1)]))
 
