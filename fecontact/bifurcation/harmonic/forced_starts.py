@@ -141,9 +141,11 @@ def _rests_at_zero(problem: HarmonicProblem, field: ContactField, u: Array) -> b
             and not field.system().basis.springs)
 
 
-def rest_state(field: ContactField, values: Array) -> Array:
-    """State (d,) of rest under the loads' means, of the normal problem alone."""
+def rest_state(field: VectorField, values: Array) -> Array:
+    """State (d,) of rest under the loads' means, of the normal problem alone; zero for others."""
     state = np.zeros(field.dimension)
+    if not isinstance(field, ContactField):
+        return state
     if isinstance(field, WaveField):
         return field.waves.rest(field, values)
     try:

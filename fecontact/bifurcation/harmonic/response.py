@@ -1,6 +1,6 @@
 """Nonlinear frequency responses: branches of forced orbits at several levels."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from numbers import Real
 from types import NoneType
@@ -274,24 +274,38 @@ def frequency_response(
     row, observed = observed_row(field, observe)
     low, high = chosen.bounds
     first = inside(low if start is None else float(start), chosen)
-    found: list[Branch] = []
     level = None if level_name is None else field.index(level_name)
     follow = branch_of_response if discretisation_by(how).finds_responses else _by_orbit_method
-    for value in values:
+
+    def at_level(value: float) -> Branch:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
         wanted = Forced(field, given, field.index(name), how, chosen, held, level)
+        return follow(wanted, first, row, _with_level(field, observed, row, level_name, value),
+                      both=low < first < high)
+
+    found = until_interrupted(values, at_level)
+    return FrequencyResponse(found, level_name, values[: len(found)], observed)
+
+
+def until_interrupted(values: Array, follow: Callable[[float], Branch]) -> tuple[Branch, ...]:
+    """A branch for each value, up to the one during which the user interrupts.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If there is no branch yet.
+    """
+    found: list[Branch] = []
+    for value in values.tolist():
         try:
-            branch = follow(wanted, first, row,
-                            _with_level(field, observed, row, level_name, float(value)),
-                            both=low < first < high)
+            found.append(follow(value))
         except KeyboardInterrupt:
             if not found:
                 raise
             break
-        found.append(branch)
-        if branch.status is BranchStatus.INTERRUPTED:
+        if found[-1].status is BranchStatus.INTERRUPTED:
             break
-    return FrequencyResponse(tuple(found), level_name, values[: len(found)], observed)
+    return tuple(found)
 
 
 def amplitude_label(observed: str) -> str:

@@ -10,16 +10,13 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.problem import (
-    BranchStatus,
     ContinuationOptions,
     options_of,
-    width_of,
 )
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
-from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
+from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.fields.observed_row import observed_row
-from fecontact.bifurcation.harmonic import starts
-from fecontact.bifurcation.harmonic.forced_starts import Forced, rest_state
+from fecontact.bifurcation.harmonic.forced_starts import Forced
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.response import (
     FrequencyResponse,
@@ -27,8 +24,9 @@ from fecontact.bifurcation.harmonic.response import (
     branch_of_response,
     observed_amplitudes,
     preloaded,
+    until_interrupted,
 )
-from fecontact.bifurcation.nonlinear_modes.peak_problem import HELD, PeakProblem
+from fecontact.bifurcation.nonlinear_modes.peak_problem import HELD, PeakProblem, problem_at
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.resources.blas_threads import one_blas_thread
@@ -110,23 +108,18 @@ def controlled_response(
     values[field.index(name)] = first
     wanted = Forced(field, values, field.index(force), method or HarmonicBalance(), chosen,
                     preloaded(system, preload))
-    found: list[Branch] = []
-    for amplitude in held.tolist():
-        try:
-            problem, u = _started(wanted, field.index(name), amplitude, row)
-            found.append(continue_branch(
-                problem, u, chosen, name=name, direction=1.0 if first < high else -1.0,
-                both=low < first < high, attributes={
-                    **problem.orbit.attributes(), "parameters": [name, force],
-                    "observed": observed, "condition": HELD, "level": amplitude,
-                    "level_name": "amplitude", "level_label": amplitude_label(observed)}))
-        except KeyboardInterrupt:
-            if not found:
-                raise
-            break
-        if found[-1].status is BranchStatus.INTERRUPTED:
-            break
-    return FrequencyResponse(tuple(found), "amplitude", held[: len(found)], observed)
+
+    def at_amplitude(amplitude: float) -> Branch:
+        problem, u = _started(wanted, field.index(name), amplitude, row)
+        return continue_branch(
+            problem, u, chosen, name=name, direction=1.0 if first < high else -1.0,
+            both=low < first < high, attributes={
+                **problem.orbit.attributes(), "parameters": [name, force],
+                "observed": observed, "condition": HELD, "level": amplitude,
+                "level_name": "amplitude", "level_label": amplitude_label(observed)})
+
+    found = until_interrupted(held, at_amplitude)
+    return FrequencyResponse(found, "amplitude", held[: len(found)], observed)
 
 
 def _started(
@@ -156,14 +149,7 @@ def _started(
         if sizes[0] >= amplitude:
             highest *= _FIRST * amplitude / sizes[0]
         elif branch.points[-1].kind == _REACHED:
-            orbit, u, tangent = starts.restored(field, branch.points[-1])
-            orbit = replace(orbit, stability=wanted.method.stability)
-            width = width_of(None, wanted.options, float(values[second]))
-            rest = (rest_state(field, values) if isinstance(field, ContactField)
-                    else np.zeros(field.dimension))
-            problem = PeakProblem(orbit, second, width, row, HELD, orbit.weights() * tangent, rest,
-                                  amplitude)
-            return problem, np.append(u, values[second])
+            return problem_at(wanted, branch.points[-1], second, row, HELD, amplitude)
         else:
             # At a constant slope the amplitude would be reached half-way.
             highest *= max(_WIDER, 2.0 * amplitude / sizes[-1])

@@ -27,8 +27,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.bifurcation.continuation.newton import newton, weighted_norm
-from fecontact.bifurcation.continuation.problem import Problem
+from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.problem import Problem, width_of
 from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.harmonic import starts
+from fecontact.bifurcation.harmonic.forced_starts import Forced, rest_state
 from fecontact.bifurcation.harmonic.observed import observed_values
 from fecontact.bifurcation.harmonic.problem import (
     HarmonicLinearisation,
@@ -153,6 +156,20 @@ class PeakProblem(Problem):
         X, T = self.orbit.coefficients(u[:-1]), linearisation.inner.period
         amplitude = observed_values(self.orbit.layout, X, T, self.row)["observed_amplitude"]
         return {"extremum": float(linearisation.gradient @ tangent[:-1]) / amplitude}
+
+
+def problem_at(
+    wanted: Forced, point: BranchPoint, second: int, row: Array, condition: str,
+    amplitude: float, lag: float = 0.5 * np.pi,
+) -> tuple[PeakProblem, Array]:
+    """Problem and unknowns at a point of a response; see :class:`PeakProblem`."""
+    orbit, u, tangent = starts.restored(wanted.field, point)
+    orbit = replace(orbit, stability=wanted.method.stability)
+    value = float(wanted.values[second])
+    problem = PeakProblem(orbit, second, width_of(None, wanted.options, value), row, condition,
+                          orbit.weights() * tangent, rest_state(wanted.field, wanted.values),
+                          amplitude, lag=lag)
+    return problem, np.append(u, value)
 
 
 class PeakLinearised:

@@ -9,11 +9,10 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of, width_of
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.observed_row import observed_row
-from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.forced_starts import Forced, rest_state
 from fecontact.bifurcation.harmonic.layout import layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
@@ -23,7 +22,7 @@ from fecontact.bifurcation.harmonic.response import (
     preloaded,
 )
 from fecontact.bifurcation.nonlinear_modes.given_force import given_force
-from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem
+from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem, problem_at
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_choice
 from fecontact.core.read_only import read_only_arrays
@@ -221,29 +220,25 @@ def _first(
         raise AnalysisError(f"The response has no peak between the frequencies "
                             f"{given.bounds[0]:.6g} and {branch.points[-1].parameter:.6g}; choose "
                             f"others.")
-    rest = (rest_state(field, values) if isinstance(field, ContactField)
-            else np.zeros(field.dimension))
     if condition == "phase" and isinstance(field, ContactField):
-        place = _place_of_phase(field, values, wanted.free, branch, rest, lag, place)
-    orbit, u, tangent = starts.restored(field, branch.points[place])
-    width = width_of(None, wanted.options, float(values[second]))
-    problem = PeakProblem(orbit, second, width, row, condition, orbit.weights() * tangent, rest,
-                          float(sizes[place]), lag=lag)
-    start = np.append(u, values[second])
+        place = _place_of_phase(field, values, wanted.free, branch, lag, place)
+    problem, start = problem_at(wanted, branch.points[place], second, row, condition,
+                                float(sizes[place]), lag)
     if condition == "amplitude" and layout_of(field).memory:
         # In the scales of the orbit a distance is about a change of phase.
-        problem = replace(problem, window=max(_WINDOW, _SAMPLES * 2.0 * np.pi / orbit.samples))
+        problem = replace(problem, window=max(
+            _WINDOW, _SAMPLES * 2.0 * np.pi / problem.orbit.samples))
     if condition == "phase":
         problem = replace(problem, size=_work(problem, start))
     return problem, start
 
 
 def _place_of_phase(
-    field: ContactField, values: Array, free: int, branch: Branch, rest: Array, lag: float,
-    peak: int,
+    field: ContactField, values: Array, free: int, branch: Branch, lag: float, peak: int
 ) -> int:
     """Index of the point nearest to the peak beside which the displacements pass the lag."""
-    values, m, b, off = values.copy(), field.system().basis.modes, layout_of(field).harmonic, []
+    m, b, off = field.system().basis.modes, layout_of(field).harmonic, []
+    rest, values = rest_state(field, values), values.copy()
     for point in branch.points:
         values[free] = point.parameter
         P = given_force(field, values, rest, float(point.values["period"]))
