@@ -81,7 +81,7 @@ from fecontact.study.sector_section import MistuningSettings
 from fecontact.study.sweep_section import SweepSettings, flat_axes
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.gap import Crown
-from fecontact.system.model_limits import PlannedBodies, implausible_bodies, warn_of_limits
+from fecontact.system.model_limits import PlannedBodies, implausible_faces, warn_of_limits
 from fecontact.system.quasistatic.history import LoadHistory
 
 NOT_OF_THE_RUN = ("output", "render", "sweep", "fit", "mistuning")
@@ -443,8 +443,8 @@ class Study(Summarised, StudyModels):
             # Check names before the run: an error after a long run would come too late.
             for point in self.output.points:
                 system.basis.point_index(point)
-        warn_of_limits(implausible_bodies(PlannedBodies(self.made_bodies(), self.contact_faces,
-                                                        system)), "In this study")
+        warn_of_limits(implausible_faces(PlannedBodies(self.made_bodies(), self.contact_faces,
+                                                       system)), "In this study")
         initial = self.initial()
         with located(f"{_title(self.path)}: [simulation]:"):
             return simulate(system, t_end, t_start=settings.t_start,

@@ -167,7 +167,8 @@ def require_motion(basis: ModalBasis, drive: Drive, load: Load) -> None:
 
 def _without_effect(what: str, still: str) -> InputError:
     return InputError(f"{what} has no effect, as {still} in no mode of the basis; leave it out, or "
-                      f"give the basis rows for that point.")
+                      f"give the basis a point that moves so: points B and C are keys of [basis] "
+                      f"in a study, arguments of modal_basis, rows of basis_from_matrices.")
 
 
 def load_summary(load: Load) -> str:

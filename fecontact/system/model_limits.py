@@ -1,8 +1,8 @@
 """Limits of the model: small displacements and rotations, shallow penetration, plausible values.
 
-They reveal wrong units and unsupported loads. ``CHECKS_OF_BODIES``, ``CHECKS_BEFORE`` and
-``CHECKS_AFTER`` list one function for each check: of elastic bodies; of a system before a run; of
-its states after it.
+They reveal wrong units and unsupported loads. ``CHECKS_BEFORE`` and ``CHECKS_AFTER`` list one
+function for each check: of a system before a run; of its states after it. Bodies and the meshes of
+faces have checks of their own.
 """
 
 import math
@@ -110,9 +110,14 @@ def implausible_values(planned: Planned) -> tuple[str, ...]:
         return tuple(sentence for check in CHECKS_BEFORE for sentence in check(planned))
 
 
-def implausible_bodies(planned: PlannedBodies) -> tuple[str, ...]:
-    """Messages about dimensions, materials and meshes that are more likely an error."""
-    return tuple(sentence for check in CHECKS_OF_BODIES for sentence in check(planned))
+def implausible_bodies(bodies: Mapping[str, ElasticBody]) -> tuple[str, ...]:
+    """Messages about size, material and thickness of bodies by name, "" for the only one."""
+    return tuple(_bodies(bodies))
+
+
+def implausible_faces(planned: PlannedBodies) -> tuple[str, ...]:
+    """Messages about meshes of contact faces that are more likely an error."""
+    return tuple(_chords(planned))
 
 
 def warn_of_limits(sentences: Iterable[str], what: str) -> None:
@@ -216,9 +221,8 @@ def beyond_fit(basis: ModalBasis, coordinates: Array) -> str | None:
     return None
 
 
-def _bodies(planned: PlannedBodies) -> Iterator[str]:
-    """Size, material and thickness of the bodies."""
-    for name, body in planned.bodies.items():
+def _bodies(bodies: Mapping[str, ElasticBody]) -> Iterator[str]:
+    for name, body in bodies.items():
         who = f"body '{name}'" if name else "the body"
         yield from implausible_body(who, body)
         size = float(np.ptp(body.mesh.nodes, axis=0).max())
@@ -496,7 +500,6 @@ def _named(along: Array, turn: float) -> str:
     return AXES[first] if along[first] > 10.0 * along[second] else "a translation"
 
 
-CHECKS_OF_BODIES: tuple[Callable[[PlannedBodies], Iterator[str]], ...] = (_bodies, _chords)
 CHECKS_BEFORE: tuple[Callable[[Planned], Iterator[str]], ...] = (
     _friction, _roughness, _ground, _duration, _unheld, _gap)
 CHECKS_AFTER: tuple[Callable[[ContactSystem, Array, Array], str | None], ...] = (

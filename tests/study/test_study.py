@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+import warnings
 from dataclasses import fields, replace
 
 import numpy as np
@@ -41,7 +42,7 @@ from fecontact.study.study import with_given_keys
 from fecontact.system.model_limits import (
     Planned,
     PlannedBodies,
-    implausible_bodies,
+    implausible_faces,
     implausible_values,
 )
 
@@ -574,9 +575,11 @@ def test_implausible_values_are_warned_of_before_a_run(tiny, changes, message):
 
 
 def implausible(study):
-    system = study.system()
-    bodies = PlannedBodies({"": study.elastic_body()}, study.contact_faces, system)
-    return (*implausible_bodies(bodies),
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        system = study.system()
+    bodies = PlannedBodies(study.made_bodies(), study.contact_faces, system)
+    return (*(str(one.message) for one in caught), *implausible_faces(bodies),
             *implausible_values(Planned(system, study.t_end, np.zeros(system.size))))
 
 

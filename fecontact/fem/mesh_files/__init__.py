@@ -249,6 +249,10 @@ def _reader(path: Path) -> tuple[Callable[[Path], RawMesh], str]:
         ".vtu": (_read_vtu, "VTU"),
         **dict.fromkeys((".bdf", ".fem", ".nas"), (read_nastran, "Nastran")),
     }
+    if path.suffix.lower() in (".brep", ".iges", ".igs", ".step", ".stp"):
+        raise InputError(f"{path} is a geometry, not a mesh; mesh it first, for example with "
+                         f"`gmsh {path.name} -3 -order 2 -o {path.stem}.msh`, and name its faces "
+                         f"by physical groups or by boxes in `boundaries`.")
     if path.suffix.lower() not in readers:
         raise InputError(f"{path}: files of this kind are not read; the suffixes that are: "
                          f"{', '.join(sorted(readers))}.")
