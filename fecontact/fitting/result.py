@@ -315,8 +315,10 @@ class Fit(Summarised):
             if (f.sf(ratio, self.freedom, known) if np.isfinite(known)
                     else chi2.sf(self.chi_square, self.freedom)) < 1e-3:
                 found.append(f"The residuals are {np.sqrt(ratio):.2g} times the stated deviations: "
-                             f"the model does not reproduce the data, or the deviations are too "
-                             f"small; intervals are too narrow.")
+                             f"the model does not reproduce the data, the deviations are too "
+                             f"small, or the search ended in a local minimum; intervals are too "
+                             f"narrow. Look at the curves; against local minima give narrower "
+                             f"ranges, more starts or a shorter record.")
         return tuple(found)
 
     def _pairs(self) -> list[str]:

@@ -12,6 +12,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.tables import convert_fields
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
+from fecontact.integrate.initial_state import PointStart, RigidStart
 from fecontact.study.sweep_section import leaves
 
 
@@ -131,8 +132,9 @@ class FitDataSettings:
         Quantity measured over time: 'displacement', 'velocity', 'acceleration', ...
     t_start, t_end : float, optional
         Part of the record [s]; of a ring-down t_end is also the end of the run of the model.
-    initial : 'rest', 'sliding', 'preload' or list
-        State from which the model runs [q, q', z].
+    initial : 'rest', 'sliding', 'preload', RigidStart, PointStart or list
+        State from which the model runs, as ``initial`` of ``[simulation]``; a list is the state
+        [q, q', z].
     along : str
         Kind of displacement of a loop: 'motion_x', 'motion_y', 'motion_z' of the drive, or
         'travel', 'travel_y' of the ground.
@@ -177,7 +179,8 @@ class FitDataSettings:
     quantity: str = "displacement"
     t_start: Annotated[float | None, Unit("s")] = None
     t_end: Annotated[float | None, Unit("s")] = None
-    initial: Literal["rest", "sliding", "preload"] | tuple[float, ...] = "rest"
+    initial: Literal["rest", "sliding", "preload"] | RigidStart | PointStart | tuple[float, ...] = (
+        "rest")
     along: Literal["motion_x", "motion_y", "motion_z", "travel", "travel_y"] = "motion_x"
     frequencies_hz: Annotated[tuple[float, ...] | None, Unit("Hz")] = None
     modes: tuple[int, ...] | None = None
@@ -198,6 +201,8 @@ class FitDataSettings:
         if self.deviation is not None and not 0.0 < self.deviation < math.inf:
             raise InputError(f"FitDataSettings: deviation = {self.deviation!r} must be a finite "
                              f"number above zero.")
+        if isinstance(self.initial, PointStart):
+            self.initial.require_writable("FitDataSettings: initial")
 
 
 @dataclass(frozen=True)

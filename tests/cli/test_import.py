@@ -179,7 +179,7 @@ def test_a_single_body_and_units(cli, place):
 
 @pytest.mark.parametrize(("name", "message"), [
     ("none.inp", "none.inp: there is no such file."),
-    ("part.step", "part.step: files of this kind are not read"),
+    ("part.step", "part.step is a geometry, not a mesh; mesh it first, for example with `gmsh "),
     ("cut.inp", "cut.inp: The file ends with the line '*ELEMENT, TYPE=C3D8' without its data"),
 ])
 def test_files_that_cannot_be_read(cli, place, name, message):

@@ -206,7 +206,9 @@ kind = "history"
 file = "decay.csv"
 deviation = 1e-5
 t_start = 0.1
+t_end = 0.105
 units = { tip = "m" }
+initial = { displacements = { B = { x = 2e-4 } } }
 
 [[fit.data]]
 kind = "frequencies"
@@ -224,7 +226,9 @@ kind = "response"
 file = "test.csv"
 changes = { "drive.amplitude_x" = 1e-4 }
 """
-    kinds = study_data(fc.Study.from_toml(text, study))
+    read = fc.Study.from_toml(text, study)
+    assert fc.Study.from_toml(read.to_toml(), study) == read
+    kinds = study_data(read)
     decay, backbone, history, frequencies, receptance, response = kinds
     assert decay.curve.frequency_hz == pytest.approx(
         np.full(len(decay.curve), np.hypot(250.0, 9.0) / (2.0 * np.pi)), rel=1e-6)
@@ -234,6 +238,7 @@ changes = { "drive.amplitude_x" = 1e-4 }
         np.full(len(backbone.curve), 9.0 / np.hypot(250.0, 9.0)), rel=1e-5)
     assert history.time[0] == pytest.approx(0.1)
     assert np.abs(history.values).max() > 0.1
+    assert history.predicted(read.system())[0] == pytest.approx(2e-4)
     assert frequencies.modes.tolist() == [1, 3]
     assert receptance.kind == "accelerance"
     assert receptance.excitation == ("C", "y")
