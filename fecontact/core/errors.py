@@ -39,9 +39,12 @@ def choices(names: Iterable[str]) -> str:
     return ", ".join(f"'{name}'" for name in sorted(names)) or "none"
 
 
-def nearest(name: str, names: Iterable[str]) -> str:
-    """A hint `` (did you mean 'x'?)`` with the closest of ``names``, or an empty string."""
-    close = difflib.get_close_matches(name, list(names), n=1, cutoff=0.5)
+def nearest(name: str, names: Iterable[str], likeness: float = 0.5) -> str:
+    """A hint `` (did you mean 'x'?)`` with the closest of ``names``, or an empty string.
+
+    ``likeness`` is the least ratio of equal letters, 1 for equal words.
+    """
+    close = difflib.get_close_matches(name, list(names), n=1, cutoff=likeness)
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 

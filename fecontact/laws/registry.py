@@ -135,7 +135,8 @@ def law_class(kind: type, name: Any, where: str) -> type:
     name = _DEFAULTS[kind] if name is None else name
     if not isinstance(name, str) or (name not in names and ".py:" not in name):
         meant = laws_called(str(name), names.values())
-        hint = nearest(str(name), names) or _meant(str(name), names, meant)
+        hint = (nearest(str(name), names, likeness=0.7) or _meant(str(name), names, meant)
+                or nearest(str(name), names))
         raise InputError(f"{where}: law = {name!r} must be one of {choices(names)}{hint}, or a law "
                          f"of your own, \"FILE.py:CLASS\".")
     if name in names:

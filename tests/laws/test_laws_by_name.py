@@ -172,6 +172,7 @@ def test_a_study_with_a_law_of_its_own_can_be_moved(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(("law", "message"), [
+    ('"coulomb"', "coulomb is 'constant'"),
     ('"lugr"', "did you mean 'lugre'"), ('"none.py:Law"', "there is no file"),
     ('"bad.py:Law"', r"cannot be loaded \(SyntaxError"), ("3", "law = 3 must be one of"),
     ('"other.py:Low"', r"has no FrictionLaw of that name \(did you mean 'Law'\?\)"),
