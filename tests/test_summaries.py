@@ -97,6 +97,10 @@ SHOWN = {
     "Trajectory": (lambda: run(times=41), ("finished", "20 ms", "41", "RoughSurface", "9000 Hz")),
     "ContactSystem": (lambda: run(times=11).system, (
         "RoughSurface", "ExponentialFriction", "20 mm/s", "contact nodes: 5", "9000 Hz")),
+    "ContactEquilibrium": (lambda: fc.equilibrium(
+        run(times=11).system.with_({"load.normal": 20.0})), (
+        "kind: rest", "stable: yes", "in contact: 5 of 5", "normal force: 20 N",
+        "friction force: 0 N")),
     "ModalBasis": (basis, ("modes: 5, 3 rigid", "2000, 9000 Hz", "ratios 0.01", "nodes: 5")),
     "ElasticBody": (body, ("80 quadrilaterals", "210 GPa", "0.02 m", "left in xy", "7850 kg/m³")),
     "Mesh": (lambda: body().mesh, ("nodes: 123", "0 ... 0.2 m", "0.002 m²",

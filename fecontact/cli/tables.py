@@ -87,7 +87,8 @@ def preload_table(history: "LoadHistory", basis: "ModalBasis") -> Any:
     Their sum over faces of different directions would mean nothing.
     """
     from fecontact.reduction.assembly.contact_faces import contact_faces
-    from fecontact.system.quasistatic.rest_state import STATES, total_friction
+    from fecontact.system.contact_quantities import total_friction
+    from fecontact.system.quasistatic.rest_state import STATES
 
     faces, rows = contact_faces(basis), dict(history.summary())
     if not faces[0].name:

@@ -22,6 +22,12 @@ class ContactState(IntEnum):
     SLIP = 2
 
 
+def total_friction(forces: Array) -> float:
+    """Sum of friction forces (n, k) against tangents [N]: in space the size of a vector."""
+    total = forces.sum(axis=0)
+    return float(total[0]) if len(total) == 1 else float(np.linalg.norm(total))
+
+
 @read_only_arrays
 class ContactQuantities:
     """Motion of points, and forces, gaps and slip of contact nodes, in states of a system.

@@ -23,7 +23,7 @@ def basis():
     ({"load": fc.Load(forces=[fc.PointLoad(1, "phi", signal=Constant(1.0))])},
      r"Load: a force at 1 with component 'phi' has no effect, as 1 turns in no mode"),
     ({"load": fc.Load(forces=[fc.PointLoad("C", "x", signal=Constant(1.0))])},
-     r"Load: a force at 'C' with component 'x' has no effect, .* points B and C are keys of .basis"),
+     r"Load: a force at 'C' with component 'x' has no effect, .* B and C are keys of .basis"),
 ])
 def test_what_could_do_no_work_is_refused(parts, message):
     with pytest.raises(fc.InputError, match=message):

@@ -10,6 +10,7 @@ from fecontact.core.errors import InputError, require_choice
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, quantity
+from fecontact.system.contact_quantities import total_friction
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.polynomial_forces import polynomial_energy
 from fecontact.system.quasistatic.given import actions_of, travel_forces
@@ -18,7 +19,7 @@ from fecontact.system.quasistatic.pose import (
     PENETRATION,
     Sliders,
 )
-from fecontact.system.quasistatic.rest_state import STATES, ContactPoses, RestState, total_friction
+from fecontact.system.quasistatic.rest_state import STATES, ContactPoses, RestState
 from fecontact.system.quasistatic.sliders import components
 
 

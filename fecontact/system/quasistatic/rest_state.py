@@ -9,6 +9,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, count, quantity
+from fecontact.system.contact_quantities import total_friction
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.quasistatic.pose import (
     AGAINST,
@@ -177,9 +178,3 @@ class RestState(ContactPoses, Summarised):
                 stiffness = springs[0].reshape(*springs[0].shape, *([1] * (force.ndim - 2)))
                 out[nodes, : force[0].size] = (force / stiffness).reshape(len(force), -1)
         return out
-
-
-def total_friction(forces: Array) -> float:
-    """Sum of friction forces (n, k) against tangents [N]: in space the size of a vector."""
-    total = forces.sum(axis=0)
-    return float(total[0]) if len(total) == 1 else float(np.linalg.norm(total))

@@ -11,13 +11,14 @@ from fecontact.core.errors import AnalysisError, require_choice, require_finite
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
-from fecontact.core.units import listed
+from fecontact.core.units import Summarised, listed, quantity
 from fecontact.laws.excitation import AXES, Load
 from fecontact.laws.friction.planar import along_slip, clear
 from fecontact.laws.signatures import friction_law, planar_friction_law, signal
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import columns
 from fecontact.system.complex_modes import unstable_count
+from fecontact.system.contact_quantities import total_friction
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.friction_memory import steady_memory
 from fecontact.system.instant import Instant
@@ -60,8 +61,8 @@ def _still(t, p):
 
 
 @read_only_arrays
-@dataclass(frozen=True, eq=False)
-class ContactEquilibrium(Instant):
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactEquilibrium(Summarised, Instant):
     """An equilibrium of a contact system, see :func:`equilibrium`.
 
     Attributes
@@ -82,6 +83,14 @@ class ContactEquilibrium(Instant):
 
     kind: Kind
     stable: bool
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Kind, stability, nodes in contact and their total normal and friction force."""
+        normal = self.normal_force[~self.system.basis.spring_nodes]
+        return [("kind", self.kind), ("stable", "yes" if self.stable else "no"),
+                ("nodes in contact", f"{np.count_nonzero(normal)} of {len(normal)}"),
+                ("normal force", quantity(float(normal.sum()), "N", 4)),
+                ("friction force", quantity(total_friction(self.friction_forces), "N", 4))]
 
     @cached_property
     def _contact(self) -> Array:
