@@ -43,7 +43,6 @@ from fecontact.study.sector_section import (
     usable_of_sector,
     wave_of,
 )
-from fecontact.system.model_limits import implausible_bodies, warn_of_limits
 
 # Cached objects of a study, and that on which each depends.
 _MADE_FROM: Mapping[str, Callable[["StudyModels"], Any]] = {
@@ -262,9 +261,7 @@ class StudyModels:
     def _body(self) -> ElasticBody:
         mesh = self._mesh
         with located(f"{self.title}: [body]:", "ElasticBody"):
-            body = self.body.elastic_body(mesh)
-        warn_of_limits(implausible_bodies({"": body}), "In this study")
-        return body
+            return self.body.elastic_body(mesh)
 
     @cached_property
     def _meshes(self) -> dict[str, Mesh]:
@@ -272,9 +269,7 @@ class StudyModels:
 
     @cached_property
     def _bodies(self) -> dict[str, ElasticBody]:
-        bodies = elastic_bodies(self, self._meshes, self.title)
-        warn_of_limits(implausible_bodies(bodies), "In this study")
-        return bodies
+        return elastic_bodies(self, self._meshes, self.title)
 
     @cached_property
     def _pairings(self) -> dict[str, Pairing | TwoPassPairing]:

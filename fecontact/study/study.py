@@ -81,7 +81,12 @@ from fecontact.study.sector_section import MistuningSettings
 from fecontact.study.sweep_section import SweepSettings, flat_axes
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.gap import Crown
-from fecontact.system.model_limits import PlannedBodies, implausible_faces, warn_of_limits
+from fecontact.system.model_limits import (
+    PlannedBodies,
+    implausible_bodies,
+    implausible_faces,
+    warn_of_limits,
+)
 from fecontact.system.quasistatic.history import LoadHistory
 
 NOT_OF_THE_RUN = ("output", "render", "sweep", "fit", "mistuning")
@@ -443,6 +448,7 @@ class Study(Summarised, StudyModels):
             # Check names before the run: an error after a long run would come too late.
             for point in self.output.points:
                 system.basis.point_index(point)
+        self.warn_of_bodies()
         warn_of_limits(implausible_faces(PlannedBodies(self.made_bodies(), self.contact_faces,
                                                        system)), "In this study")
         initial = self.initial()
@@ -454,6 +460,10 @@ class Study(Summarised, StudyModels):
                                 settings.keep_steps if keep_steps is None else keep_steps),
                             events=(ContactEvents(settings.stop)
                                     if settings.events or settings.stop else None))
+
+    def warn_of_bodies(self) -> None:
+        """Warn of implausible size, materials and thickness of the bodies made so far."""
+        warn_of_limits(implausible_bodies(self.made_bodies()), "In this study")
 
     def measure(self, run: Trajectory | None = None) -> Measurement:
         """Measure a run of the study, by default a new one, by the sensors of ``[measurement]``.

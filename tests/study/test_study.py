@@ -578,6 +578,7 @@ def implausible(study):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         system = study.system()
+        study.warn_of_bodies()
     bodies = PlannedBodies(study.made_bodies(), study.contact_faces, system)
     return (*(str(one.message) for one in caught), *implausible_faces(bodies),
             *implausible_values(Planned(system, study.t_end, np.zeros(system.size))))

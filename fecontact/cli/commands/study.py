@@ -177,6 +177,7 @@ def modes(
             basis = described.reduced.basis
             bases = described.modal_bases() if described.bodies else {"": basis}
             interfaces = interfaces_of(described)
+        described.warn_of_bodies()
         for (name, one), part in zip(bases.items(), name_parts(bases), strict=True):
             if name:
                 echo(f"\n{name}:")
