@@ -8,7 +8,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation import predictor
 from fecontact.bifurcation.continuation.newton import Solution, weighted_norm, weighted_product
-from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint, attributes_of
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
 from fecontact.bifurcation.fields.fast_modes import unresolved_modes
 from fecontact.bifurcation.fields.jumps import missed_jumps
@@ -185,22 +185,17 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
         beside: Callable[[CollocationLinearisation, Array], Array],
     ) -> dict[str, Any]:
         """Values of :meth:`point`; ``beside`` gives the change of the orbit by right-hand sides."""
-        stability = linearisation.floquet
         low, high = extremes(self.nodes(u), self.degree)
         error = state_error(self, u, linearisation, beside)
         self.noted[:] = [(u, error)]
-        return {"period": self.period(u), "multipliers": stability.multipliers,
-                "unstable": stability.unstable, "stable": stability.stable,
-                "trivial_error": stability.trivial_error, "mesh": self.mesh, "minimum": low,
-                "maximum": high, "state_error": error}
+        return {"period": self.period(u), **linearisation.floquet.stored, "mesh": self.mesh,
+                "minimum": low, "maximum": high, "state_error": error}
 
     def attributes(self) -> dict[str, Any]:
         """Attributes of a branch from which its points are restored."""
         kept: dict[str, Any] = {
-            "state_names": list(self.field.state_names),
-            "parameter_names": list(self.field.parameters), "parameter_values": self.values,
-            "scales": self.scales, "degree": self.degree, "periods": self.periods,
-            "intervals": self.intervals}
+            **attributes_of(self.field, self.values), "scales": self.scales,
+            "degree": self.degree, "periods": self.periods, "intervals": self.intervals}
         return kept if self.limits is None else kept | {"limits": self.limits}
 
     def note(self, points: Sequence[BranchPoint]) -> str:
@@ -213,11 +208,6 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
             "take more intervals")
         missed = missed_jumps(self.field, points)
         return " ".join(filter(None, (super().note(points), missed, fast)))
-
-    def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
-        """Range of the number of unstable multipliers, given their errors."""
-        found: tuple[int, int] = linearisation.floquet.unstable_range
-        return found
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Test functions of the multipliers, and of orbits that shrink to an equilibrium."""
