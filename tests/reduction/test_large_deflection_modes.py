@@ -101,8 +101,9 @@ def parts(whole, basis, mode, size, number):
     """Coordinates of two modes in a harmonic, of the whole body and of the reduced one."""
     shapes = basis.mode_shapes.shapes.reshape(-1, basis.modes)[:, :2]
     inertia = whole.mass @ (whole.model.body.expansion.T @ shapes)
-    at = int(np.argmin(np.abs(np.abs(mode.harmonic()) - size)))
-    return np.abs(whole.harmonics[number] @ inertia), np.abs(mode.coordinates(number)[at, :2])
+    found = [np.interp(size, np.abs(mode.harmonic()), along)
+             for along in np.abs(mode.coordinates(number)[:, :2]).T]
+    return np.abs(whole.harmonics[number] @ inertia), np.array(found)
 
 
 def twins():

@@ -349,7 +349,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         """At orbits that are homoclinic to a saddle, as far as numbers tell."""
         if self.autonomous and near_saddle(
                 self, self.parameters(u), linearisation.states,
-                np.full(self.samples, 1.0 / self.samples), tangent, linearisation.rates):
+                np.full(self.samples, 1.0 / self.samples), tangent):
             return BranchStatus.HOMOCLINIC
         return None
 

@@ -28,6 +28,7 @@ _KINDS = ("plane bodies", "solids")
 _AT_LIMIT = 1e-9
 
 
+@read_only_arrays
 class ContactPoses:
     """Forces, slips and states of contact nodes in equilibria; of several with an axis (N, ...)."""
 
