@@ -29,6 +29,14 @@ def test_buckling_of_a_strut(tmp_path, capsys):
     assert (tmp_path / "strut-buckling.png").stat().st_size > 10_000
 
 
+def test_a_strut_in_mm_is_warned_of(tmp_path, capsys):
+    path = tmp_path / "strut.toml"
+    path.write_text(STRUT.replace("length = 1.0, height = 0.02, element_size = 0.02",
+                                  "length = 1000.0, height = 20.0, element_size = 20.0"))
+    assert execute(["buckling", str(path), "--count", "1", "-o", str(tmp_path)]) == 0
+    assert "warning: In this study the body has an extent of 1e+03 m" in capsys.readouterr().err
+
+
 def test_loads_that_pull_and_bad_studies(tmp_path, capsys):
     path = tmp_path / "strut.toml"
     path.write_text(STRUT.replace("1e6", "-1e6"))

@@ -34,6 +34,7 @@ def buckling(
         raise InputError(f"{described.title}: buckling is that of a single body; describe it in "
                          f"[geometry] and [body].")
     body, places = described.elastic_body(), described.basis.load_points
+    described.warn_of_bodies()
     with output_folder(output or described.results) as folder:
         with waiting("Computing load factors"), located(f"{described.title}:"):
             found = buckling_loads(body, described.load, count, points=places)
@@ -86,6 +87,7 @@ def campbell(
     with output_folder(output or described.results) as folder:
         with waiting("Computing modes"):
             diagram = diagram_of(described.modal_basis(), np.linspace(*speeds, points), count=count)
+        described.warn_of_bodies()
         echo(str(diagram))
         if orders:
             show(table("order", "critical speeds [rad/s]", left=2, rows=(
