@@ -158,7 +158,8 @@ def until_end(run: StepRun, *columns: tuple[Array, Array]) -> list[Array]:
     """
     done = run.outputs
     found = [run.times[:done], *(rows[:done] for rows, _ in columns)]
-    if run.time > found[0][-1] and np.isfinite(run.progress.state).all():
+    # Some methods write the first output with their first step, which may fail.
+    if done and run.time > found[0][-1] and np.isfinite(run.progress.state).all():
         last = [run.time, *(row for _, row in columns)]
         found = [np.concatenate([rows, [row]]) for rows, row in zip(found, last, strict=True)]
     return found
