@@ -15,7 +15,7 @@ from fecontact.bifurcation.harmonic.elements import (
     follow_elements,
 )
 from fecontact.bifurcation.harmonic.engine_order import Waves
-from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled
+from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled, orbit_weights
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
 from fecontact.bifurcation.harmonic.series import (
     Series,
@@ -24,14 +24,17 @@ from fecontact.bifurcation.harmonic.series import (
     rows_of,
     series,
 )
-from fecontact.bifurcation.harmonic.woodbury import Factors, WoodburySolver, contact_directions
-from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns
+from fecontact.bifurcation.harmonic.woodbury import (
+    BorderedEquations,
+    Factors,
+    WoodburySolver,
+    contact_directions,
+)
+from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns, beside, by_differences
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, Integers
 from fecontact.system.fields.vector_field import VectorField
 
-# Relative step of differences in a parameter that changes the period.
-_DIFFERENCE = 1e-5
 UNREPEATED = ("The internal variables of friction do not come to repeat; take more samples a "
               "period.")
 _NOTHING_KEPT = Kept(np.zeros((0, 0)), np.zeros(0), *np.zeros((2, 0), dtype=np.int64))
@@ -221,10 +224,8 @@ class Balance(OrbitUnknowns):
 
     @cached_property
     def _weights(self) -> Array:
-        sizes = self.scales[self.layout.columns] ** -2.0
-        over = np.full((2 * self.harmonics + 1, 1), 0.5)
-        over[0] = 1.0
-        return np.concatenate([(over * sizes).reshape(-1), self.scales[-self.common :] ** -2.0])
+        return orbit_weights(self.scales[self.layout.columns], self.scales[-self.common :],
+                             len(self.reference))
 
     def weights(self) -> Array:
         """Weights of the inner product: mean over the orbit of scaled q and y; T; parameter."""
@@ -271,7 +272,7 @@ class Balance(OrbitUnknowns):
         return x
 
 
-class Linearised:
+class Linearised(BorderedEquations):
     """Residual at u, and solutions of systems with the derivative there.
 
     The residual holds the balance of the harmonics (n), and the phase condition where the period
@@ -281,7 +282,6 @@ class Linearised:
     def __init__(self, problem: Balance, u: Array) -> None:
         self.problem, self.u = problem, u
         self.period = problem.period(u)
-        self._factors: tuple[Factors | WoodburySolver, Array] | None = None
         self._widths: Array | None = None
 
     @cached_property
@@ -343,12 +343,14 @@ class Linearised:
                                            (problem.free,))
         if problem.onsets.size:
             self._widths = problem.add_kinks(self.times, self.states, values, self.period, f, J)
-            h = _DIFFERENCE * max(abs(float(self.u[-1])), 1e-3)
-            for side in (1.0, -1.0):
-                beside, change = values.copy(), np.zeros_like(f)
-                beside[problem.free] += side * h
-                problem.add_kinks(self.times, self.states, beside, self.period, change)
-                P[:, :, 0] += side * change / (2.0 * h)
+
+            def change(u: Array) -> Array:
+                found = np.zeros_like(f)
+                problem.add_kinks(self.times, self.states, problem.parameters(u), self.period,
+                                  found)
+                return found
+
+            P[:, :, 0] += by_differences(change, self.u)
         return f, J, P
 
     @property
@@ -381,6 +383,12 @@ class Linearised:
         """Balance (2 H + 1, b) of the harmonics, without the equations of waves."""
         return self._balance(self.u, self.period, self.rates)
 
+    def _bare_balance(self, u: Array) -> Array:
+        """Balance (2 H + 1, b) at other unknowns with the same z, without elements."""
+        problem, T = self.problem, self.problem.period(u)
+        return self._balance(u, T, problem.rates(
+            problem.times(T), problem.states(u, T, self.memory), problem.parameters(u), T))
+
     def _balance(self, u: Array, period: float, rates: Array) -> Array:
         problem, layout = self.problem, self.problem.layout
         m = layout.displacements
@@ -404,13 +412,9 @@ class Linearised:
                 slowed[:, m : 2 * m] += self._widths.T / T
             by_period = -turned.reshape(-1) + self._by_rates(slowed)
             return np.stack([by_period, self._by_rates(P[:, :, 0])], axis=1)
-        ends = self._perturbed()
-        if ends is None:
+        if self._same_period:
             return self._by_rates(P[:, :, 0])[:, None]
-        sides = [self._balance(end, period, problem.rates(
-            problem.times(period), problem.states(end, period, self.memory),
-            problem.parameters(end), period)) for end, period, _ in ends]
-        return ((sides[0] - sides[1]) / (2.0 * ends[0][2])).reshape(-1, 1)
+        return by_differences(self._bare_balance, u).reshape(-1, 1)
 
     def _slowed(self, J: Array, x: Array) -> Array:
         """Derivatives (N, rows) of rates to T, through velocities q' / T, from J (N, rows, d)."""
@@ -420,23 +424,17 @@ class Linearised:
         return np.asarray(-np.matmul(J[:, :, m : 2 * m], x[:, m : 2 * m, None])[:, :, 0]
                           / self.period)
 
-    def _perturbed(self) -> list[tuple[Array, float, float]] | None:
-        """Unknowns, period and distance beside the parameter; None if the period stays."""
-        u, h = self.u, _DIFFERENCE * max(abs(float(self.u[-1])), 1e-3)
-        found = []
-        for sign in (1.0, -1.0):
-            end = u.copy()
-            end[-1] += sign * h
-            found.append((end, self.problem.period(end), h))
-        return None if found[0][1] == self.period == found[1][1] else found
+    @property
+    def _same_period(self) -> bool:
+        """Whether the period stays where the parameter changes."""
+        return all(self.problem.period(side) == self.period for side in beside(self.u))
 
     @property
     def _by_common(self) -> Array:
         """Derivatives (e,) of the period to the period, if it is unknown, and the parameter."""
         if self.problem.autonomous:
             return np.array([1.0, 0.0])
-        ends = self._perturbed()
-        return np.array([0.0 if ends is None else (ends[0][1] - ends[1][1]) / (2.0 * ends[0][2])])
+        return by_differences(self.problem.period, self.u).reshape(1)
 
     def _by_rates(self, change: Array) -> Array:
         """Change (n,) of the balance with a change (N, d) of the rates."""
@@ -481,14 +479,8 @@ class Linearised:
         common[:, :, -1] = P[:, first:, 0]
         if problem.autonomous:
             common[:, :, 0] = self._slowed(J, x) + differences(x[:, first:]) / T**2
-        elif (ends := self._perturbed()) is not None:
-            sides = []
-            for end, period, _ in ends:
-                moved = problem.states(end, period, x[:, first:])
-                moved[:, m : 2 * m] = differences(moved[:, :m]) / period
-                rates = problem.field.rates(problem.times(period), moved, problem.parameters(end))
-                sides.append(rates[:, first:] - differences(moved[:, first:]) / period)
-            common[:, :, -1] = (sides[0] - sides[1]) / (2.0 * ends[0][2])
+        elif not self._same_period:
+            common[:, :, -1] = by_differences(self._marching, self.u)
         right = np.concatenate([found.reshape(N, c, -1), common], axis=2)
         # Variables of other nodes have no influence.
         s, nodes = c // layout.nodes, np.arange(layout.nodes)
@@ -496,6 +488,15 @@ class Linearised:
         solve_around(np.ascontiguousarray(np.moveaxis(whole[:, nodes, :, nodes], 0, 1)), T,
                      problem.kept.blocks, right)
         return right
+
+    def _marching(self, u: Array) -> Array:
+        """Residual (N, c) of the equations of z without leak, at other unknowns with the same z."""
+        problem, T = self.problem, self.problem.period(u)
+        m, first = problem.layout.displacements, problem.layout.states - problem.layout.memory
+        x = problem.states(u, T, self.marched[:, first:])
+        x[:, m : 2 * m] = differences(x[:, :m]) / T
+        rates = problem.field.rates(problem.times(T), x, problem.parameters(u))
+        return np.asarray(rates[:, first:] - differences(x[:, first:]) / T)
 
     def _add_elements(self, found: Array) -> None:
         """Add what elements contribute to derivatives (n, n + e) of the balance."""
@@ -510,14 +511,9 @@ class Linearised:
             within += np.einsum("jqk,ji,jo->qiko", change[:, :, axis * L : (axis + 1) * L], rows,
                                 along, optimize=True)
         for column in range(-problem.common, 0):
-            h = _DIFFERENCE * max(abs(float(u[column])), 1e-3)
-            sides = []
-            for sign in (1.0, -1.0):
-                end = u.copy()
-                end[column] += sign * h
-                sides.append(problem.followed(end, problem.period(end), False).friction)
-            by_column = problem.series.projection @ ((sides[0] - sides[1]).T / (2.0 * h) @ rows)
-            found[:n, column] += by_column.reshape(-1)
+            change = by_differences(lambda end: problem.followed(
+                end, problem.period(end), False).friction, u, column)
+            found[:n, column] += (problem.series.projection @ (change.T @ rows)).reshape(-1)
 
     def _coupled(self, z: Array) -> Array:
         """Change (n, columns) of the balance with a change (N, c, columns) of z."""
@@ -554,46 +550,12 @@ class Linearised:
                                      problem.harmonics_kept)
         return zero_left_out(found, problem.left_out)
 
-    def solve(self, row: Array, rhs: Array) -> Array:
-        """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
-        if self._factors is None:
-            square = np.empty((len(row), len(row)))
-            square[:-1], square[-1] = self.condensed, row
-            directions = None if self.problem.autonomous else self.problem.directions
-            if len(self.problem.left_out):
-                made: Factors | WoodburySolver | None = Factors.without(
-                    square, self.problem.left_out)
-            else:
-                made = (Factors.of(square) if directions is None
-                        else WoodburySolver.of(square, directions))
-            if made is None:
-                return np.full(len(row), np.nan)
-            self._factors = made, row
-        factors, first = self._factors
-        found = factors.solve(rhs)
-        if first is row or np.array_equal(first, row):
-            return np.asarray(found)
-        # Another last row: add what solves the homogeneous equations.
-        along = self._along
-        return np.asarray(found + (rhs[-1] - row @ found) / (row @ along) * along)
-
-    @cached_property
-    def _along(self) -> Array:
-        """Solution of the homogeneous equations with one in the last row that was factorised."""
-        assert self._factors is not None
-        factors, first = self._factors
-        return np.asarray(factors.solve(np.append(np.zeros(len(first) - 1), 1.0)))
-
-    def determinant_sign(self, row: Array) -> float:
-        """Sign of det [[G_u], [row]] by the factors of :meth:`solve`; 0 where they are singular."""
-        if self._factors is None:
-            self.solve(row, np.zeros(len(row)))
-        factors, first = self._factors or (None, row)
-        if not isinstance(factors, Factors):
-            return 0.0
-        if first is row or np.array_equal(first, row):
-            return factors.sign
-        return factors.sign * float(np.sign(row @ self._along))
+    def factorised(self, square: Array) -> Factors | WoodburySolver | None:
+        """Factors of a square matrix; None where it is singular."""
+        if len(self.problem.left_out):
+            return Factors.without(square, self.problem.left_out)
+        directions = None if self.problem.autonomous else self.problem.directions
+        return Factors.of(square) if directions is None else WoodburySolver.of(square, directions)
 
 
 def zero_left_out(matrix: Array, left: Integers) -> Array:

@@ -102,6 +102,17 @@ def element_counts(field: VectorField, layout: Layout) -> Integers:
     return counts if alone else np.zeros_like(counts)
 
 
+def orbit_weights(sizes: Array, others: Array, functions: int) -> Array:
+    """Weights (..., n) of coefficients and further unknowns for scales (..., b) and (..., e).
+
+    The sum of weighted squares of coefficients of so many functions is the mean of scaled states.
+    """
+    over = np.full((functions, 1), 0.5)
+    over[0] = 1.0
+    coefficients = over * sizes[..., None, :] ** -2.0
+    return np.concatenate([coefficients.reshape(*sizes.shape[:-1], -1), others**-2.0], axis=-1)
+
+
 def filled(layout: Layout, X: Array, z: Array, period: float, values: Array) -> Array:
     """States (N, d) from coefficients, internal variables (N, c) and the basis (N, 2 H + 1)."""
     m, end = layout.displacements, layout.states - layout.memory

@@ -9,6 +9,7 @@ they are solved for.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -126,6 +127,53 @@ class WoodburySolver:
     def _once(self, rhs: Array) -> Array:
         first = _through(self.blocks, rhs[:, None])[:, 0]
         return np.asarray(first - self.solved @ dgetrs(*self.core, self.right @ first)[0])
+
+
+class BorderedEquations:
+    """Solutions of equations with a last row, whose first factors serve any other one too."""
+
+    _made: tuple[Factors | WoodburySolver, Array] | None = None
+
+    @property
+    def condensed(self) -> Array:
+        """Derivatives (n, n + 1) of the equations."""
+        raise NotImplementedError
+
+    def factorised(self, square: Array) -> Factors | WoodburySolver | None:
+        """Factors of a square matrix; None where it is singular."""
+        return Factors.of(square)
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
+        if self._made is None:
+            made = self.factorised(np.vstack([self.condensed, row]))
+            if made is None:
+                return np.full(len(row), np.nan)
+            self._made = made, row
+        factors, first = self._made
+        found = factors.solve(rhs)
+        if first is row or np.array_equal(first, row):
+            return found
+        # Another last row: add what solves the homogeneous equations.
+        return np.asarray(found + (rhs[-1] - row @ found) / (row @ self._along) * self._along)
+
+    @cached_property
+    def _along(self) -> Array:
+        """Solution of the homogeneous equations with one in the last row that was factorised."""
+        assert self._made is not None
+        factors, first = self._made
+        return factors.solve(np.append(np.zeros(len(first) - 1), 1.0))
+
+    def determinant_sign(self, row: Array) -> float:
+        """Sign of det [[G_u], [row]] by the factors of :meth:`solve`; 0 where they are singular."""
+        if self._made is None:
+            self.solve(row, np.zeros(len(row)))
+        factors, first = self._made or (None, row)
+        if not isinstance(factors, Factors):
+            return 0.0
+        if first is row or np.array_equal(first, row):
+            return factors.sign
+        return factors.sign * float(np.sign(row @ self._along))
 
 
 def _through(blocks: list[tuple[slice, Any, Any]], rhs: Array) -> Array:

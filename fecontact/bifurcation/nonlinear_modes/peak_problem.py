@@ -40,11 +40,12 @@ from fecontact.bifurcation.harmonic.problem import (
 )
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated, uniform_basis
 from fecontact.bifurcation.nonlinear_modes.given_force import given_force
+from fecontact.bifurcation.orbits.unknowns import by_differences
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
-# Steps of differences: relative in a parameter, and along the response in its inner product.
-_PARAMETER_STEP, _ALONG_STEP = 1e-5, 1e-4
+# Step of differences along the response in its inner product.
+_ALONG_STEP = 1e-4
 _SAMPLES, _REFINED = 512, 4
 # Of orbits beside the resonance: relative size of the last Newton step, and Newton steps.
 _TOLERANCE, _ITERATIONS = 1e-9, 12
@@ -212,15 +213,14 @@ class PeakLinearised:
     @cached_property
     def force_row(self) -> Array:
         """Row (n,) of Im(P^H X_1 exp(i lag)) over the coefficients."""
-        return self._force_rows(float(self.u[-2]), float(self.u[-1]))
+        return self._force_row_at(self.u)
 
-    def _force_rows(self, frequency: float, parameter: float) -> Array:
+    def _force_row_at(self, u: Array) -> Array:
         problem, orbit = self.problem, self.orbit
         assert isinstance(orbit.field, ContactField)
         values = orbit.values.copy()
-        values[orbit.free], values[problem.second] = frequency, parameter
-        period = orbit.period(np.append(self.u[:-2], frequency))
-        P = given_force(orbit.field, values, problem.rest, period)
+        values[[orbit.free, problem.second]] = u[-2:]
+        P = given_force(orbit.field, values, problem.rest, orbit.period(u[:-1]))
         P = P * np.exp(1j * (0.5 * np.pi - problem.lag))
         row = np.zeros(orbit.reference.shape)
         row[1, : len(P)], row[2, : len(P)] = P.real, -P.imag
@@ -269,30 +269,18 @@ class PeakLinearised:
         along, by_parameter = (slopes[1] - slopes[0]) / (2.0 * self.problem.window)
         return np.append(along * self.problem.border, by_parameter) / self.problem.size
 
-    @cached_property
-    def _step(self) -> float:
-        return _PARAMETER_STEP * max(abs(float(self.u[-1])), 1e-3 * self.problem.width)
-
     def _by_parameter(self, y: Array) -> Array:
         """Derivative (n,) of the equations of the orbit to the parameter, at y."""
-        sides = []
-        for sign in (1.0, -1.0):
-            moved = np.append(y, self.u[-1] + sign * self._step)
-            sides.append(self.problem.at(moved).linearise(y).residual)
-        return np.asarray((sides[0] - sides[1]) / (2.0 * self._step))
+        return by_differences(lambda u: self.problem.at(u).linearise(y).residual,
+                              np.append(y, self.u[-1]), least=1e-3 * self.problem.width)
 
     @cached_property
     def _last_row(self) -> Array:
         """Derivative (n + 2,) of the condition."""
         if self.problem.condition == "phase":
-            frequency, parameter, X = float(self.u[-2]), float(self.u[-1]), self.u[:-2]
-            h = _PARAMETER_STEP * frequency
-            by_frequency = (self._force_rows(frequency + h, parameter)
-                            - self._force_rows(frequency - h, parameter)) @ X / (2.0 * h)
-            by_parameter = (self._force_rows(frequency, parameter + self._step)
-                            - self._force_rows(frequency, parameter - self._step)) @ X
-            return np.concatenate([self.force_row, [
-                by_frequency, by_parameter / (2.0 * self._step)]]) / self.problem.size
+            changes = [by_differences(self._force_row_at, self.u, place, least) @ self.u[:-2]
+                       for place, least in ((-2, 0.0), (-1, 1e-3 * self.problem.width))]
+            return np.concatenate([self.force_row, changes]) / self.problem.size
         if self.problem.condition == HELD:
             return np.append(self.gradient, 0.0) / self.problem.size
         if self.problem.window:

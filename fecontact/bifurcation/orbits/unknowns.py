@@ -4,10 +4,31 @@ The last unknowns are the free parameters; the period of an orbit stands before 
 unknown, which it is if rates do not depend on time.
 """
 
+from collections.abc import Callable
 from functools import cached_property
+
+import numpy as np
 
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
+
+# Relative step of differences in an unknown.
+_DIFFERENCE = 1e-5
+
+
+def beside(u: Array, place: int = -1, least: float = 1e-3) -> tuple[Array, Array]:
+    """Unknowns with more and with less of one of them, in parts of its size or the least one."""
+    step = np.zeros_like(u)
+    step[place] = _DIFFERENCE * max(abs(float(u[place])), least)
+    return u + step, u - step
+
+
+def by_differences(
+    function: Callable[[Array], Array | float], u: Array, place: int = -1, least: float = 1e-3
+) -> Array:
+    """Derivative of a function of the unknowns to one of them, by central differences."""
+    more, less = beside(u, place, least)
+    return np.asarray((function(more) - function(less)) / (more[place] - less[place]))
 
 
 class FreeParameters:

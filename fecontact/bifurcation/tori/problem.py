@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
-from fecontact.bifurcation.harmonic.layout import Layout
-from fecontact.bifurcation.harmonic.woodbury import Factors
+from fecontact.bifurcation.harmonic.layout import Layout, orbit_weights
+from fecontact.bifurcation.harmonic.woodbury import BorderedEquations
 from fecontact.bifurcation.orbits.same_orbit import shrunk
-from fecontact.bifurcation.orbits.unknowns import FreeParameters
+from fecontact.bifurcation.orbits.unknowns import FreeParameters, beside, by_differences
 from fecontact.bifurcation.tori.elements import Friction, TorusElements
 from fecontact.bifurcation.tori.excitation import Excitation
 from fecontact.bifurcation.tori.series import (
@@ -33,8 +33,6 @@ from fecontact.bifurcation.tori.stability import (
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
-# Relative step of differences in a parameter that changes a prescribed frequency.
-_DIFFERENCE = 1e-5
 # Part of their limits by which elements that do not slide are short of them.
 _WITHIN = 1e-6
 # Points per harmonic among which extremes are sought.
@@ -173,11 +171,9 @@ class TorusProblem(FreeParameters, Problem):
 
     @cached_property
     def _weights(self) -> Array:
-        sizes = self.scales[self.layout.columns] ** -2.0
-        over = np.full((len(self.reference), 1), 0.5)
-        over[0] = 1.0
-        tail = [self.scales[self.layout.states + i] for i in self.unknown] + [self.scales[-1]]
-        return np.concatenate([(over * sizes).reshape(-1), np.array(tail) ** -2.0])
+        others = [self.layout.states + i for i in self.unknown] + [-1]
+        return orbit_weights(self.scales[self.layout.columns], self.scales[others],
+                             len(self.reference))
 
     def weights(self) -> Array:
         """Weights of the inner product: mean over the torus of scaled states; f; parameter."""
@@ -270,14 +266,13 @@ class TorusProblem(FreeParameters, Problem):
         return " ".join(notes)
 
 
-class TorusLinearisation:
+class TorusLinearisation(BorderedEquations):
     """Residual of the equations at u, and solutions of systems with their derivative."""
 
     def __init__(self, problem: TorusProblem, u: Array) -> None:
         self.problem, self.u = problem, u
         self.frequencies = problem.frequencies(u)
         self.ratio = problem.ratio(self.frequencies)
-        self._factors: tuple[Factors, Array] | None = None
 
     @cached_property
     def _taus(self) -> Array:
@@ -409,7 +404,8 @@ class TorusLinearisation:
         X, columns = problem.coefficients(self.u), []
         if problem.elements is not None:
             # The lines turn with the frequencies, and limits may depend on any parameter.
-            return np.array([self._by_differences(place) for place in range(-problem.common, 0)]).T
+            return np.array([by_differences(self._balance_at, self.u, place)
+                             for place in range(-problem.common, 0)]).T
         for i in problem.unknown:
             moved = turned(X, 2.0 * np.pi * problem.pairs[:, i])
             speeds = on_lines(complex_coefficients(moved[:, :m], *problem.orders), self._taus,
@@ -419,24 +415,15 @@ class TorusLinearisation:
                 moved -= projected(np.einsum("qpij,qpj->qpi", by_velocity, speeds),
                                    *problem.orders, self.ratio)
             columns.append(moved.reshape(-1))
-        sides = self._beside(-1)
-        if problem.frequencies(sides[0]) == problem.frequencies(sides[1]):
+        more, less = map(problem.frequencies, beside(self.u))
+        if more == less:
             columns.append(-projected(by_parameter, *problem.orders, self.ratio).reshape(-1))
         else:
-            columns.append(self._by_differences(-1))
+            columns.append(by_differences(self._balance_at, self.u))
         return np.array(columns).T
 
-    def _beside(self, place: int) -> tuple[Array, Array]:
-        """Unknowns with more and with less of one of them."""
-        step = np.zeros_like(self.u)
-        step[place] = _DIFFERENCE * max(abs(float(self.u[place])), 1e-3)
-        return self.u + step, self.u - step
-
-    def _by_differences(self, place: int) -> Array:
-        """Derivatives (L b,) of the balance to an unknown, by differences."""
-        more, less = self._beside(place)
-        up, down = (TorusLinearisation(self.problem, side).balance for side in (more, less))
-        return np.asarray((up - down) / (more[place] - less[place]))
+    def _balance_at(self, u: Array) -> Array:
+        return TorusLinearisation(self.problem, u).balance
 
     @cached_property
     def condensed(self) -> Array:
@@ -446,21 +433,6 @@ class TorusLinearisation:
         found[:n, :n], found[:n, n:] = self.matrix.reshape(n, n), self._by_common
         found[n:, :n] = problem.phase_rows
         return found
-
-    def solve(self, row: Array, rhs: Array) -> Array:
-        """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
-        if self._factors is None:
-            made = Factors.of(np.vstack([self.condensed, row]))
-            if made is None:
-                return np.full(len(row), np.nan)
-            self._factors = made, np.array(row)
-        factors, first = self._factors
-        found = factors.solve(rhs)
-        if np.array_equal(first, row):
-            return found
-        # Another last row: add what solves the homogeneous equations.
-        along = factors.solve(np.append(np.zeros(len(row) - 1), 1.0))
-        return np.asarray(found + (rhs[-1] - row @ found) / (row @ along) * along)
 
     @cached_property
     def _size(self) -> float:

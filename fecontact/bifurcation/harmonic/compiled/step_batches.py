@@ -20,6 +20,7 @@ from fecontact.bifurcation.continuation.problem import (
 )
 from fecontact.bifurcation.harmonic.compiled import arrays
 from fecontact.bifurcation.harmonic.compiled.steps import BOUND, COUPLED, steps
+from fecontact.bifurcation.harmonic.layout import orbit_weights
 from fecontact.bifurcation.harmonic.stability import along_orbits
 from fecontact.bifurcation.orbits.floquet import Floquet
 from fecontact.core.errors import AnalysisError
@@ -134,7 +135,7 @@ class StepBatches:
         self.count = later if whole == made else max(_FIRST, min(self.count // 2, 2 * whole))
         # The last tangent is made exact: later steps rely on its signs.
         while 0 < whole < made and (folds[whole - 1] or not self._made_exact(
-                problem, u[whole - 1], _weights(problem, sizes[whole - 1 : whole])[0],
+                problem, u[whole - 1], _weights(problem, sizes[whole - 1]),
                 tangents[whole - 1])):
             whole -= 1
         if whole == 0:
@@ -161,8 +162,7 @@ class StepBatches:
         bend = None if grown else (tangents[last] - before) / out.lengths[last]
         tangent = tangents[last]
         if grown:
-            tangent = tangent / np.sqrt(_weights(problem, out.scales[last : last + 1])[0]
-                                        @ tangent**2)
+            tangent = tangent / np.sqrt(_weights(problem, out.scales[last]) @ tangent**2)
         reached = replace(
             problem, reference=problem.coefficients(u[last]).copy(),
             values=problem.parameters(u[last]), scales=scales, before=(u[last], tangent),
@@ -253,8 +253,5 @@ def _tests(problem: Any, floquet: Floquet | None, tangent: Array) -> dict[str, f
 
 
 def _weights(problem: Any, scales: Array) -> Array:
-    """Weights (K, n + 1) for scales (K, m + 1)."""
-    over = np.full((2 * problem.harmonics + 1, 1), 0.5)
-    over[0] = 1.0
-    sizes = scales[:, None, :-1] ** -2.0
-    return np.concatenate([(over * sizes).reshape(len(scales), -1), scales[:, -1:] ** -2.0], axis=1)
+    """Weights (..., n + 1) for scales (..., m + 1)."""
+    return orbit_weights(scales[..., :-1], scales[..., -1:], len(problem.reference))
