@@ -87,8 +87,7 @@ class ByHarmonics(BalancedPoints, Discretisation):
         if method is None:
             method = _method_of(problem)
         else:
-            _, tangent = starts.with_more(problem, tangent, method)
-            problem, u = starts.with_more(problem, u, method)
+            problem, u, tangent = starts.with_more(problem, u, tangent, method)
         return follow(problem, u, request.sign * tangent, method, request.options,
                       both=request.both)
 
@@ -98,15 +97,13 @@ class ByHarmonics(BalancedPoints, Discretisation):
         if problem.orders is not None:
             # The other orbits may have harmonics that these leave out.
             every = replace(_method_of(problem), harmonics=problem.harmonics)
-            _, tangent = starts.with_more(problem, tangent, every)
-            problem, u = starts.with_more(problem, u, every)
+            problem, u, tangent = starts.with_more(problem, u, tangent, every)
         problem, u, tangent = (starts.doubled(problem, u) if point.kind == "period doubling"
                                else starts.crossing(problem, u, tangent))
         own = _method_of(problem)
         if request.method is not None:
             own = request.method
-            _, tangent = starts.with_more(problem, tangent, own)
-            problem, u = starts.with_more(problem, u, own)
+            problem, u, tangent = starts.with_more(problem, u, tangent, own)
         return stepped_off(
             (problem, u, tangent), request,
             lambda u, tangent, options: follow(problem, u, tangent, own, options))
@@ -236,9 +233,7 @@ def _refined(
                 branch = replace(branch, message=_joined(branch.message, _CORNERS.format(corners)))
             break
         method = finer
-        if tangent is not None:
-            _, tangent = starts.with_more(problem, tangent, method)
-        problem, u = starts.with_more(problem, u, method)
+        problem, u, tangent = starts.with_more(problem, u, tangent, method)
     return branch, problem, u, tangent
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from fecontact.bifurcation.harmonic.estimates import peaks
 from fecontact.bifurcation.harmonic.layout import Layout, layout_from
-from fecontact.bifurcation.harmonic.series import differentiated, uniform_basis
+from fecontact.bifurcation.harmonic.series import complex_harmonics, differentiated, uniform_basis
 from fecontact.core.types import Array
 
 # Samples a period of what is observed, and harmonics of it that are stored.
@@ -38,8 +38,7 @@ def observed_of_orbits(
         observes = observes + differentiated(moved[..., :m]) @ row[m : 2 * m] / periods
     low, high = peaks(observes.T @ uniform_basis(OBSERVED_SAMPLES, H).T)
     harmonics = np.zeros((K, max(H, OBSERVED_HARMONICS) + 1), dtype=complex)
-    harmonics[:, 0] = observes[0]
-    harmonics[:, 1 : H + 1] = (observes[1::2] - 1j * observes[2::2]).T
+    harmonics[:, : H + 1] = complex_harmonics(observes).T
     return dict(zip(OBSERVED, (low.tolist(), high.tolist(), ((high - low) / 2.0).tolist(),
                                harmonics[:, : OBSERVED_HARMONICS + 1]), strict=True))
 

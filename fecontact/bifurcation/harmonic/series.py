@@ -11,7 +11,7 @@ import numpy as np
 
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Array4, Matrix
-from fecontact.core.types import Array, Integers
+from fecontact.core.types import Array, ComplexArray, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +54,26 @@ def series(harmonics: int, samples: int) -> Series:
 
 def basis_at(times: Array, harmonics: int) -> Array:
     """From coefficients to values (k, 2 H + 1) at times tau (k,)."""
-    angles = 2.0 * np.pi * np.outer(times, np.arange(1, harmonics + 1))
-    values = np.ones((len(times), 2 * harmonics + 1))
-    values[:, 1::2], values[:, 2::2] = np.cos(angles), np.sin(angles)
+    return functions_at(2.0 * np.pi * np.outer(times, np.arange(1, harmonics + 1)))
+
+
+def functions_at(angles: Array) -> Array:
+    """Functions 1, cos, sin, cos, ... (..., 2 K + 1) of a series for K angles (..., K)."""
+    values = np.ones((*angles.shape[:-1], 2 * angles.shape[-1] + 1))
+    values[..., 1::2], values[..., 2::2] = np.cos(angles), np.sin(angles)
     return values
+
+
+def complex_harmonics(X: Array) -> ComplexArray:
+    """Harmonics (H + 1, ...) of x = sum_k Re(X_k exp(2 pi i k tau)) from coefficients."""
+    return np.asarray(np.concatenate([X[:1], X[1::2] - 1j * X[2::2]]))
+
+
+def real_coefficients(harmonics: ComplexArray) -> Array:
+    """Coefficients (2 H + 1, ...) from complex harmonics (H + 1, ...)."""
+    X = np.empty((2 * len(harmonics) - 1, *harmonics.shape[1:]))
+    X[0], X[1::2], X[2::2] = harmonics[0].real, harmonics[1:].real, -harmonics[1:].imag
+    return X
 
 
 @cache

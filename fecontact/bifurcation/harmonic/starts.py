@@ -4,6 +4,7 @@ A start is a problem, its unknowns u and the direction in which the branch leave
 """
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
 
 Start = tuple[HarmonicProblem, Array, Array]
+T = TypeVar("T", Array, Array | None)
 
 _CORRECTIONS = 40
 # Least size of an equation, in that of the largest one, by which it is divided at a branch point.
@@ -240,12 +242,19 @@ def crossing(problem: HarmonicProblem, u: Array, incoming: Array) -> Start:
     return problem, u, (row @ second) * first - (row @ first) * second
 
 
-def with_more(problem: HarmonicProblem, u: Array, method: HarmonicBalance) -> tuple[
-    HarmonicProblem, Array
-]:
-    """Problem and unknowns, or a tangent, with another number of harmonics and samples."""
-    X = with_harmonics(problem.coefficients(u), method.highest)
-    result = replace(problem, harmonics=method.highest, samples=method.count, reference=X,
+def with_more(
+    problem: HarmonicProblem, u: Array, tangent: T, method: HarmonicBalance
+) -> tuple[HarmonicProblem, Array, T]:
+    """Problem, unknowns and tangent with another number of harmonics and samples."""
+    result = replace(problem, harmonics=method.highest, samples=method.count,
+                     reference=with_harmonics(problem.coefficients(u), method.highest),
                      orders=method.orders, stability=method.stability, before=(), bend=None)
-    X.reshape(-1)[result.left_out] = 0.0
-    return result, np.append(X.reshape(-1), u[-problem.common :])
+
+    def changed(vector: Array) -> Array:
+        X = with_harmonics(problem.coefficients(vector), method.highest).reshape(-1)
+        X[result.left_out] = 0.0
+        return np.append(X, vector[-problem.common :])
+
+    found = changed(u)
+    return (replace(result, reference=result.coefficients(found).copy()), found,
+            tangent if tangent is None else changed(tangent))

@@ -10,6 +10,7 @@ from fecontact.bifurcation.fields.contact_field import ContactField, contact_fie
 from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.engine_order import WaveField, Waves
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
+from fecontact.bifurcation.harmonic.series import real_coefficients
 from fecontact.bifurcation.nonlinear_modes.linear_start import field_over_xi
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
@@ -87,23 +88,18 @@ class WheelMotion:
     def coordinates(self, whole: WholeWheel, harmonics: int) -> Array:
         """Coefficients (2 H + 1, M) of the coordinates of the whole wheel."""
         N, symmetry = self.wheel.symmetry.sectors, self.wheel.symmetry
-        X = np.zeros((2 * harmonics + 1, whole.modes))
+        found = np.zeros((harmonics + 1, whole.modes), dtype=complex)
         for h, y in self.amplitudes.items():
             k = -h * self.order % N
             folded = min(k, N - k)
             first, m = next((start, size) for number, start, size in whole.blocks
                             if number == folded)
             a = np.sqrt(N if symmetry.is_real(folded) else 0.5 * N) * y
-            if h == 0:
-                X[0, first : first + m] = a.real
-                continue
-            X[2 * h - 1, first : first + m], X[2 * h, first : first + m] = a.real, -a.imag
+            found[h, first : first + m] = a
             if not symmetry.is_real(folded):
                 # Beyond N / 2 shapes are conjugates, so that the wave runs the other way.
-                sign = 1.0 if k == folded else -1.0
-                rest = slice(first + m, first + 2 * m)
-                X[2 * h - 1, rest], X[2 * h, rest] = sign * a.imag, sign * a.real
-        return X
+                found[h, first + m : first + 2 * m] = (-1j if k == folded else 1j) * a
+        return real_coefficients(found)
 
 
 def wheel_motion(field: WaveField, point: BranchPoint) -> WheelMotion:

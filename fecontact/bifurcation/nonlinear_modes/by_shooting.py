@@ -11,6 +11,7 @@ from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.layout import Layout
+from fecontact.bifurcation.harmonic.series import real_coefficients
 from fecontact.bifurcation.nonlinear_modes.linear_start import XI, LinearStart
 from fecontact.bifurcation.nonlinear_modes.mode_problem import (
     motion_values,
@@ -53,14 +54,13 @@ class ShootingMode(ShootingProblem):
         m = d // 2
         H = min(_HARMONICS, len(samples) // 2 - 1)
         waves = 2.0 / len(samples) * np.fft.rfft(samples[:, :m], axis=0)[: H + 1]
-        X = np.empty((2 * H + 1, m))
-        X[0], X[1::2], X[2::2] = 0.5 * waves[0].real, waves[1:].real, -waves[1:].imag
+        waves[0] *= 0.5
         kept = {name: found[name] for name in ("mesh", "minimum", "maximum")}
         if self.conservative:
             multipliers = found["multipliers"]
             kept |= {"multipliers": multipliers, "stable": none_grows(multipliers, 1),
                      "trivial_error": found["trivial_error"]}
-        return kept | motion_values(Layout(d, m), X, T, self.row)
+        return kept | motion_values(Layout(d, m), real_coefficients(waves), T, self.row)
 
     def lost(self, values: Mapping[str, Any]) -> bool:
         """False: no special point of a mode follows from multipliers."""

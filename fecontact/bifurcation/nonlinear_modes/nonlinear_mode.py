@@ -22,6 +22,7 @@ from fecontact.bifurcation.harmonic.engine_order import EngineOrder
 from fecontact.bifurcation.harmonic.layout import layout_from
 from fecontact.bifurcation.harmonic.method import HarmonicBalance, method_from
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
+from fecontact.bifurcation.harmonic.series import complex_harmonics
 from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.nonlinear_modes.by_shooting import (
     ShootingMode,
@@ -177,9 +178,8 @@ class NonlinearMode(Summarised):
         if not (isinstance(k, int | np.integer) and 0 <= k <= H):
             raise InputError(f"coordinates: k = {k!r} must be a whole number from 0 to {H}, the "
                              f"number of harmonics.")
-        X = np.array([point.u[: (2 * H + 1) * b].reshape(-1, b)[:, :m]
-                      for point in self.branch.points])
-        return np.asarray(X[:, 0] + 0j if k == 0 else X[:, 2 * k - 1] - 1j * X[:, 2 * k])
+        return np.array([complex_harmonics(point.u[: (2 * H + 1) * b].reshape(-1, b)[:, :m])[k]
+                         for point in self.branch.points])
 
     def orbit(self, index: int, samples: int = 1000) -> PeriodicMotion:
         """The motion at one of the points over a period, both ends included."""

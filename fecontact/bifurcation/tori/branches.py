@@ -20,6 +20,7 @@ from fecontact.bifurcation.continuation.problem import (
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.layout import Layout, layout_of
+from fecontact.bifurcation.harmonic.series import real_coefficients
 from fecontact.bifurcation.orbits.branches import as_motion
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.tori.elements import elements_of
@@ -178,9 +179,7 @@ def _of_orbit(
 ) -> tuple[Array, Array]:
     """Coefficients (L, b) of a periodic motion as a torus, and amplitudes (d,) of its states."""
     c = motion.harmonics(min(orders[0], max((len(motion.times) - 3) // 2, 0)))[:, layout.columns]
-    X = np.zeros((2 * len(c) - 1, c.shape[1]))
-    X[0], X[1::2], X[2::2] = c[0].real, c[1:].real, -c[1:].imag
-    return with_orders(X, (len(c) - 1, 0), orders), motion.amplitudes
+    return with_orders(real_coefficients(c), (len(c) - 1, 0), orders), motion.amplitudes
 
 
 def _values(field: VectorField, motion: PeriodicMotion, free: int, options: Any) -> Array:

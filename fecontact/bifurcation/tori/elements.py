@@ -22,6 +22,7 @@ from fecontact.bifurcation.harmonic.layout import (
     memory_blocks,
 )
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept
+from fecontact.bifurcation.harmonic.series import functions_at
 from fecontact.bifurcation.tori.series import complex_coefficients, on_lines, orders, turned
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.errors import AnalysisError, InputError
@@ -424,10 +425,8 @@ def _functions(
     """Functions of the series (Q, P, L) at tau (P,) of lines, and their rates [1/s]."""
     k = orders(*harmonics)
     phis = np.arange(count)[:, None] / count + ratio * places
-    angles = 2.0 * np.pi * (k[:, 0] * places[:, None] + k[:, 1] * phis[:, :, None])
-    values, speeds = (np.zeros((count, len(places), 2 * len(k) - 1)) for _ in range(2))
-    values[..., 0] = 1.0
-    values[..., 1::2], values[..., 2::2] = np.cos(angles[..., 1:]), np.sin(angles[..., 1:])
+    values = functions_at(2.0 * np.pi * (k[1:, 0] * places[:, None] + k[1:, 1] * phis[:, :, None]))
+    speeds = np.zeros_like(values)
     speeds[..., 1::2], speeds[..., 2::2] = (-turns[1:] * values[..., 2::2],
                                             turns[1:] * values[..., 1::2])
     return values, speeds

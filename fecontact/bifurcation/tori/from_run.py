@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from fecontact.bifurcation.harmonic.series import functions_at
 from fecontact.bifurcation.tori.series import orders
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
@@ -107,8 +108,6 @@ def _fit(
     at: Array, x: Array, frequencies: tuple[float, float], H: tuple[int, int]
 ) -> tuple[Array, Array]:
     """Coefficients (L, b) by least squares, and the series (k, b)."""
-    angles = 2.0 * np.pi * np.outer(at, orders(*H)[1:] @ np.array(frequencies))
-    basis = np.ones((len(at), 2 * angles.shape[1] + 1))
-    basis[:, 1::2], basis[:, 2::2] = np.cos(angles), np.sin(angles)
+    basis = functions_at(2.0 * np.pi * np.outer(at, orders(*H)[1:] @ np.array(frequencies)))
     X = np.asarray(np.linalg.lstsq(basis, x, rcond=1e-6)[0], dtype=np.float64)
     return X, np.asarray(basis @ X)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.harmonic.series import functions_at
 from fecontact.bifurcation.tori.series import complex_coefficients, on_lines, orders, turned
 from fecontact.core.checks import as_count, as_floats, require_kind
 from fecontact.core.errors import InputError
@@ -67,9 +68,7 @@ class TorusMotion(Summarised):
         """States (k, d) at times (k,) [s]."""
         t = as_floats(times, "times")
         angles = 2.0 * np.pi * np.outer(t, orders(*self.harmonics)[1:] @ self.frequencies)
-        basis = np.ones((len(t), len(self.coefficients)))
-        basis[:, 1::2], basis[:, 2::2] = np.cos(angles), np.sin(angles)
-        return np.asarray(basis @ self.coefficients)
+        return np.asarray(functions_at(angles) @ self.coefficients)
 
     def grid(self, first: int = 64, second: int = 64) -> Array:
         """States (first, second, d) at equidistant theta1 and theta2 from 0 on."""

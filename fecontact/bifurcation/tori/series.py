@@ -15,6 +15,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.bifurcation.harmonic.series import real_coefficients
 from fecontact.core.types import Array, Integers
 
 Complex = NDArray[np.complex128]
@@ -66,9 +67,8 @@ def projected(values: Array, first: int, second: int, ratio: float) -> Array:
     """Coefficients (L, b) of values (Q, P, b) on lines."""
     k = orders(first, second)
     found = means(values, first, second, ratio)[first + k[:, 0], second + k[:, 1]]
-    X = np.empty((2 * len(k) - 1, values.shape[2]))
-    X[0], X[1::2], X[2::2] = found[0].real, 2.0 * found[1:].real, -2.0 * found[1:].imag
-    return X
+    found[1:] *= 2.0
+    return real_coefficients(found)
 
 
 def turned(X: Array, turns: Array) -> Array:
