@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.problem import enlarged
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
@@ -125,11 +126,20 @@ def filled(layout: Layout, X: Array, z: Array, period: float, values: Array) -> 
     return x
 
 
-def all_coefficients(layout: Layout, X: Array, period: float) -> Array:
-    """Coefficients (2 H + 1, d - c) of q, q' and y from those of q and y."""
+def all_coefficients(layout: Layout, X: Array, period: float | Array) -> Array:
+    """Coefficients (..., 2 H + 1, d - c) of q, q' and y from those of q and y."""
     m = layout.displacements
-    return (np.concatenate([X[:, :m], differentiated(X[:, :m]) / period, X[:, m:]], axis=1) if m
-            else X)
+    q, y = X[..., :m], X[..., m:]
+    return np.concatenate([q, differentiated(q) / period, y], axis=-1) if m else X
+
+
+def grown(layout: Layout, scales: Array, X: Array, limits: Array | None) -> Array:
+    """Scales enlarged with coefficients X (L, b) of an orbit or torus, up to limits if any."""
+    if limits is None:
+        return scales
+    sizes = scales[: layout.states].copy()
+    sizes[layout.columns] = np.sqrt(np.einsum("ki,ki->i", X[1:], X[1:]))
+    return enlarged(scales, sizes, limits)
 
 
 def series_states(layout: Layout, X: Array, z: Array, period: float, times: Array) -> Array:

@@ -32,13 +32,12 @@ def observed_of_orbits(
 ) -> dict[str, Any]:
     """Values of K orbits with coefficients X (K, 2 H + 1, b) and periods (K,), K by each name."""
     K, H, m = len(X), X.shape[1] // 2, layout.displacements
-    moved = np.moveaxis(X, 1, 0)
-    observes = moved[..., :m] @ row[:m] + moved[..., m:] @ row[2 * m : m + layout.harmonic]
+    observes = X[..., :m] @ row[:m] + X[..., m:] @ row[2 * m : m + layout.harmonic]
     if m and row[m : 2 * m].any():
-        observes = observes + differentiated(moved[..., :m]) @ row[m : 2 * m] / periods
-    low, high = peaks(observes.T @ uniform_basis(OBSERVED_SAMPLES, H).T)
+        observes = observes + differentiated(X[..., :m]) @ row[m : 2 * m] / periods[:, None]
+    low, high = peaks(observes @ uniform_basis(OBSERVED_SAMPLES, H).T)
     harmonics = np.zeros((K, max(H, OBSERVED_HARMONICS) + 1), dtype=complex)
-    harmonics[:, : H + 1] = complex_harmonics(observes).T
+    harmonics[:, : H + 1] = complex_harmonics(observes.T).T
     return dict(zip(OBSERVED, (low.tolist(), high.tolist(), ((high - low) / 2.0).tolist(),
                                harmonics[:, : OBSERVED_HARMONICS + 1]), strict=True))
 

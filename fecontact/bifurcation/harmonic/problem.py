@@ -14,7 +14,6 @@ from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
     Problem,
-    enlarged,
 )
 from fecontact.bifurcation.fields.fast_modes import unresolved_modes
 from fecontact.bifurcation.fields.jumps import missed_jumps
@@ -35,9 +34,10 @@ from fecontact.bifurcation.harmonic.compiled.orbit import (
     evaluate,
 )
 from fecontact.bifurcation.harmonic.compiled.step_batches import StepBatches
+from fecontact.bifurcation.harmonic.layout import grown
 from fecontact.bifurcation.harmonic.series import differentiated, shifted
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions, stability_grid
-from fecontact.bifurcation.harmonic.stored import StoredOrbits, StoredValues
+from fecontact.bifurcation.harmonic.stored import ERRORS, StoredOrbits, StoredValues
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests
 from fecontact.bifurcation.orbits.same_orbit import (
     HALVING,
@@ -79,10 +79,14 @@ class HarmonicLinearisation(Linearised):
     def neglected(self) -> tuple[float, float]:
         """Estimates of the error: of the orbit, and of its equations; see :mod:`estimates`."""
         problem, layout = self.problem, self.problem.layout
-        forces, mean = self._samples()
+        X, sizes, (forces, mean) = (problem.coefficients(self.u), problem.scales[layout.columns],
+                                    self._samples())
+        if problem.waves is not None:
+            return problem.waves.neglected(X, forces, self.period, float(self.u[-1]), sizes,
+                                           problem.harmonics_kept), np.nan
         error, residual = estimates.neglected(
-            problem.coefficients(self.u)[None], forces[None], mean[None], np.array([self.period]),
-            problem.scales[layout.columns], layout.displacements, problem.orders)
+            X[None], forces[None], mean[None], np.array([self.period]), sizes,
+            layout.displacements, problem.orders)
         return float(error[0]), float(residual[0])
 
     def _samples(self) -> tuple[Array, Array]:
@@ -256,16 +260,15 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
 
     def _grown(self, u: Array) -> Array:
         """Scales of states, period and parameter, enlarged with the orbit."""
-        if self.limits is None:
-            return self.scales
-        sizes, X = self.scales[:-2].copy(), self.coefficients(u)[1:]
-        sizes[self.layout.columns] = np.sqrt(np.einsum("ki,ki->i", X, X))
-        return enlarged(self.scales, sizes, self.limits)
+        return grown(self.layout, self.scales, self.coefficients(u), self.limits)
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
         """Period, stability, the errors of the truncation and the extremes of the states."""
         known = {} if self.stability is None else {
             name: [value] for name, value in linearisation.floquet.stored.items()}
+        if self.waves is not None:
+            known |= {name: [error] for name, error in zip(
+                ERRORS, linearisation.neglected, strict=True)}
         forces, mean = linearisation._samples()
         return self.stored(u[None], linearisation.memory[None], forces[None], mean[None],
                            self.scales[None, self.layout.columns], known)[0]
@@ -279,13 +282,6 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
             periods = self.periods * self.turn / u[:, -1]
         else:
             periods = np.array([self.period(each) for each in u])
-        if self.waves is not None:
-            errors = [self.waves.neglected(self.coefficients(one), accelerations, T, float(one[-1]),
-                                          size, self.harmonics_kept)
-                      for one, accelerations, T, size in zip(
-                          u, forces, periods, np.broadcast_to(sizes, (count, sizes.shape[-1])),
-                          strict=True)]
-            known = {**known, "truncation_error": errors, "residual": [np.nan] * count}
         orbits = StoredOrbits(layout, u[:, : self.size].reshape(count, -1, layout.harmonic), z,
                               periods, forces, mean, sizes, self.row, known, self.orders)
         return [StoredValues(orbits, k) for k in range(count)]

@@ -83,19 +83,18 @@ def uniform_basis(count: int, harmonics: int) -> Array:
 
 
 def differentiated(X: Array) -> Array:
-    """Coefficients (2 H + 1, ...) of dx/dtau."""
-    out, turns = np.empty_like(X), _turns(len(X) // 2, X.ndim)
-    out[0] = 0.0
-    np.multiply(turns, X[2::2], out=out[1::2])
-    np.multiply(-turns, X[1::2], out=out[2::2])
+    """Coefficients (..., 2 H + 1, b) of dx/dtau."""
+    out, turns = np.empty_like(X), _turns(X.shape[-2] // 2)
+    out[..., 0, :] = 0.0
+    np.multiply(turns, X[..., 2::2, :], out=out[..., 1::2, :])
+    np.multiply(-turns, X[..., 1::2, :], out=out[..., 2::2, :])
     return out
 
 
 @cache
-def _turns(harmonics: int, dimension: int) -> Array:
-    """2 pi k of the harmonics, along the first of so many axes."""
-    k = np.arange(1, harmonics + 1).reshape(-1, *[1] * (dimension - 1))
-    return np.asarray(2.0 * np.pi * k)
+def _turns(harmonics: int) -> Array:
+    """2 pi k (H, 1) of the harmonics."""
+    return np.asarray(2.0 * np.pi * np.arange(1, harmonics + 1)[:, None])
 
 
 def rows_of(orders: tuple[int, ...] | None, harmonics: int) -> Integers:

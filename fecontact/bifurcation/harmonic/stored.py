@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.harmonic import estimates
-from fecontact.bifurcation.harmonic.layout import Layout
+from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients
 from fecontact.bifurcation.harmonic.observed import OBSERVED, observed_of_orbits
-from fecontact.bifurcation.harmonic.series import differentiated
 from fecontact.core.read_only import read_only
 from fecontact.core.types import Array
 
-_ERRORS, _EXTREMES = ("truncation_error", "residual"), ("minimum", "maximum")
+ERRORS, _EXTREMES = ("truncation_error", "residual"), ("minimum", "maximum")
 
 
 @dataclass(eq=False)
@@ -53,7 +52,7 @@ class StoredOrbits:
 
     def names(self) -> tuple[str, ...]:
         """Names of all values, in the order in which they are stored."""
-        first = ("period", *_ERRORS, *_EXTREMES, *(("memory",) if self.layout.memory else ()))
+        first = ("period", *ERRORS, *_EXTREMES, *(("memory",) if self.layout.memory else ()))
         more = () if self.row is None else OBSERVED
         return (*first, *(name for name in self.known if name not in first and name not in more),
                 *more)
@@ -67,29 +66,24 @@ class StoredOrbits:
 
     def _release(self) -> None:
         """Drop what no value is left to be made from."""
-        if all(name in self.known for name in _ERRORS):
+        if all(name in self.known for name in ERRORS):
             self.forces = self.mean = self.sizes = np.empty(0)
         if all(name in self.known for name in self.names()):
             self.X = self.z = np.empty(0)
 
     def _made(self, name: str) -> dict[str, Any]:
         layout, X = self.layout, self.X
-        m = layout.displacements
         if name == "period":
             return {name: self.periods.tolist()}
         if name == "memory" and layout.memory:
             return {name: self.z}
         if name in _EXTREMES:
-            whole = X
-            if m:
-                speeds = np.moveaxis(differentiated(np.moveaxis(X[..., :m], 1, 0)), 0, 1)
-                whole = np.concatenate([X[..., :m], speeds / self.periods[:, None, None],
-                                        X[..., m:]], axis=2)
+            whole = all_coefficients(layout, X, self.periods[:, None, None])
             return dict(zip(_EXTREMES, estimates.extremes(whole, self.z), strict=True))
-        if name in _ERRORS:
-            found = estimates.neglected(X, self.forces, self.mean, self.periods, self.sizes, m,
-                                        self.orders)
-            return {each: values.tolist() for each, values in zip(_ERRORS, found, strict=True)}
+        if name in ERRORS:
+            found = estimates.neglected(X, self.forces, self.mean, self.periods, self.sizes,
+                                        layout.displacements, self.orders)
+            return {each: values.tolist() for each, values in zip(ERRORS, found, strict=True)}
         if name in OBSERVED and self.row is not None:
             return observed_of_orbits(layout, X, self.periods, self.row)
         raise KeyError(name)

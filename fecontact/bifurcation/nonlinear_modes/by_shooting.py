@@ -14,9 +14,9 @@ from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.series import real_coefficients
 from fecontact.bifurcation.nonlinear_modes.linear_start import XI, LinearStart
 from fecontact.bifurcation.nonlinear_modes.mode_problem import (
+    AlongMode,
     motion_values,
     none_grows,
-    with_frequency,
 )
 from fecontact.bifurcation.orbit_methods import Shooting
 from fecontact.bifurcation.orbits.shooting import ShootingProblem
@@ -28,7 +28,7 @@ _HARMONICS = 63
 
 
 @dataclass(frozen=True, eq=False)
-class ShootingMode(ShootingProblem):
+class ShootingMode(AlongMode, ShootingProblem):
     """Orbits of an autonomous system over xi, with what is observed of them.
 
     Multipliers are stored of conservative motions alone; none makes a special point.
@@ -62,21 +62,9 @@ class ShootingMode(ShootingProblem):
                      "trivial_error": found["trivial_error"]}
         return kept | motion_values(Layout(d, m), real_coefficients(waves), T, self.row)
 
-    def lost(self, values: Mapping[str, Any]) -> bool:
-        """False: no special point of a mode follows from multipliers."""
-        return False
-
-    def note(self, points: Any) -> str:
-        """Nothing."""
-        return ""
-
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """None."""
         return {}
-
-    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """Turns of xi are no folds of the mode."""
-        return {"fold"}
 
     def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Zero: multipliers under negative damping say nothing."""
@@ -85,10 +73,6 @@ class ShootingMode(ShootingProblem):
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
         """None: a mode ends at its amplitudes."""
         return None
-
-    def _grown(self, u: Array) -> Array:
-        """Scales enlarged with the motion; those of period and xi follow the frequency."""
-        return with_frequency(super()._grown(u), self.period(u))
 
 
 def leaving_by_shooting(

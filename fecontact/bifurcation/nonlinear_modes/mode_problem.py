@@ -10,6 +10,9 @@ import numpy as np
 from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.observed import observed_values
 from fecontact.bifurcation.harmonic.problem import HarmonicLinearisation, HarmonicProblem
+from fecontact.bifurcation.harmonic.series import differentiated
+from fecontact.bifurcation.harmonic.stored import ERRORS
+from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, ComplexArray
 
@@ -56,8 +59,32 @@ class ModeLinearisation(HarmonicLinearisation):
         return float((2.0 * np.pi / self.problem.scales[-2]) ** 2)
 
 
+class AlongMode(OrbitUnknowns):
+    """Branches of orbits along a mode, whose multipliers and turns of xi say nothing of it."""
+
+    def lost(self, values: Mapping[str, Any]) -> bool:
+        """False: no special point of a mode follows from multipliers."""
+        return False
+
+    def note(self, points: Any) -> str:
+        """Empty note: 'trivial_error' is the error of the multipliers."""
+        return ""
+
+    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """Turns of xi are no folds of the mode."""
+        return {"fold"}
+
+    def _grown(self, u: Array) -> Array:
+        """Scales enlarged with the motion; those of period and xi follow the frequency."""
+        scales: Array = super()._grown(u)  # type: ignore[misc]
+        ratio = PERIOD_SCALE * self.period(u) / scales[-2]
+        if 1.0 / _FOLLOWED < ratio < _FOLLOWED:
+            return scales
+        return np.append(scales[:-2], [scales[-2] * ratio, scales[-1] / ratio])
+
+
 @dataclass(frozen=True, eq=False)
-class ModeProblem(HarmonicProblem):
+class ModeProblem(AlongMode, HarmonicProblem):
     """Orbits of an autonomous system over xi, with what is observed and without stability.
 
     Multipliers of a damped system with -xi M q' say nothing of its own motion; those of a
@@ -96,14 +123,6 @@ class ModeProblem(HarmonicProblem):
         """Relative size of Newton steps below which growing steps are rounding."""
         return _ROUNDING_OF_MEANS if self.layout.memory else super().rounding
 
-    def lost(self, values: Mapping[str, Any]) -> bool:
-        """False: no special point of a mode follows from multipliers."""
-        return False
-
-    def note(self, points: Any) -> str:
-        """Empty note: 'trivial_error' is the error of the multipliers."""
-        return ""
-
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
         """The predictor; that of a motion x(-t) = x(t) without losses is one too.
 
@@ -116,24 +135,14 @@ class ModeProblem(HarmonicProblem):
             X[2::2] = 0.0
         return guess
 
-    def _grown(self, u: Array) -> Array:
-        """Scales enlarged with the motion; those of period and xi follow the frequency."""
-        return with_frequency(super()._grown(u), self.period(u))
-
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, velocities, truncation errors, and what is observed."""
         T, X = self.period(u), self.coefficients(u)
         found = motion_values(self.layout, X, T, self.row)
         if self.waves is not None:
-            forces, _ = linearisation._samples()
-            xi, kept = float(u[-1]), self.harmonics_kept
-            error, residual = self.waves.neglected(
-                X, forces, T, xi, self.scales[self.layout.columns], kept), float("nan")
             found["mean_square_velocity"] = self.waves.mean_square_velocity(
-                X, linearisation.free_balance, T, xi, kept)
-        else:
-            error, residual = linearisation.neglected
-        found |= {"truncation_error": error, "residual": residual}
+                X, linearisation.free_balance, T, float(u[-1]), self.harmonics_kept)
+        found |= dict(zip(ERRORS, linearisation.neglected, strict=True))
         if self.conservative and self.stability is not None:
             floquet = linearisation.floquet
             found |= {"multipliers": floquet.multipliers, "stable": none_grows(
@@ -159,10 +168,6 @@ class ModeProblem(HarmonicProblem):
         return {"branch point": (linearisation.determinant_sign(row) / size
                                  if np.isfinite(size) else 0.0)}
 
-    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """Turns of xi are no folds of the mode."""
-        return {"fold"}
-
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
     ) -> dict[str, Any] | None:
@@ -176,19 +181,10 @@ def motion_values(layout: Layout, X: Array, period: float, row: Array) -> dict[s
     'period', 'mean_square_velocity' of the displacements (NaN without any), and what is observed.
     """
     m = layout.displacements
-    k = np.repeat(np.arange(1, len(X) // 2 + 1), 2)[:, None]
     # Of mass-normalised modes: twice the mean kinetic energy.
-    square = 0.5 * float(((2.0 * np.pi / period * k * X[1:, :m]) ** 2).sum()) if m else np.nan
+    square = 0.5 * float((differentiated(X[:, :m] / period) ** 2).sum()) if m else np.nan
     return {"period": period, "mean_square_velocity": square,
             **observed_values(layout, X, period, row)}
-
-
-def with_frequency(scales: Array, period: float) -> Array:
-    """Scales whose last two, of period and xi, follow the frequency of the motion."""
-    ratio = PERIOD_SCALE * period / scales[-2]
-    if 1.0 / _FOLLOWED < ratio < _FOLLOWED:
-        return scales
-    return np.append(scales[:-2], [scales[-2] * ratio, scales[-1] / ratio])
 
 
 def none_grows(multipliers: ComplexArray, pairs: int) -> bool:

@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
-from fecontact.bifurcation.harmonic.layout import Layout, orbit_weights
+from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.harmonic.layout import Layout, grown, orbit_weights
 from fecontact.bifurcation.harmonic.woodbury import BorderedEquations
 from fecontact.bifurcation.orbits.same_orbit import shrunk
 from fecontact.bifurcation.orbits.unknowns import FreeParameters, beside, by_differences
@@ -195,13 +195,9 @@ class TorusProblem(FreeParameters, Problem):
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[TorusProblem, Array, Array]":
         """The problem for the next step, with the phase conditions at u."""
-        scales, X = self.scales, self.coefficients(u)[1:]
-        if self.limits is not None:
-            sizes = scales[:-3].copy()
-            sizes[self.layout.columns] = np.sqrt(np.einsum("ki,ki->i", X, X))
-            scales = enlarged(scales, sizes, self.limits)
-        return replace(self, reference=self.coefficients(u).copy(), values=self.parameters(u),
-                       scales=scales), u, tangent
+        X = self.coefficients(u).copy()
+        return replace(self, reference=X, values=self.parameters(u), scales=grown(
+            self.layout, self.scales, X, self.limits)), u, tangent
 
     @cached_property
     def _second(self) -> int:
