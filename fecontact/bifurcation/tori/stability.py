@@ -143,7 +143,8 @@ def exponents(M: Array, ratio: float) -> Array:
     basis, total = np.eye(d), np.zeros(d)
     for n, step in enumerate(matrices):
         basis, upper = np.linalg.qr(step @ basis)
-        if n >= _BEFORE:
+        # The first and last weights are zero within rounding, and growth may be.
+        if n >= _BEFORE and weights[n - _BEFORE] > 0.0:
             with np.errstate(divide="ignore"):
                 total += weights[n - _BEFORE] * np.log(np.abs(np.diag(upper)))
     return np.sort(total / weights.sum())[::-1]
