@@ -171,7 +171,7 @@ def test_derivatives_of_the_resonance_are_those_of_its_residual(condition, windo
         h = 1e-6 * np.eye(len(u))[k]
         differences[:, k] = (problem.linearise(u + h).residual
                              - problem.linearise(u - h).residual) / 2e-6
-    found = problem.linearise(u).matrix
+    found = problem.linearise(u).condensed
     assert found == pytest.approx(differences, abs=3e-7 * np.abs(differences).max())
 
 

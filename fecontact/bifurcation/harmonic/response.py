@@ -57,8 +57,8 @@ from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 
-# Points of a branch at most, and largest step, unless options say so.
-_POINTS, _LARGEST = 2000, 0.03
+# Options of branches, unless others are given.
+RESPONSES = ContinuationOptions(points=2000, largest_step=0.03)
 _FREQUENCY = "drive.frequency_hz"
 
 
@@ -255,8 +255,7 @@ def frequency_response(
     require_kind("frequency_response", (*(one.options for one in DISCRETISATIONS), NoneType),
                  method=method)
     held = preloaded(system, preload)
-    chosen = options_of(
-        options or ContinuationOptions(points=_POINTS, largest_step=_LARGEST), bounds)
+    chosen = options_of(options or RESPONSES, bounds)
     level_name, values = levels_of(levels)
     if isinstance(system, ContactSystem):
         name = parameter or _FREQUENCY
@@ -426,7 +425,7 @@ def observed_amplitudes(branch: Branch, row: Array) -> Array:
 
 
 def _require_observable(layout: Layout, row: Array) -> None:
-    if row[layout.states - layout.memory :].any():
+    if row[layout.internal].any():
         raise InputError("Internal variables of friction cannot be observed; choose a displacement "
                          "or a velocity.")
 

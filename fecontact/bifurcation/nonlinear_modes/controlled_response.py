@@ -8,7 +8,6 @@ from types import NoneType
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.problem import (
     ContinuationOptions,
     options_of,
@@ -19,6 +18,7 @@ from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic.forced_starts import Forced
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.response import (
+    RESPONSES,
     FrequencyResponse,
     amplitude_label,
     branch_of_response,
@@ -26,7 +26,12 @@ from fecontact.bifurcation.harmonic.response import (
     preloaded,
     until_interrupted,
 )
-from fecontact.bifurcation.nonlinear_modes.peak_problem import HELD, PeakProblem, problem_at
+from fecontact.bifurcation.nonlinear_modes.peak_problem import (
+    HELD,
+    PeakProblem,
+    followed,
+    problem_at,
+)
 from fecontact.core.checks import as_floats, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.resources.blas_threads import one_blas_thread
@@ -36,8 +41,6 @@ from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 
-# Points at most, and largest step, unless options say so.
-_POINTS, _LARGEST = 2000, 0.03
 # First level, relative to the one at which the linear response has the amplitude, factor by which
 # the range of levels grows, and how often.
 _FIRST, _WIDER, _TIMES = 1e-3, 8.0, 5
@@ -94,29 +97,24 @@ def controlled_response(
     if held.ndim != 1 or not len(held) or not (held > 0.0).all():
         raise InputError(f"controlled_response: amplitudes = {amplitudes!r} must be one or several "
                          f"numbers above zero.")
-    chosen = options_of(
-        options or ContinuationOptions(points=_POINTS, largest_step=_LARGEST), bounds)
+    chosen = options_of(options or RESPONSES, bounds)
     name = parameter or "drive.frequency_hz"
     if name == force:
         raise InputError(f"controlled_response: parameter and force are both {force!r}; take "
                          f"another parameter.")
     field = system if isinstance(system, VectorField) else contact_field(system, [force, name])
     row, observed = observed_row(field, observe)
-    low, high = chosen.bounds
-    first = inside(low if start is None else float(start), chosen)
     values = field.values
-    values[field.index(name)] = first
+    values[field.index(name)] = inside(
+        chosen.bounds[0] if start is None else float(start), chosen)
     wanted = Forced(field, values, field.index(force), method or HarmonicBalance(), chosen,
                     preloaded(system, preload))
 
     def at_amplitude(amplitude: float) -> Branch:
         problem, u = _started(wanted, field.index(name), amplitude, row)
-        return continue_branch(
-            problem, u, chosen, name=name, direction=1.0 if first < high else -1.0,
-            both=low < first < high, attributes={
-                **problem.orbit.attributes(), "parameters": [name, force],
-                "observed": observed, "condition": HELD, "level": amplitude,
-                "level_name": "amplitude", "level_label": amplitude_label(observed)})
+        return followed(problem, u, chosen, name, {
+            "parameters": [name, force], "observed": observed, "level": amplitude,
+            "level_name": "amplitude", "level_label": amplitude_label(observed)})
 
     found = until_interrupted(held, at_amplitude)
     return FrequencyResponse(found, "amplitude", held[: len(found)], observed)
@@ -135,8 +133,8 @@ def _started(
     failed: FecontactError = AnalysisError("")
     highest = abs(float(values[force])) or 1.0
     for _ in range(_TIMES):
-        given = ContinuationOptions(
-            points=2000, largest_step=_LARGEST, locate=False, bounds=(_FIRST * highest, highest),
+        given = replace(
+            RESPONSES, locate=False, bounds=(_FIRST * highest, highest),
             events={_REACHED: lambda found: found["observed_amplitude"] / amplitude - 1.0},
             stop_at=[_REACHED])
         try:

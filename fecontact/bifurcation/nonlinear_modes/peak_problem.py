@@ -19,16 +19,18 @@ pi / 2 the force does no work in phase with them.
 Held: the observed amplitude has a given value, a(y) = a_0.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.newton import newton, weighted_norm
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.problem import Problem, width_of
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem, width_of
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.forced_starts import Forced, rest_state
@@ -39,6 +41,7 @@ from fecontact.bifurcation.harmonic.problem import (
     orientation,
 )
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated, uniform_basis
+from fecontact.bifurcation.harmonic.woodbury import BorderedEquations
 from fecontact.bifurcation.nonlinear_modes.given_force import given_force
 from fecontact.bifurcation.orbits.unknowns import by_differences
 from fecontact.core.errors import AnalysisError
@@ -120,7 +123,7 @@ class PeakProblem(Problem):
 
     def orientation(self, linearisation: Any, tangent: Array) -> float:
         """Sign of the determinant of the equations with the tangent below."""
-        return orientation(linearisation.matrix, self.weights(), tangent)
+        return orientation(linearisation.condensed, self.weights(), tangent)
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[PeakProblem, Array, Array]":
         """The problem for the next step: border along the response at u, scales of its orbit."""
@@ -173,7 +176,19 @@ def problem_at(
     return problem, np.append(u, value)
 
 
-class PeakLinearised:
+def followed(
+    problem: PeakProblem, u: Array, options: ContinuationOptions, name: str,
+    further: Mapping[str, Any],
+) -> Branch:
+    """The branch through u over the second parameter, to both sides within its range."""
+    low, high = options.bounds
+    return continue_branch(
+        problem, u, options, name=name, direction=1.0 if u[-1] < high else -1.0,
+        both=low < u[-1] < high, attributes={
+            **problem.orbit.attributes(), "condition": problem.condition, **further})
+
+
+class PeakLinearised(BorderedEquations):
     """Residual of orbit and condition, and solutions of systems with their derivative."""
 
     def __init__(self, problem: PeakProblem, u: Array) -> None:
@@ -294,7 +309,7 @@ class PeakLinearised:
         return np.append(bent[0] - z @ bent[1], -z @ bent[2]) / self.problem.size
 
     @cached_property
-    def matrix(self) -> Array:
+    def condensed(self) -> Array:
         """Derivative (n + 1, n + 2) of the residual."""
         n = self.orbit.size
         found = np.empty((n + 1, n + 2))
@@ -302,13 +317,6 @@ class PeakLinearised:
         found[:n, -1] = self._by_parameter(self.u[:-1])
         found[n] = self._last_row
         return found
-
-    def solve(self, row: Array, rhs: Array) -> Array:
-        """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
-        try:
-            return np.asarray(np.linalg.solve(np.vstack([self.matrix, row]), rhs))
-        except np.linalg.LinAlgError:
-            return np.full(len(rhs), np.nan)
 
 
 def _extreme(x: Array) -> float:

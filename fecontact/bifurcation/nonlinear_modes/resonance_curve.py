@@ -7,7 +7,6 @@ from typing import Any, Literal
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
@@ -17,12 +16,13 @@ from fecontact.bifurcation.harmonic.forced_starts import Forced, rest_state
 from fecontact.bifurcation.harmonic.layout import layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.response import (
+    RESPONSES,
     branch_of_response,
     observed_amplitudes,
     preloaded,
 )
 from fecontact.bifurcation.nonlinear_modes.given_force import given_force
-from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem, problem_at
+from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem, followed, problem_at
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_choice
 from fecontact.core.read_only import read_only_arrays
@@ -34,8 +34,8 @@ from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 
-# Points at most and largest step, unless options say so; largest step on the first response.
-_POINTS, _LARGEST, _RESPONSE = 400, 0.05, 0.03
+# Points at most and largest step, unless options say so.
+_POINTS, _LARGEST = 400, 0.05
 # Distance along the response of the orbits whose amplitudes are compared, with memory, and least
 # number of samples by which they differ in phase.
 _WINDOW, _SAMPLES = 0.05, 4
@@ -174,17 +174,13 @@ def resonance_curve(
         raise InputError("resonance_curve: condition = 'phase' needs a contact system, whose given "
                          "forces are known; take 'amplitude'.")
     row, observed = observed_row(field, observe)
-    low, high = chosen.bounds
     values = field.values
-    values[second] = inside(low if start is None else float(start), chosen)
+    values[second] = inside(chosen.bounds[0] if start is None else float(start), chosen)
     wanted = Forced(field, values, free, method or HarmonicBalance(), chosen,
                     preloaded(system, preload))
     problem, u = _first(wanted, second, frequencies, row, condition, float(lag))
-    branch = continue_branch(
-        problem, u, chosen, name=parameter, direction=1.0 if u[-1] < high else -1.0,
-        both=low < u[-1] < high, attributes={
-            **problem.orbit.attributes(), "parameters": [parameter, frequency],
-            "observed": observed, "condition": condition})
+    branch = followed(problem, u, chosen, parameter,
+                      {"parameters": [parameter, frequency], "observed": observed})
     return ResonanceCurve(branch, observed, condition)
 
 
@@ -209,8 +205,7 @@ def _first(
     """The problem, and the peak of a response."""
     field, values = wanted.field, wanted.values
     # Kinks jump the stability, which does not matter here.
-    given = options_of(ContinuationOptions(points=2000, largest_step=_RESPONSE, locate=False),
-                       frequencies)
+    given = options_of(replace(RESPONSES, locate=False), frequencies)
     branch = branch_of_response(
         replace(wanted, method=replace(wanted.method, tolerance=None), options=given),
         given.bounds[0])
