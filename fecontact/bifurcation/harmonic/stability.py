@@ -19,10 +19,9 @@ from fecontact.bifurcation.linalg.transition_matrices import transitions
 from fecontact.bifurcation.orbits.floquet import (
     Floquet,
     by_falling_modulus,
-    floquet_of,
     floquet_of_product,
 )
-from fecontact.bifurcation.orbits.mesh import rule
+from fecontact.bifurcation.orbits.mesh import basis_at_points, rule
 from fecontact.core.types import Array
 
 # Collocation of the linearised equations: degree, intervals per harmonic, at least, and samples for
@@ -61,11 +60,7 @@ def radau_rule(degree: int) -> tuple[Array, Array, Array]:
     legendre = np.polynomial.legendre.Legendre
     roots = (legendre.basis(degree) - legendre.basis(degree - 1)).roots()
     points = np.sort((1.0 + np.real(roots)) / 2.0)
-    nodes = np.linspace(0.0, 1.0, degree + 1)
-    basis = [np.polynomial.Polynomial.fromroots(np.delete(nodes, k)) for k in range(degree + 1)]
-    basis = [p / p(node) for p, node in zip(basis, nodes, strict=True)]
-    return (points, np.array([[p(x) for p in basis] for x in points]),
-            np.array([[p.deriv()(x) for p in basis] for x in points]))
+    return points, *basis_at_points(degree, points)
 
 
 def by_transitions(problem: Balance, u: Array, z: Array) -> Floquet:
@@ -125,25 +120,22 @@ def _floquet(problem: Balance, T: float, J: Array) -> Floquet:
     layout = problem.layout
     N, radau = _intervals(problem)
     points, basis, slopes = _collocation(radau)
+    M = np.empty((N, layout.states, layout.states))
     if layout.displacements and not layout.memory:
-        M = np.empty((N, layout.states, layout.states))
         motion_transitions(J, T / N, points, *integrals(tuple(points.tolist())), M)
         return _of_transitions(problem, T, M, J)
     for k in range(layout.states - layout.memory, layout.states):
         J[:, k, k] -= LEAK / T
     factors, rates, nothing, widths = _workspace(N, len(points), layout.states)
     condensation.condense(J, rates, nothing, widths, T, basis, slopes, 0, factors)
-    if problem.autonomous or not layout.displacements or layout.states < _MANY:
-        return floquet_of(factors, problem.autonomous)
-    M = np.empty((N, layout.states, layout.states))
     transitions(factors, M)
     return _of_transitions(problem, T, M, J)
 
 
 def _of_transitions(problem: Balance, T: float, M: Array, J: Array) -> Floquet:
-    """Multipliers from the transition matrices M (N, d, d) of motions."""
+    """Multipliers from transition matrices M (N, d, d)."""
     layout = problem.layout
-    if problem.autonomous or layout.states < _MANY:
+    if problem.autonomous or not layout.displacements or layout.states < _MANY:
         return floquet_of_product(M, problem.autonomous)
     # Velocities in the scale of displacements, by the stiffness of each coordinate.
     m, scale = layout.displacements, np.ones(layout.states)
@@ -205,6 +197,4 @@ def koopman_hill(J: Array, period: float, order: int) -> NDArray[np.float64]:
 def by_hill(problem: Balance, u: Array, J: Array) -> Floquet:
     """Multipliers by the Koopman-Hill projection with K = 2 H; J (N, d, d) at the samples."""
     monodromy = koopman_hill(J, problem.period(u), 2 * problem.harmonics)
-    found = by_falling_modulus(np.asarray(np.linalg.eigvals(monodromy), dtype=np.complex128))
-    trivial = int(np.argmin(np.abs(found - 1.0))) if problem.autonomous else None
-    return Floquet(found, trivial)
+    return floquet_of_product(monodromy[None], problem.autonomous)

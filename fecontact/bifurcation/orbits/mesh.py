@@ -43,21 +43,31 @@ class Rule:
     fine: Array
 
 
+def basis_polynomials(degree: int) -> list[np.polynomial.Polynomial]:
+    """Polynomials that are one at one of m + 1 equidistant nodes in [0, 1], zero at the others."""
+    nodes = np.linspace(0.0, 1.0, degree + 1)
+    found = [np.polynomial.Polynomial.fromroots(np.delete(nodes, k)) for k in range(degree + 1)]
+    return [p / p(node) for p, node in zip(found, nodes, strict=True)]
+
+
+def basis_at_points(degree: int, points: Array) -> tuple[Array, Array]:
+    """Values and slopes (s, m + 1) of the basis polynomials at points (s,)."""
+    basis = basis_polynomials(degree)
+    return (np.array([[p(x) for p in basis] for x in points]),
+            np.array([[p.deriv()(x) for p in basis] for x in points]))
+
+
 @cache
 def rule(degree: int) -> Rule:
     """The rule with m = ``degree`` Gauss points."""
     roots, weights = np.polynomial.legendre.leggauss(degree)
     points = (roots + 1.0) / 2.0
-    nodes = np.linspace(0.0, 1.0, degree + 1)
-    basis = [np.polynomial.Polynomial.fromroots(np.delete(nodes, k)) for k in range(degree + 1)]
-    basis = [p / p(node) for p, node in zip(basis, nodes, strict=True)]
+    basis = basis_polynomials(degree)
     bump = np.polynomial.Polynomial.fromroots(points).integ()
     # Its extremes lie at the Gauss points, the zeros of its derivative.
     highest = float(np.abs(bump(points)).max()) / factorial(degree)
     return Rule(
-        points, weights / 2.0,
-        np.array([[p(x) for p in basis] for x in points]),
-        np.array([[p.deriv()(x) for p in basis] for x in points]),
+        points, weights / 2.0, *basis_at_points(degree, points),
         np.array([p.deriv(degree)(0.0) for p in basis]), highest,
         np.array([[p(x) for p in basis] for x in np.linspace(0.0, 1.0, 8 * degree + 1)]))
 
