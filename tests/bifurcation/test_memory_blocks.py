@@ -7,7 +7,7 @@ from systems import TURN
 
 import fecontact as fc
 from fecontact.bifurcation import HarmonicBalance, contact_field
-from fecontact.bifurcation.harmonic.layout import layout_of, memory_blocks
+from fecontact.bifurcation.harmonic.layout import kept_by, layout_of
 from fecontact.bifurcation.harmonic.memory import LEAK, solve_around
 from fecontact.bifurcation.harmonic.starts import converged_orbit, problem_for
 from fecontact.laws import DahlFriction, IwanFriction, JenkinsFriction, PrescribedForce
@@ -55,7 +55,7 @@ def test_elements_are_blocks_of_their_own():
     for system, wanted in ((iwan(5), [1]), (jenkins_system(), [1]),
                            (iwan(5).with_(friction=DahlFriction(0.5, 1.0)), [0])):
         field = driven(system)
-        assert memory_blocks(field, layout_of(field)).tolist() == wanted
+        assert kept_by(field, layout_of(field)).blocks.tolist() == wanted
 
 
 def test_elements_of_one_node_are_those_of_as_many_nodes():

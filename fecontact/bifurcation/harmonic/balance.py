@@ -258,7 +258,7 @@ class Balance(OrbitUnknowns):
             If internal variables do not come to repeat.
         """
         layout = self.layout
-        m, first = layout.displacements, layout.states - layout.memory
+        m = layout.displacements
         x = self.states(u, period, np.zeros((self.samples, layout.memory)))
         if not layout.memory:
             return x
@@ -268,7 +268,7 @@ class Balance(OrbitUnknowns):
         if not march(self.times(period), x, self.field.arrays(self.parameters(u)), period,
                      self.kept.blocks, self.kept.at(x[:, :m]), z):
             raise AnalysisError(UNREPEATED)
-        x[:, first:] = z
+        x[:, layout.internal] = z
         return x
 
 
@@ -314,7 +314,7 @@ class Linearised(BorderedEquations):
             return self.elements.deflections
         if not layout.memory:
             return np.zeros((self.problem.samples, 0))
-        return np.ascontiguousarray(self.marched[:, layout.states - layout.memory :])
+        return np.ascontiguousarray(self.marched[:, layout.internal])
 
     @cached_property
     def states(self) -> Array:
@@ -395,7 +395,7 @@ class Linearised(BorderedEquations):
         turned = differentiated(problem.coefficients(u)) / period
         if m:
             turned[:, :m] = differentiated(turned[:, :m]) / period
-        turned -= problem.series.projection @ rates[:, m : layout.states - layout.memory]
+        turned -= problem.series.projection @ rates[:, layout.rows]
         return turned
 
     @cached_property
@@ -438,9 +438,7 @@ class Linearised(BorderedEquations):
 
     def _by_rates(self, change: Array) -> Array:
         """Change (n,) of the balance with a change (N, d) of the rates."""
-        layout = self.problem.layout
-        first = layout.states - layout.memory
-        found = self.problem.series.projection @ change[:, layout.displacements : first]
+        found = self.problem.series.projection @ change[:, self.problem.layout.rows]
         return -found.reshape(-1)
 
     @cached_property
@@ -450,8 +448,8 @@ class Linearised(BorderedEquations):
         J, transforms = self.derivatives[1], problem.series
         m, N = layout.displacements, problem.samples
         if m or layout.memory:
-            by_state = J[:, layout.rows[:, None], layout.columns].reshape(N, -1)
-            by_speed = J[:, layout.rows[0] : layout.rows[-1] + 1, m : 2 * m].reshape(N, -1)
+            by_state = J[:, layout.rows, layout.columns].reshape(N, -1)
+            by_speed = J[:, layout.rows, m : 2 * m].reshape(N, -1)
         else:
             by_state, by_speed = J.reshape(N, -1), np.zeros((N, 0))
         out = np.empty((len(problem.reference), layout.harmonic) * 2)
@@ -464,11 +462,11 @@ class Linearised(BorderedEquations):
     def _followed(self) -> Array:
         """Derivatives (N, c, n + e) of z to coefficients and common unknowns."""
         problem, layout, x, T = self.problem, self.problem.layout, self.marched, self.period
-        m, first = layout.displacements, layout.states - layout.memory
+        m, own = layout.displacements, layout.internal
         H, b, c, N = problem.harmonics, layout.harmonic, layout.memory, problem.samples
         _, J, P = problem.field.derivatives(self.times, x, problem.parameters(self.u),
                                             (problem.free,))
-        J = J[:, first:]
+        J = J[:, own]
         J[:, :, :m] += LEAK / T * problem.kept.rows
         values = problem.series.values
         speeds = differences(values) / T
@@ -476,15 +474,15 @@ class Linearised(BorderedEquations):
         np.multiply(values[:, None, :, None], J[:, :, None, layout.columns], out=found)
         found[..., :m] += speeds[:, None, :, None] * J[:, :, None, m : 2 * m]
         common = np.empty((N, c, problem.common))
-        common[:, :, -1] = P[:, first:, 0]
+        common[:, :, -1] = P[:, own, 0]
         if problem.autonomous:
-            common[:, :, 0] = self._slowed(J, x) + differences(x[:, first:]) / T**2
+            common[:, :, 0] = self._slowed(J, x) + differences(x[:, own]) / T**2
         elif not self._same_period:
             common[:, :, -1] = by_differences(self._marching, self.u)
         right = np.concatenate([found.reshape(N, c, -1), common], axis=2)
         # Variables of other nodes have no influence.
         s, nodes = c // layout.nodes, np.arange(layout.nodes)
-        whole = J[:, :, first:].reshape(N, layout.nodes, s, layout.nodes, s)
+        whole = J[:, :, own].reshape(N, layout.nodes, s, layout.nodes, s)
         solve_around(np.ascontiguousarray(np.moveaxis(whole[:, nodes, :, nodes], 0, 1)), T,
                      problem.kept.blocks, right)
         return right
@@ -492,11 +490,11 @@ class Linearised(BorderedEquations):
     def _marching(self, u: Array) -> Array:
         """Residual (N, c) of the equations of z without leak, at other unknowns with the same z."""
         problem, T = self.problem, self.problem.period(u)
-        m, first = problem.layout.displacements, problem.layout.states - problem.layout.memory
-        x = problem.states(u, T, self.marched[:, first:])
+        m, own = problem.layout.displacements, problem.layout.internal
+        x = problem.states(u, T, self.memory)
         x[:, m : 2 * m] = differences(x[:, :m]) / T
         rates = problem.field.rates(problem.times(T), x, problem.parameters(u))
-        return np.asarray(rates[:, first:] - differences(x[:, first:]) / T)
+        return np.asarray(rates[:, own] - differences(x[:, own]) / T)
 
     def _add_elements(self, found: Array) -> None:
         """Add what elements contribute to derivatives (n, n + e) of the balance."""
@@ -518,8 +516,7 @@ class Linearised(BorderedEquations):
     def _coupled(self, z: Array) -> Array:
         """Change (n, columns) of the balance with a change (N, c, columns) of z."""
         problem, layout, transforms = self.problem, self.problem.layout, self.problem.series
-        by_memory = self.derivatives[1][:, layout.displacements : layout.states - layout.memory,
-                                        layout.states - layout.memory :]
+        by_memory = self.derivatives[1][:, layout.rows, layout.internal]
         # Few contact displacements take part: project before, not behind.
         directions = None if problem.autonomous else problem.directions
         if directions is not None:

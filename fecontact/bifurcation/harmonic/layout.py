@@ -9,6 +9,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.problem import enlarged
 from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.harmonic.memory import Kept
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.types import Array, Integers
@@ -50,10 +51,14 @@ class Layout:
         return np.concatenate([np.arange(m), np.arange(2 * m, self.states - self.memory)])
 
     @cached_property
-    def rows(self) -> Integers:
-        """Indices (b,) of the equations of q and y among the rates."""
-        m = self.displacements
-        return np.arange(m, self.states - self.memory)
+    def rows(self) -> slice:
+        """Places (b,) of the equations of q and y among the rates."""
+        return slice(self.displacements, self.states - self.memory)
+
+    @cached_property
+    def internal(self) -> slice:
+        """Places (c,) of the internal variables z among the states."""
+        return slice(self.states - self.memory, self.states)
 
 
 def layout_of(field: VectorField) -> Layout:
@@ -65,42 +70,29 @@ def layout_of(field: VectorField) -> Layout:
     return Layout(field.dimension, modes, memory, nodes if memory else 0)
 
 
-def element_rows(field: VectorField, layout: Layout) -> Array:
-    """Rows (c, m) of the displacements that deflect springs with sliders; zero for other variables.
+def kept_by(field: VectorField, layout: Layout, offsets: Array | None = None) -> Kept:
+    """Deflections of elements that never slide; by default without any at zero displacement.
 
-    Bristles that never slide are no springs: their deflection stays about zero.
+    Rows are those of springs with sliders. Bristles that never slide are no springs: their
+    deflection stays about zero. No elements are followed one by one where other internal variables
+    exist.
     """
     rows = np.zeros((layout.memory, layout.displacements))
-    if not (layout.memory and isinstance(field, ContactField)):
-        return rows
-    system = field.system()
-    arrays, s = system.arrays, layout.memory // layout.nodes
-    tangents = arrays.rows[:, ::2].swapaxes(0, 1)
-    for nodes, share, law in system.law_groups("friction"):
-        if law.memory and law.sliders(share) is not None:
-            for node in range(layout.nodes)[nodes]:
-                for k in range(law.memory * len(tangents)):
-                    rows[node * s + k] = tangents[k % len(tangents)][node]
-    return rows
-
-
-def memory_blocks(field: VectorField, layout: Layout) -> Integers:
-    """Numbers (n,) of internal variables of each node that act on each other; 0 for all of them."""
-    if not (layout.memory and isinstance(field, ContactField)):
-        return np.zeros(layout.nodes, dtype=np.int64)
-    system = field.system()
-    return np.where(slider_counts(system) > 0, system.basis.dimension - 1, 0)
-
-
-def element_counts(field: VectorField, layout: Layout) -> Integers:
-    """Numbers (n,) of elements of the nodes; zero for all where other internal variables exist."""
-    if not (layout.memory and isinstance(field, ContactField)):
-        return np.zeros(layout.nodes, dtype=np.int64)
-    system = field.system()
-    counts = slider_counts(system)
-    tangents = system.basis.dimension - 1
-    alone = np.array_equal(tangents * counts, system.arrays.memory)
-    return counts if alone else np.zeros_like(counts)
+    given = np.zeros(layout.memory) if offsets is None else np.array(offsets, dtype=float)
+    blocks = elements = np.zeros(layout.nodes, dtype=np.int64)
+    if layout.memory and isinstance(field, ContactField):
+        system = field.system()
+        arrays, counts, s = system.arrays, slider_counts(system), layout.memory // layout.nodes
+        tangents = arrays.rows[:, ::2].swapaxes(0, 1)
+        blocks = np.where(counts > 0, len(tangents), 0)
+        if np.array_equal(len(tangents) * counts, arrays.memory):
+            elements = counts
+        for nodes, share, law in system.law_groups("friction"):
+            if law.memory and law.sliders(share) is not None:
+                for node in range(layout.nodes)[nodes]:
+                    for k in range(law.memory * len(tangents)):
+                        rows[node * s + k] = tangents[k % len(tangents)][node]
+    return Kept(rows, given, blocks, elements)
 
 
 def orbit_weights(sizes: Array, others: Array, functions: int) -> Array:

@@ -91,9 +91,8 @@ class HarmonicLinearisation(Linearised):
 
     def _samples(self) -> tuple[Array, Array]:
         """Rates (N, b) of velocities and other states, and their mean derivatives."""
-        layout = self.problem.layout
-        m, end = layout.displacements, layout.states - layout.memory
-        return self.rates[:, m:end], self.derivatives[1][:, m:end, :end].mean(axis=0)
+        rows = self.problem.layout.rows
+        return self.rates[:, rows], self.derivatives[1][:, rows, : rows.stop].mean(axis=0)
 
 
 class CompiledLinearisation(HarmonicLinearisation):

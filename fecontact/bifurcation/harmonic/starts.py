@@ -13,13 +13,7 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.engine_order import WaveField, Waves
-from fecontact.bifurcation.harmonic.layout import (
-    element_counts,
-    element_rows,
-    layout_of,
-    memory_blocks,
-)
-from fecontact.bifurcation.harmonic.memory import Kept
+from fecontact.bifurcation.harmonic.layout import kept_by, layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance, method_from, require_wave
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.series import with_harmonics
@@ -51,14 +45,11 @@ def problem_for(
     if isinstance(field, ContactField) and field.system().basis.large_deflections:
         _require_even(method)
     layout = layout_of(field)
-    kept = Kept(element_rows(field, layout),
-                np.zeros(layout.memory) if offsets is None else np.array(offsets, dtype=float),
-                memory_blocks(field, layout), element_counts(field, layout))
     found = HarmonicProblem(
         field, values.copy(), free, method.highest, method.count,
         np.zeros((2 * method.highest + 1, layout.harmonic)), scales, layout, periods,
-        *timing_of(field, values, free), kept, orders=method.orders, stability=method.stability,
-        limits=limits, waves=_waves_of(field, method))
+        *timing_of(field, values, free), kept_by(field, layout, offsets), orders=method.orders,
+        stability=method.stability, limits=limits, waves=_waves_of(field, method))
     if found.waves is None:
         # The problem is new: nobody has it yet.
         object.__setattr__(found, "compiled", CompiledBalance.of(found))

@@ -11,7 +11,7 @@ from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.engine_order import WaveField, Waves
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.series import real_coefficients
-from fecontact.bifurcation.nonlinear_modes.linear_start import field_over_xi
+from fecontact.bifurcation.nonlinear_modes.linear_start import field_over_xi, unchanged
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.read_only import read_only_arrays
@@ -187,7 +187,7 @@ def wheel_stability(
     problem, u, _ = starts.restored(field, point)
     system = field.waves.at_rest(field.system(problem.parameters(u)))
     every = contact_field(wheel_system(system, whole, field.waves.order), {"time scale": (
-        1.0, _unchanged)})
+        1.0, unchanged)})
     method = HarmonicBalance(problem.orders or problem.harmonics, problem.samples)
     X = motion.coordinates(whole, problem.harmonics)
     largest = float(np.abs(X).max()) or 1.0
@@ -203,10 +203,6 @@ def wheel_stability(
     floquet = found.linearise(orbit).floquet
     return WheelStability(floquet.multipliers, bool(floquet.stable),
                           float(np.abs(orbit - start)[:-1].max()) / largest)
-
-
-def _unchanged(system: ContactSystem, value: float) -> ContactSystem:
-    return system
 
 
 def wheel_system(system: ContactSystem, whole: WholeWheel, order: int) -> ContactSystem:

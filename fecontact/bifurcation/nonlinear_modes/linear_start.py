@@ -120,10 +120,11 @@ def field_over_xi(
     if wave is None:
         return contact_field(free, {XI: (xi, with_mass_damping)})
     # The negative damping of all masses of the wheel stands in the equations of the wave.
-    return WaveField(ParametrisedSystem(free, {XI: (xi, _unchanged)}), wave, unfolded=True)
+    return WaveField(ParametrisedSystem(free, {XI: (xi, unchanged)}), wave, unfolded=True)
 
 
-def _unchanged(system: ContactSystem, xi: float) -> ContactSystem:
+def unchanged(system: ContactSystem, value: float) -> ContactSystem:
+    """The system as it is, for a parameter that acts elsewhere."""
     return system
 
 

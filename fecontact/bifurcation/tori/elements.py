@@ -15,12 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.harmonic.layout import (
-    Layout,
-    element_counts,
-    element_rows,
-    memory_blocks,
-)
+from fecontact.bifurcation.harmonic.layout import Layout, kept_by
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept
 from fecontact.bifurcation.harmonic.series import functions_at
 from fecontact.bifurcation.tori.series import complex_coefficients, on_lines, orders, turned
@@ -80,6 +75,13 @@ def _shortened(one, other, limit):
 
 
 @helper
+def _edge(across, limit):
+    """Distance along a path at which the limit is met, from the place abeam of its middle."""
+    square = limit * limit - across * across
+    return np.sqrt(square) if square.real > 0.0 else 0.0 * square
+
+
+@helper
 def _moved(one, other, d_one, d_other, limit):
     """Deflection (one, other) after a straight path, within its limit; numbers may be complex."""
     if limit.real <= 0.0:
@@ -91,14 +93,12 @@ def _moved(one, other, d_one, d_other, limit):
     way = np.sqrt(way)
     c, s = d_one / way, d_other / way
     along, across = one * c + other * s, other * c - one * s
-    edge = limit * limit - across * across
-    edge = np.sqrt(edge) if edge.real > 0.0 else 0.0 * edge
+    edge = _edge(across, limit)
     if not (edge.real > 0.0 > along.real and (along + edge + way).real >= 0.0):
         # Unless the path leads back within a limit that has fallen.
         part = _shortened(one, other, limit)
         one, other, along, across = part * one, part * other, part * along, part * across
-        edge = limit * limit - across * across
-        edge = np.sqrt(edge) if edge.real > 0.0 else 0.0 * edge
+        edge = _edge(across, limit)
     if (edge - along).real >= way.real:
         return one + d_one, other + d_other
     half = across / (limit + edge) * np.exp((edge - along - way) / limit)
@@ -452,10 +452,9 @@ def elements_of(field: VectorField, layout: Layout) -> TorusElements | None:
     """
     if not (isinstance(field, ContactField) and slider_counts(field.system()).any()):
         return None
-    counts = element_counts(field, layout)
-    if not counts.any():
+    kept = kept_by(field, layout)
+    if not kept.exact:
         raise InputError("torus_branch: friction has elastic Coulomb elements (JenkinsFriction, "
                          "IwanFriction, FourParameterIwanFriction) beside other internal "
                          "variables; take the same kind at all contact nodes.")
-    return TorusElements(field, Kept(element_rows(field, layout), np.zeros(layout.memory),
-                                     memory_blocks(field, layout), counts))
+    return TorusElements(field, kept)
