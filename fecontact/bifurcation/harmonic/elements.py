@@ -14,6 +14,7 @@ import numpy as np
 from fecontact.bifurcation.harmonic.memory import (
     LEAK,
     Sliding,
+    difference,
     solve_around,
     solve_around_limit,
     take_element,
@@ -182,8 +183,7 @@ def _along_two_tangents(j, x, s, count, offsets, r, z, rows):
         ground = ground_motion(n * T / N, s)
         slip[n, 2] = pressing[n]
         for c in range(2):
-            slip[n, c] = rate * (1.5 * moved[n, 2 * c] - 2.0 * moved[n - 1, 2 * c]
-                                 + 0.5 * moved[n - 2, 2 * c]) - ground_speed(c, j, ground, s)
+            slip[n, c] = rate * difference(moved, n, 2 * c) - ground_speed(c, j, ground, s)
     rows[:, :, :] = 0.0
     done = 1
     for i in range(count):
@@ -207,8 +207,7 @@ def _along_two_tangents(j, x, s, count, offsets, r, z, rows):
                 for k in range(3 * L):
                     change[n, c, k] = rates[c, 2] * slopes[n, k]
                 for k in range(L):
-                    speed = rate * (1.5 * values[n, k] - 2.0 * values[n - 1, k]
-                                    + 0.5 * values[n - 2, k])
+                    speed = rate * difference(values, n, k)
                     change[n, c, k] += rates[c, 1] * speed
                     change[n, c, 2 * L + k] += rates[c, 5] * speed
                     change[n, c, 2 * L * c + k] += leak * values[n, k]

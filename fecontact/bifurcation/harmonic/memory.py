@@ -100,6 +100,34 @@ def differences(z: Array) -> Array:
     return found
 
 
+@helper
+def difference(z, n, i):
+    """Backward difference of column i at sample n: the rate times the distance of samples."""
+    return 1.5 * z[n, i] - 2.0 * z[n - 1, i] + 0.5 * z[n - 2, i]
+
+
+@helper
+def _before(z, place, i, c, columns):
+    """Column c at both samples before a place: before the first, unit values behind ``columns``."""
+    unit = 1.0 if c == columns + i else 0.0
+    one = z[place - 1, i, c] if place > 0 else unit
+    if place > 1:
+        return one, z[place - 2, i, c]
+    return one, unit if place == 1 else (1.0 if c == columns + z.shape[1] + i else 0.0)
+
+
+@helper
+def _ring_of(z, columns, ring, pivots):
+    """Factorise the equations (2 s, 2 s) of starts that repeat, from the unit columns of z."""
+    N, s = z.shape[:2]
+    for last in range(2):
+        for i in range(s):
+            for k in range(2 * s):
+                ring[last * s + i, k] = -z[N - 1 - last, i, columns + k]
+            ring[last * s + i, last * s + i] += 1.0
+    factorise(ring, 2 * s, pivots)
+
+
 @kernel
 def solve_around(slopes: Array4, T: float, blocks: IntegerVector, x: Block) -> None:
     """Replace right sides x (N, n s, columns) by the solutions z of D z / T - g_z z = x.
@@ -133,23 +161,15 @@ def _solve_block(slopes, T, node, own, s, x):
             a[i, i] += 1.5 * rate + LEAK / T
             for c in range(wide):
                 value = x[place, first + i, c] if c < columns else 0.0
-                # Columns beyond the right sides: unit values of the last two samples.
-                one = z[place - 1, i, c] if place > 0 else (
-                    1.0 if c == columns + i else 0.0)
-                two = z[place - 2, i, c] if place > 1 else (
-                    (1.0 if c == columns + i else 0.0) if place == 1 else (
-                        1.0 if c == columns + s + i else 0.0))
+                one, two = _before(z, place, i, c, columns)
                 z[place, i, c] = value + rate * (2.0 * one - 0.5 * two)
         factorise(a, s, pivots)
         solve_rows(a, pivots, z[place])
+    _ring_of(z, columns, ring, ring_pivots)
     for last in range(2):
         for i in range(s):
-            for k in range(2 * s):
-                ring[last * s + i, k] = -z[N - 1 - last, i, columns + k]
-            ring[last * s + i, last * s + i] += 1.0
             for c in range(columns):
                 given[last * s + i, c] = z[N - 1 - last, i, c]
-    factorise(ring, 2 * s, ring_pivots)
     solve_rows(ring, ring_pivots, given)
     for place in range(N):
         for i in range(s):
@@ -200,13 +220,14 @@ def _keep_within(start, brackets):
 
 
 @helper
-def _take_block(rates, diagonal, a):
-    """Fill a (b, b) with the derivatives of the equations of b variables at a sample."""
+def _factorise_block(rates, diagonal, a, pivots):
+    """Factorise the derivatives (b, b) of the equations of b variables at a sample."""
     b = len(a)
     for i in range(b):
         for c in range(b):
             a[i, c] = -rates[i, 3 + c]
         a[i, i] += diagonal
+    factorise(a, b, pivots)
 
 
 @helper
@@ -259,7 +280,7 @@ def march_block(j, alone, samples, s, element, target, path):
     if alone:
         force, rates = np.empty(2 * (4 + b)), np.empty((b, 4 + b))
     rate, leak = N / T, LEAK / T
-    turned, part = np.empty((N, b, 2 * b)), np.empty(2 * b)
+    turned = np.empty((N, b, 2 * b))
     a, pivots = np.empty((b, b)), np.empty(b, dtype=np.int64)
     ring, ring_pivots = np.empty((2 * b, 2 * b)), np.empty(2 * b, dtype=np.int64)
     start, off, step = np.zeros(2 * b), np.empty(2 * b), np.empty(b)
@@ -284,8 +305,7 @@ def march_block(j, alone, samples, s, element, target, path):
                            start[i] if place == 1 else start[b + i])
                     step[i] = (rates[i, 0] - leak * (here[i] - target[place, i])
                                - rate * (1.5 * here[i] - 2.0 * one + 0.5 * two))
-                _take_block(rates, 1.5 * rate + leak, a)
-                factorise(a, b, pivots)
+                _factorise_block(rates, 1.5 * rate + leak, a, pivots)
                 solve(a, pivots, step)
                 change, size = 0.0, 0.0
                 for i in range(b):
@@ -296,13 +316,9 @@ def march_block(j, alone, samples, s, element, target, path):
                     break
             for i in range(b):
                 for c in range(2 * b):
-                    one = turned[place - 1, i, c] if place > 0 else (1.0 if c == i else 0.0)
-                    two = turned[place - 2, i, c] if place > 1 else (
-                        (1.0 if c == i else 0.0) if place == 1 else
-                        (1.0 if c == b + i else 0.0))
+                    one, two = _before(turned, place, i, c, 0)
                     turned[place, i, c] = rate * (2.0 * one - 0.5 * two)
-            _take_block(rates, 1.5 * rate + leak, a)
-            factorise(a, b, pivots)
+            _factorise_block(rates, 1.5 * rate + leak, a, pivots)
             solve_rows(a, pivots, turned[place])
             # Where two samples are those of the last round, all behind them are.
             if turn > 0:
@@ -321,16 +337,8 @@ def march_block(j, alone, samples, s, element, target, path):
             return 1
         if turn > 0:
             _bracket(turn, start, off, brackets)
-            for last in range(2):
-                for i in range(b):
-                    row = last * b + i
-                    part[row] = off[row]
-                    for c in range(2 * b):
-                        ring[row, c] = (1.0 if c == row else 0.0) - turned[N - 1 - last, i, c]
-            factorise(ring, 2 * b, ring_pivots)
-            solve(ring, ring_pivots, part)
-            for row in range(2 * b):
-                off[row] = part[row]
+            _ring_of(turned, 0, ring, ring_pivots)
+            solve(ring, ring_pivots, off)
         for i in range(2 * b):
             start[i] += off[i]
         _keep_within(start, brackets)
@@ -360,8 +368,7 @@ def _left_over(j, s, T, element, target, path, out):
         set_friction(j, (slip[n, 0], slip[n, 1]), slip[n, 2], path[n], p, s, force, rates)
         for i in range(b):
             left[n, i, 0] = (rates[i, 0] - LEAK / T * (path[n, i] - target[n, i])
-                             - rate * (1.5 * path[n, i] - 2.0 * path[n - 1, i]
-                                       + 0.5 * path[n - 2, i]))
+                             - rate * difference(path, n, i))
             most, largest = max(most, abs(left[n, i, 0])), max(largest, abs(path[n, i]))
             for k in range(b):
                 slopes[n, 0, i, k] = rates[i, 3 + k]

@@ -5,6 +5,7 @@ import numpy as np
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
 from fecontact.bifurcation.harmonic.compiled.evaluation import speed_coefficient, take_parameter
 from fecontact.bifurcation.harmonic.compiled.kinks import SampledRates, add_kinks
+from fecontact.bifurcation.harmonic.compiled.memoryless_forces import combine
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Array4, Block, Matrix, Vector
 from fecontact.system.jacobian import batch_derivatives
@@ -32,7 +33,6 @@ def derivatives_along(
     """
     m, N, c = e.springs.shape[1], zs.shape[1], zs.shape[2]
     X, linear = e.workspace.coefficients, e.workspace.linear
-    L = X.shape[2]
     P = len(tau)
     t, x, f, row = np.empty(P), np.empty((P, 2 * m + c)), np.empty((P, 2 * m + c)), np.empty(P)
     widths = np.empty((m, P))
@@ -41,11 +41,7 @@ def derivatives_along(
         _take_coefficients(us[k], T, X)
         for part in range(2):
             for j in range(m):
-                for p in range(P):
-                    row[p] = 0.0
-                for i in range(L):
-                    for p in range(P):
-                        row[p] += X[part, j, i] * series[i, p]
+                combine(series, X[part, j], X.shape[2], row)
                 for p in range(P):
                     x[p, part * m + j] = row[p]
         for p in range(P):

@@ -152,14 +152,20 @@ class CompiledBalance:
         """
         m, N = problem.layout.displacements, problem.samples
         places = near.low + (near.high - near.low) * _PLACES
-        periods = (problem.periods * problem.turn / places if problem.turn is not None
-                   else np.full(len(places), problem.periods * problem.fixed))
-        body, given, sizes = np.empty((4, m, m)), np.empty((2, N, m)), np.empty(3)
+        periods = np.array([problem.period(np.array([place])) for place in places])
+        P = len(places)
+        loads, rest, matrices = np.empty((P, N, m)), np.empty((N, m)), np.empty((P, 2, m, m))
         forces_at_rest(places, periods, problem.series.times,
-                       AffineSystem(near.flat, near.base, near.slope, near.arrays), body, given,
-                       sizes)
-        off, mean, change = sizes.tolist()
-        return None if off > _AFFINE else (body, given, mean <= _NOTHING and change <= _NOTHING)
+                       AffineSystem(near.flat, near.base, near.slope, near.arrays), loads, rest,
+                       matrices)
+        body, given = (np.array(_line(places, values)) for values in (matrices, loads))
+        off = np.abs(given[0] + np.multiply.outer(places, given[1]) - loads).max(axis=(1, 2))
+        if (off > _AFFINE * np.abs(given).max() * np.maximum(np.abs(places), 1.0)).any():
+            return None
+        means = loads.mean(axis=1)
+        return body.reshape(4, m, m), given, bool(
+            np.abs(rest.mean(axis=0)).max() <= _NOTHING * np.abs(rest).max()
+            and np.abs(means - means[-1]).max() <= _NOTHING * np.abs(loads).max())
 
     def _steady(self, near: AffineArrays) -> bool:
         """Whether contact forces depend neither on the parameter nor on time."""
@@ -182,6 +188,12 @@ class CompiledBalance:
         return needs_friction(system.basis) or not all(
             isinstance(law, BilateralPolynomial)
             for nodes, _, law in system.law_groups("normal") if nodes.stop > nodes.start)
+
+
+def _line(places: Array, values: Array) -> tuple[Array, Array]:
+    """Values at p = 0 and slopes of the line through values at the first two places."""
+    slope = (values[1] - values[0]) / (places[1] - places[0])
+    return values[0] - places[0] * slope, slope
 
 
 def _contact_alone(system: SystemArrays) -> SystemArrays:

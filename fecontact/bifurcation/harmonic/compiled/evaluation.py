@@ -27,7 +27,7 @@ from fecontact.bifurcation.harmonic.elements import (
     ElementForces,
     element_forces_at,
 )
-from fecontact.bifurcation.harmonic.memory import LEAK, march, solve_around
+from fecontact.bifurcation.harmonic.memory import LEAK, difference, march, solve_around
 from fecontact.bifurcation.harmonic.series import fill_blocks
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, kernel
@@ -97,12 +97,19 @@ def _take_differences(T, e):
     for n in range(N):
         for j in range(m):
             y[n, j] = x[n, j]
-            y[n, m + j] = rate * (1.5 * x[n, j] - 2.0 * x[n - 1, j] + 0.5 * x[n - 2, j])
+            y[n, m + j] = rate * difference(x, n, j)
         for i in range(len(e.offsets)):
             total = e.offsets[i]
             for j in range(m):
                 total += e.springs[i, j] * x[n, j]
             e.workspace.target[n, i] = total
+
+
+@helper
+def _marched_rate(k, i, T, e):
+    """Rate that internal variable i must have at sample k, leak included."""
+    z = e.workspace.z
+    return LEAK / T * (z[k, i] - e.workspace.target[k, i]) + len(z) / T * difference(z, k, i)
 
 
 @helper
@@ -316,15 +323,19 @@ def _by_parameter(u, T, e):
             for j in range(m):
                 workspace.column[k * m + j] += (e.body[2, i, j] * place + e.body[3, i, j] * speed
                                                 - rise * workspace.linear[1, i, j] * speed)
-    rate = N / T
     for k in range(N):
         for i in range(c):
-            total = (LEAK / T * (workspace.z[k, i] - workspace.target[k, i])
-                     + rate * (1.5 * workspace.z[k, i] - 2.0 * workspace.z[k - 1, i]
-                               + 0.5 * workspace.z[k - 2, i]))
+            total = _marched_rate(k, i, T, e)
             for j in range(m):
                 total -= workspace.J_marched[k, 2 * m + i, m + j] * workspace.y[k, m + j]
             workspace.followed[k, i, len(u) - 1] = rise * total
+
+
+@helper
+def _step_of(p, central):
+    """Step of differences in the parameter, and the distance of both sides."""
+    h = (_CENTRAL if central else _ONE_SIDED) * max(abs(p), 1e-3)
+    return h, 2.0 * h if central else h
 
 
 @helper
@@ -336,9 +347,8 @@ def _by_differences(u, central, e, followed):
     workspace = e.workspace
     n, p = len(workspace.residual), u[len(u) - 1]
     m, c, N = e.springs.shape[1], len(e.offsets), len(e.tau)
-    h = (_CENTRAL if central else _ONE_SIDED) * max(abs(p), 1e-3)
+    h, width = _step_of(p, central)
     # Without a second side what is marched meets its equations.
-    width = 2.0 * h if central else h
     for k in range(n):
         workspace.column[k] = 0.0 if central else -workspace.residual[k] / h
     there = workspace.vectors[7]
@@ -360,13 +370,9 @@ def _by_differences(u, central, e, followed):
         if c > 0:
             _take_differences(T, e)
             batch_rates(workspace.t, workspace.y, e.contact, workspace.f_marched)
-            rate = N / T
             for k in range(N):
                 for i in range(c):
-                    off = (workspace.f_marched[k, 2 * m + i]
-                           - LEAK / T * (workspace.z[k, i] - workspace.target[k, i])
-                           - rate * (1.5 * workspace.z[k, i] - 2.0 * workspace.z[k - 1, i]
-                                     + 0.5 * workspace.z[k - 2, i]))
+                    off = workspace.f_marched[k, 2 * m + i] - _marched_rate(k, i, T, e)
                     followed[k, i, n] = (sign * off / width
                                          + (followed[k, i, n] if side > 0 else 0.0))
     take_parameter(p, e)
@@ -392,8 +398,7 @@ def _add_memory(T, e):
                 workspace.slopes[k, node, i - node * s, other] = J[k, 2 * m + i,
                                                              2 * m + node * s + other]
             for q in range(L):
-                speed = rate * (1.5 * e.values[k, q] - 2.0 * e.values[k - 1, q]
-                                + 0.5 * e.values[k - 2, q])
+                speed = rate * difference(e.values, k, q)
                 for j in range(m):
                     followed[k, i, q * m + j] = (
                         e.values[k, q] * (J[k, 2 * m + i, j] + LEAK / T * e.springs[i, j])
@@ -459,8 +464,7 @@ def _add_by_elements(u, T, central, e):
     if e.numbers[STEADY] != 0.0 and e.numbers[TIMED] < 2.0:
         return
     n, p = L * m, u[len(u) - 1]
-    h = (_CENTRAL if central else _ONE_SIDED) * max(abs(p), 1e-3)
-    there, width = workspace.vectors[7], 2.0 * h if central else h
+    there, (h, width) = workspace.vectors[7], _step_of(p, central)
     for k in range(n):
         there[k] = u[k]
     for side in range(2 if central else 1):

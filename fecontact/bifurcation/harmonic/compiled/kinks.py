@@ -93,9 +93,18 @@ def kink_change(u, v, b, h, j, s):
 
 
 @helper
-def is_near(u, v, b, h):
-    """Whether a sample lies within two samples of a kink at the onset b."""
-    return abs(u - b) < _REACH * abs(v) * h
+def changes_near(u, v, onsets, h, j, s):
+    """Sums of :func:`kink_change` over the onsets (k, n) of node j nearby; whether there are any.
+
+    The force far from onsets is that of the last one.
+    """
+    change, change_u, change_v, by_width, far, found = 0.0, 0.0, 0.0, 0.0, 0.0, False
+    for k in range(len(onsets)):
+        if abs(u - onsets[k, j]) < _REACH * abs(v) * h:
+            one, one_u, one_v, one_w, far = kink_change(u, v, onsets[k, j], h, j, s)
+            change, change_u, change_v = change + one, change_u + one_u, change_v + one_v
+            by_width, found = by_width + one_w, True
+    return (change, change_u, change_v, by_width, far), found
 
 
 @helper
@@ -206,15 +215,9 @@ def add_kinks(
         moved = ground_motion(t[n], s)
         for j in range(len(s.rows)):
             contact = node_contact(j, node_motion(j, x[n], s), moved, s)
-            u, v = contact.penetration, contact.rate
-            dF, dF_u, dF_v, by_width, far, found = 0.0, 0.0, 0.0, 0.0, 0.0, False
-            for k in range(len(onsets)):
-                if is_near(u, v, onsets[k, j], h):
-                    one, one_u, one_v, one_w, far = kink_change(u, v, onsets[k, j], h, j, s)
-                    dF, dF_u, dF_v = dF + one, dF_u + one_u, dF_v + one_v
-                    by_width, found = by_width + one_w, True
+            change, found = changes_near(contact.penetration, contact.rate, onsets, h, j, s)
             if found:
-                _add_node(j, n, contact, (dF, dF_u, dF_v, by_width, far), s, derivatives != 0, out)
+                _add_node(j, n, contact, change, s, derivatives != 0, out)
 
 
 def kink_onsets(field: ContactField, values: Array, free: int) -> Array:

@@ -7,6 +7,7 @@ together. What that neglects is made good by iteration with all derivatives at t
 
 import math
 
+from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.harmonic.compiled.evaluation import (
     balance,
     take_pushes,
@@ -29,15 +30,6 @@ def inner(a, b):
     for k in range(len(a)):
         total += a[k] * b[k]
     return total
-
-
-@helper
-def length(weights, a):
-    """Square root of sum w a a."""
-    total = 0.0
-    for k in range(len(a)):
-        total += weights[k] * a[k] * a[k]
-    return math.sqrt(total)
 
 
 @routine
@@ -219,8 +211,8 @@ def solve_with(row, weights, T, tolerance, e, x):
         _once(row, T, e, change)
         for i in range(n + 1):
             x[i] += change[i]
-        size = length(weights, x)
-        off = length(weights, change)
+        size = weighted_norm(weights, x)
+        off = weighted_norm(weights, change)
         if not off < math.inf:
             return 0
         if off <= tolerance * size:

@@ -7,7 +7,7 @@ other and all else is done on whole rows.
 
 import numpy as np
 
-from fecontact.bifurcation.harmonic.compiled.kinks import is_near, kink_change
+from fecontact.bifurcation.harmonic.compiled.kinks import changes_near
 from fecontact.core.compiled import helper, routine
 from fecontact.laws.signatures import ground_at
 from fecontact.system.node_forces import normal_force, plane_friction
@@ -85,16 +85,11 @@ def _near_kinks(j, level, h, e):
     """
     s, node = e.contact, e.workspace.node
     for n in range(len(e.tau)):
-        u, v, far, found = level - node[0, n], -node[1, n], 0.0, False
-        node[8, n] = 0.0
-        for k in range(len(e.onsets)):
-            if is_near(u, v, e.onsets[k, j], h):
-                F, F_u, F_v, by_width, far = kink_change(u, v, e.onsets[k, j], h, j, s)
-                node[8, n] += by_width
-                node[3, n] += F
-                node[4, n] -= F_u
-                node[5, n] -= F_v
-                found = True
+        change, found = changes_near(level - node[0, n], -node[1, n], e.onsets, h, j, s)
+        F, F_u, F_v, node[8, n], far = change
+        node[3, n] += F
+        node[4, n] -= F_u
+        node[5, n] -= F_v
         node[1, n] = -1.0 if found and node[3, n] * far < 0.0 else 1.0
 
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.newton import right_side, weighted_norm
 from fecontact.bifurcation.harmonic.compiled.arrays import (
     KINKS,
     PLAIN,
@@ -19,7 +20,6 @@ from fecontact.bifurcation.harmonic.compiled.linear_systems import (
     choose_coupled,
     factorise_with,
     inner,
-    length,
     solve_with,
 )
 from fecontact.core.compiled import helper, routine
@@ -44,22 +44,14 @@ _CORRECTIONS, _LEAST = 40, 1e-4
 _SMALL = 1e-3
 
 
-@helper
-def _right_side(u, guess, row, e, change):
-    """Fill change (n + 1,) with the negative residual and the distance from the guess."""
-    n = len(e.workspace.residual)
-    for k in range(n):
-        change[k] = -e.workspace.residual[k]
-    off = 0.0
-    for k in range(n + 1):
-        off += row[k] * (u[k] - guess[k])
-    change[n] = -off
-
-
-@helper
-def _take_along(row, weights, T, tolerance, e):
-    """Fill ``along`` with the factors that were made last; 0 if that fails."""
-    along = e.workspace.along
+@routine
+def _factorised(u, T, row, weights, central, tolerance, e):
+    """Factorise the derivatives at u and fill ``along``; 0 if modes cannot be separated, else 1."""
+    along, n = e.workspace.along, len(u) - 1
+    if len(e.workspace.condensed) < n * (n + 1) and choose_coupled(T, e) == 0:
+        return 0
+    condensation_at(e.condense)(u, T, central, e)
+    factorise_with(row, T, e)
     for k in range(len(along)):
         along[k] = 0.0
     along[len(along) - 1] = 1.0
@@ -91,24 +83,20 @@ def newton(u, guess, row, weights, e):
     n = len(workspace.residual)
     tolerance = e.numbers[TOLERANCE]
     change = workspace.vectors[0]
-    scale = 1.0 + length(weights, guess)
+    scale = 1.0 + weighted_norm(weights, guess)
     before, made, fresh, made_at = np.inf, 0, True, 0.0
     for count in range(1, _STEPS + 1):
         T = evaluation_at(e.evaluate)(u, fresh, e)
         if not T > 0.0:
             return 0
-        _right_side(u, guess, row, e, change)
+        right_side(workspace.residual, row, u, guess, change)
         if fresh:
-            if len(workspace.condensed) < n * (n + 1) and choose_coupled(T, e) == 0:
+            if _factorised(u, T, row, weights, False, _TANGENT, e) == 0:
                 return -1
-            condensation_at(e.condense)(u, T, False, e)
-            factorise_with(row, T, e)
             made, made_at = made + 1, T
-            if _take_along(row, weights, T, _TANGENT, e) == 0:
-                return -1
         if solve_with(row, weights, made_at, _INEXACT, e, change) == 0:
             return -1
-        size = length(weights, change)
+        size = weighted_norm(weights, change)
         if count > 1 and size > before and before <= e.numbers[ROUNDING] * scale:
             return made
         if not size < np.inf or (count > 1 and size > before):
@@ -132,38 +120,33 @@ def newton(u, guess, row, weights, e):
 @routine
 def linearised(u, row, weights, e):
     """Fill ``along`` with the derivatives at u; 0 if that fails, else 1."""
-    workspace = e.workspace
-    n = len(workspace.residual)
     T = evaluation_at(e.evaluate)(u, True, e)
-    if not T > 0.0 or (len(workspace.condensed) < n * (n + 1) and choose_coupled(T, e) == 0):
-        return 0
-    condensation_at(e.condense)(u, T, True, e)
-    factorise_with(row, T, e)
-    return _take_along(row, weights, T, PRECISE, e)
+    return _factorised(u, T, row, weights, True, PRECISE, e) if T > 0.0 else 0
+
+
+@helper
+def _exact_step(u, guess, row, weights, e, change):
+    """Fill a Newton step with its own derivatives; returns its length, infinite where it fails."""
+    if linearised(u, row, weights, e) == 0:
+        return np.inf
+    right_side(e.workspace.residual, row, u, guess, change)
+    if solve_with(row, weights, e.workspace.t[1] * len(e.tau), PRECISE, e, change) == 0:
+        return np.inf
+    size = weighted_norm(weights, change)
+    return size if size < np.inf else np.inf
 
 
 @routine
 def solved(u, guess, row, weights, e):
-    """The solution at right angles to a row with ``along`` there; 0 where it fails, else 1.
-
-    Each step has its own derivatives.
-    """
-    workspace = e.workspace
-    n = len(workspace.residual)
-    change, scale, before = workspace.vectors[0], 1.0 + length(weights, guess), np.inf
+    """The solution at right angles to a row with ``along`` there; 0 where it fails, else 1."""
+    change, scale, before = e.workspace.vectors[0], 1.0 + weighted_norm(weights, guess), np.inf
     for _ in range(_EXACT_STEPS):
-        if linearised(u, row, weights, e) == 0:
-            return 0
-        _right_side(u, guess, row, e, change)
-        T = e.workspace.t[1] * len(e.tau)
-        if solve_with(row, weights, T, PRECISE, e, change) == 0:
-            return 0
-        size = length(weights, change)
-        if not size < np.inf or size > 2.0 * before > 2.0 * e.numbers[ROUNDING] * scale:
+        size = _exact_step(u, guess, row, weights, e, change)
+        if size == np.inf or size > 2.0 * before > 2.0 * e.numbers[ROUNDING] * scale:
             return 0
         if size > before:
             return 1
-        for k in range(n + 1):
+        for k in range(len(u)):
             u[k] += change[k]
         if size <= _EXACT * scale:
             return 1
@@ -183,16 +166,11 @@ def damped_newton(u, row, weights, tolerance, e):
     for k in range(n + 1):
         guess[k] = u[k]
     for _ in range(_CORRECTIONS):
-        if linearised(u, row, weights, e) == 0:
+        size = _exact_step(u, guess, row, weights, e, change)
+        if size == np.inf:
             return 0
         norm = math.sqrt(inner(workspace.residual, workspace.residual))
-        _right_side(u, guess, row, e, change)
-        if solve_with(row, weights, e.workspace.t[1] * len(e.tau), PRECISE, e, change) == 0:
-            return 0
-        size = length(weights, change)
-        if not size < np.inf:
-            return 0
-        small = size < tolerance * (1.0 + length(weights, u))
+        small = size < tolerance * (1.0 + weighted_norm(weights, u))
         factor = 1.0
         while True:
             for k in range(n + 1):
@@ -268,7 +246,7 @@ def fold_between(chord, weights, e, found):
         if solved(found, guess, chord.row, weights, e) == 0:
             return 0
         x, f, at = at, value, new
-        value = e.workspace.along[n] / length(weights, e.workspace.along)
+        value = e.workspace.along[n] / weighted_norm(weights, e.workspace.along)
         if value * f_low > 0.0:
             low = at
         else:

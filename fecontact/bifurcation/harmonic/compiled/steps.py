@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.newton import weighted_norm
 from fecontact.bifurcation.harmonic.compiled.arrays import (
     FIRST_BOUND,
     FOLDS,
@@ -25,7 +26,7 @@ from fecontact.bifurcation.harmonic.compiled.arrays import (
     Reached,
 )
 from fecontact.bifurcation.harmonic.compiled.evaluation import take_forces, take_mean
-from fecontact.bifurcation.harmonic.compiled.linear_systems import inner, length
+from fecontact.bifurcation.harmonic.compiled.linear_systems import inner
 from fecontact.bifurcation.harmonic.compiled.newton import (
     Chord,
     bound_between,
@@ -61,22 +62,23 @@ def _set_weights(scales, H, weights):
 
 
 @helper
+def _size_of(u, j, e):
+    """Size of the motion of displacement j, up to its limit."""
+    m, total = e.springs.shape[1], 0.0
+    for k in range(1, e.values.shape[1]):
+        total += u[k * m + j] * u[k * m + j]
+    return min(math.sqrt(total), e.limits[j])
+
+
+@helper
 def _grow(u, scales, e):
     """Enlarge the scales where the orbit has outgrown them; returns whether it has."""
-    m, L = e.springs.shape[1], e.values.shape[1]
     grown = False
-    for j in range(m):
-        total = 0.0
-        for k in range(1, L):
-            total += u[k * m + j] * u[k * m + j]
-        if min(math.sqrt(total), e.limits[j]) > _GROWN * scales[j]:
-            grown = True
+    for j in range(e.springs.shape[1]):
+        grown = grown or _size_of(u, j, e) > _GROWN * scales[j]
     if grown:
-        for j in range(m):
-            total = 0.0
-            for k in range(1, L):
-                total += u[k * m + j] * u[k * m + j]
-            scales[j] = max(scales[j], min(math.sqrt(total), e.limits[j]))
+        for j in range(e.springs.shape[1]):
+            scales[j] = max(scales[j], _size_of(u, j, e))
     return grown
 
 
@@ -117,7 +119,7 @@ def _exact(count, row, weights, e, out):
         row[k] = weights[k] * tangent[k]
     if linearised(u, row, weights, e) == 0:
         return 0
-    size = length(weights, along)
+    size = weighted_norm(weights, along)
     if not 0.0 < size < np.inf or along[n] * tangent[n] <= 0.0:
         return 0
     for k in range(n + 1):
@@ -167,13 +169,13 @@ def steps(
         if made < 0:
             why[0] = COUPLED
             break
-        size = length(weights, workspace.along)
+        size = weighted_norm(weights, workspace.along)
         failed = made == 0 or not 0.0 < size < np.inf
         turned = False
         if not failed:
             for k in range(n + 1):
                 chord[k] = there[k] - u[k]
-            far = length(weights, chord)
+            far = weighted_norm(weights, chord)
             aligned = inner(row, workspace.along) / size
             ahead = inner(row, chord) / far
             cosine = math.cos(e.numbers[LARGEST_TURN])
@@ -204,19 +206,19 @@ def steps(
                 leaving[k] = workspace.along[k] / size
             if last_turn == 0.0 and bound_between(
                     Chord(u, tangent, there, leaving, row), weights, bound, e, found) == 1:
-                size = length(weights, workspace.along)
+                size = weighted_norm(weights, workspace.along)
                 _keep(count, found, size if slope > 0.0 else -size, scales, far, e, out)
                 why[0] = BOUND
                 count += 1
             break
         last = count + 1 if turns else count
-        _keep(last, there, length(weights, workspace.along), scales, far, e, out)
+        _keep(last, there, weighted_norm(weights, workspace.along), scales, far, e, out)
         if turns:
             between = Chord(u, tangent, there, out.tangent[last], row)
             if fold_between(between, weights, e, found) == 0:
                 why[0] = EVENT
                 break
-            _keep(count, found, length(weights, workspace.along), scales, far, e, out)
+            _keep(count, found, weighted_norm(weights, workspace.along), scales, far, e, out)
             out.folds[count] = 1
         way, bent = inner(row, chord), 1.0 if last_turn == 0.0 else 0.0
         cubic = smooth * bent / (way * way * way)
@@ -233,7 +235,7 @@ def steps(
         halvings, last_turn, alike = 0, 0.0, 0
         if _grow(u, scales, e):
             _set_weights(scales, H, weights)
-            size = length(weights, tangent)
+            size = weighted_norm(weights, tangent)
             for k in range(n + 1):
                 tangent[k] /= size
                 bend[k], third[k] = 0.0, 0.0
