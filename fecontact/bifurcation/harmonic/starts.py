@@ -40,7 +40,7 @@ def problem_for(
     """The problem of a field; ``scales`` (d + 2,) of states, period and parameter.
 
     The former grow with the orbit up to the limits (d,), if there are any.
-    ``offsets`` (c,) are those of elements that never slide, see :class:`Kept`.
+    ``offsets`` (c,) are those of elements that never slide, see :func:`kept_by`.
     """
     if isinstance(field, ContactField) and field.system().basis.large_deflections:
         _require_even(method)
