@@ -20,15 +20,13 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core.datamodel.models import PrimitiveModel
-from numba.core.typeconv.rules import default_type_manager
-from numba.extending import intrinsic, lower_cast, overload, register_model
+from numba.extending import intrinsic, overload, register_model
 
 from fecontact.core.compiled import helper
 from fecontact.core.simd.vectors import (
     _VECTOR,
     WIDTH,
     _code,
-    _spread,
     exponent,
     fused,
     lanes,
@@ -164,14 +162,7 @@ def reciprocal_fifth_root(x):
     return exponential(-0.2 * logarithm(x))
 
 
-# A float where eight numbers are wanted, in a result or at the end of a branch.
-default_type_manager.set_promote(types.float64, lanes)
 _JIT = {"error_model": "numpy", "forceinline": True}
-
-
-@lower_cast(types.float64, lanes)
-def _float_to_lanes(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
-    return _spread(builder, value)
 
 
 def _folded(all_lanes: bool) -> Any:

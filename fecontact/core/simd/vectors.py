@@ -8,12 +8,14 @@ what the processor has. Comparisons give a mask, eight truth values, which takes
 
 import operator
 from collections.abc import Callable
-from typing import Any
+from typing import Any, ClassVar
 
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, models, overload, register_model
+from numba.core.typeconv.rules import default_type_manager
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
 
 from fecontact.core.compiled import helper
 
@@ -108,6 +110,15 @@ def gather(typingctx: Any, values: Any, places: Any, further: Any) -> Any:
 def spread(typingctx: Any, number: Any) -> Any:
     """Vector with a number in each of its eight SIMD lanes."""
     return lanes(types.float64), _code(_spread)
+
+
+# A float where eight numbers are wanted, in a result or at the end of a branch.
+default_type_manager.set_promote(types.float64, lanes)
+
+
+@lower_cast(types.float64, lanes)
+def _float_to_lanes(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
+    return _spread(builder, value)
 
 
 def _library(name: str) -> Callable[..., Any]:
@@ -215,35 +226,21 @@ def mask_of(typingctx: Any, given: Any) -> Any:
         lambda builder, given: builder.bitcast(builder.trunc(given, _BYTE), _TRUTHS))
 
 
-def _provide(operation: Any, result: Any, build: Callable[[Any, Any, Any], Any],
-             operand: Any = lanes) -> None:
-    """Let lanes, or masks, take an operator of two; beside lanes one may be a number."""
-    operands = (lanes, types.float64) if operand == lanes else (mask,)
+def _provide(operation: Any, kind: Any, result: Any, build: Callable[..., Any],
+             count: int = 2) -> None:
+    """Let lanes, or masks, take an operator; one of two lanes may be a number.
 
-    @intrinsic
-    def combined(typingctx: Any, a: Any, b: Any) -> Any:
-        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            return build(builder, *(
-                _spread(builder, value) if kind == types.float64 else value
-                for kind, value in zip(signature.args, args, strict=True)))
+    It is one instruction where it stands. Functions of Python that return one would be compiled
+    and copied for each.
+    """
 
-        return result(a, b), codegen
+    @infer_global(operation)
+    class _Operation(ConcreteTemplate):
+        cases: ClassVar = [signature(result, *[kind] * count)]
 
-    # numba compares the annotations of this one with those of what it returns.
-    def typed(a, b):
-        if operand in (a, b) and a in operands and b in operands:
-            return lambda a, b: combined(a, b)
-        return None
-
-    overload(operation)(typed)
-
-
-def _provide_for_one(operation: Any, operand: Any, build: Callable[[Any, Any], Any]) -> None:
-    @intrinsic
-    def changed(typingctx: Any, a: Any) -> Any:
-        return operand(operand), _code(build)
-
-    overload(operation)(lambda a: (lambda a: changed(a)) if a == operand else None)
+    @lower_builtin(operation, *[kind] * count)
+    def _code_of(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return build(builder, *args)
 
 
 def _compared(sign: str) -> Callable[[Any, Any, Any], Any]:
@@ -253,11 +250,11 @@ def _compared(sign: str) -> Callable[[Any, Any, Any], Any]:
 for _operation, _build in ((operator.add, ir.IRBuilder.fadd), (operator.iadd, ir.IRBuilder.fadd),
                            (operator.sub, ir.IRBuilder.fsub), (operator.mul, ir.IRBuilder.fmul),
                            (operator.truediv, ir.IRBuilder.fdiv)):
-    _provide(_operation, lanes, _build)
+    _provide(_operation, lanes, lanes, _build)
 for _operation, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"),
                           (operator.ge, ">="), (operator.eq, "==")):
-    _provide(_operation, mask, _compared(_sign))
+    _provide(_operation, lanes, mask, _compared(_sign))
 for _operation, _build in ((operator.and_, ir.IRBuilder.and_), (operator.or_, ir.IRBuilder.or_)):
-    _provide(_operation, mask, _build, operand=mask)
-_provide_for_one(operator.neg, lanes, ir.IRBuilder.fneg)
-_provide_for_one(operator.invert, mask, ir.IRBuilder.not_)
+    _provide(_operation, mask, mask, _build)
+_provide(operator.neg, lanes, lanes, ir.IRBuilder.fneg, 1)
+_provide(operator.invert, mask, mask, ir.IRBuilder.not_, 1)
