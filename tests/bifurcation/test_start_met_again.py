@@ -9,7 +9,7 @@ from fecontact.bifurcation import ContinuationOptions
 from fecontact.bifurcation.harmonic.compiled.step_batches import StepBatches
 
 # One harmonic of one displacement, and the parameter.
-PROBLEM = SimpleNamespace(harmonics=1, periods=1, scales=np.ones(4))
+PROBLEM = SimpleNamespace(harmonics=1, periods=1, scales=np.ones(4), reference=np.zeros((3, 1)))
 
 
 def before_start(curve, angles):
