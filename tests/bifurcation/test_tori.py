@@ -28,7 +28,7 @@ from fecontact.bifurcation import (
     torus_motion,
     vector_field,
 )
-from fecontact.bifurcation.tori.stability import TorusStability, stability_of
+from fecontact.bifurcation.tori.stability import TorusStability, exponents, stability_of
 from fecontact.core.errors import AnalysisError, InputError
 
 EPS = 0.1
@@ -328,3 +328,8 @@ def test_what_is_no_torus_is_refused():
         torus_motion(point)
 
 
+def test_a_direction_that_dies_at_once_leaves_the_other_exponent_a_number():
+    M = np.tile(np.diag([0.5, 0.0]), (8, 1, 1))
+    first, second = exponents(M, 0.5 * (np.sqrt(5.0) - 1.0))
+    assert first == pytest.approx(np.log(0.5), rel=1e-12)
+    assert second == -np.inf

@@ -14,7 +14,12 @@ from fecontact.bifurcation import (
 )
 from fecontact.bifurcation.harmonic import balance
 from fecontact.bifurcation.harmonic.starts import problem_for
-from fecontact.bifurcation.harmonic.woodbury import Factors, WoodburySolver, contact_directions
+from fecontact.bifurcation.harmonic.woodbury import (
+    BorderedEquations,
+    Factors,
+    WoodburySolver,
+    contact_directions,
+)
 from fecontact.laws import JenkinsFriction, RoughSurface
 
 
@@ -66,3 +71,15 @@ def test_many_contact_nodes_or_few_modes_leave_all_unknowns():
     field = contact_field(beam(), ["drive.frequency_hz"])
     assert contact_directions(field, field.values, 9) is not None
     assert contact_directions(field, field.values, 5) is None  # 264 unknowns
+
+
+def test_factors_serve_other_last_rows_even_if_the_first_one_is_overwritten():
+    class Equations(BorderedEquations):
+        condensed = np.array([[2.0, -1.0, 0.5], [0.3, 1.5, -0.7]])
+
+    equations, row, rhs = Equations(), np.array([0.2, 0.1, 1.0]), np.array([1.0, -2.0, 0.5])
+    for _ in range(2):
+        square = np.vstack([equations.condensed, row])
+        assert equations.solve(row, rhs) == pytest.approx(np.linalg.solve(square, rhs), rel=1e-13)
+        assert equations.determinant_sign(row) == np.sign(np.linalg.det(square))
+        row[:] = [-1.0, 0.4, -0.3]

@@ -149,10 +149,10 @@ class BorderedEquations:
             made = self.factorised(np.vstack([self.condensed, row]))
             if made is None:
                 return np.full(len(row), np.nan)
-            self._made = made, row
+            self._made = made, np.array(row)
         factors, first = self._made
         found = factors.solve(rhs)
-        if first is row or np.array_equal(first, row):
+        if np.array_equal(first, row):
             return found
         # Another last row: add what solves the homogeneous equations.
         return np.asarray(found + (rhs[-1] - row @ found) / (row @ self._along) * self._along)
@@ -171,7 +171,7 @@ class BorderedEquations:
         factors, first = self._made or (None, row)
         if not isinstance(factors, Factors):
             return 0.0
-        if first is row or np.array_equal(first, row):
+        if np.array_equal(first, row):
             return factors.sign
         return factors.sign * float(np.sign(row @ self._along))
 
