@@ -7,7 +7,7 @@ from numba.core.datamodel.models import PrimitiveModel
 from numba.core.typing import Signature
 from numba.extending import intrinsic, lower_builtin, register_model
 
-from fecontact.core.records import signature_of
+from fecontact.core.records import eight_type, is_eight, signature_of
 
 
 def contract_signature(contract: Any) -> Any:
@@ -18,20 +18,23 @@ def contract_signature(contract: Any) -> Any:
 
 
 class _FunctionAt(types.Callable):
-    """Numba's type of an address of a function in C that takes and returns numba's values."""
+    """Numba's type of an address of a function in C that takes and returns numba's values.
+
+    Where an argument is eight numbers, it is that of a function of eight numbers.
+    """
 
     def __init__(self, signature: Any, only_reads: bool) -> None:
-        self.prototype, self.only_reads = types.FunctionType(signature), only_reads
+        self.signature, self.only_reads = signature, only_reads
         super().__init__(name=f"FunctionAt({signature}, {only_reads})")
 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
         """Signature of the function if the number of arguments agrees, else None."""
-        wanted = self.prototype.signature
+        wanted = eight_type(self.signature) if any(map(is_eight, args)) else self.signature
         return wanted.replace(recvr=self) if len(args) == len(wanted.args) else None
 
     def get_call_signatures(self) -> Any:
         """Signature of the function."""
-        return [self.prototype.signature], False
+        return [self.signature], False
 
     def get_impl_key(self, sig: Any) -> Any:
         """All such functions are called in the same way."""
@@ -47,7 +50,8 @@ class _FunctionAtModel(PrimitiveModel):
 @lower_builtin(_FunctionAt, _FunctionAt, types.VarArg(types.Any))
 def _call_at(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     kind = signature.args[0]
-    pointer = builder.inttoptr(args[0], context.get_value_type(kind.prototype.ftype))
+    contract = types.FunctionType(Signature(signature.return_type, signature.args[1:], None))
+    pointer = builder.inttoptr(args[0], context.get_value_type(contract.ftype))
     attributes = ("nounwind", "readonly") if kind.only_reads else ("nounwind",)
     return builder.call(pointer, args[1:], attrs=attributes)
 

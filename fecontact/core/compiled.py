@@ -31,7 +31,7 @@ from numba.core.registry import CPUDispatcher
 
 from fecontact.core.addresses import contract_signature
 from fecontact.core.errors import InputError
-from fecontact.core.kernel_parts import BorrowingCompiler, kernel_compiler, part
+from fecontact.core.kernel_parts import BorrowingCompiler, PartCompiler, kernel_compiler, part
 from fecontact.core.progress import said_if_slow
 from fecontact.core.records import is_record, read_from_python, signature_of
 from fecontact.core.stored_code import (
@@ -237,9 +237,14 @@ def kernel(
     return made
 
 
+_HELPER: dict[str, Any] = {"error_model": "numpy", "fastmath": _FASTMATH, "forceinline": True}
+# Options of numba's overloads that become part of kernels as helpers do.
+OVERLOAD: dict[str, Any] = {**_HELPER, "no_cfunc_wrapper": True, "pipeline_class": PartCompiler}
+
+
 def helper(function: Callable[..., Any]) -> Any:
     """Compile a function that kernels share, and that becomes part of each of them."""
-    return part(function, error_model="numpy", fastmath=_FASTMATH, forceinline=True)
+    return part(function, **_HELPER)
 
 
 def routine(function: Callable[..., Any]) -> Any:
@@ -266,11 +271,13 @@ class CompiledLaw:
         The function as written, for other compilers and for tests.
     form : str
         Arguments and results of the function, for messages.
+    signature : Signature
+        Its arguments and results, as numba's types.
     """
 
     python: Callable[..., Any]
     form: str
-    _signature: Any
+    signature: Any
 
     @property
     def address(self) -> int:
@@ -295,7 +302,7 @@ class CompiledLaw:
                              f"assert statement{raising}, which a compiled law cannot have; check "
                              f"parameters in __post_init__ of the law's class, and return a "
                              f"finite value everywhere.")
-        law = CFunc(function, sigutils.normalize_signature(self._signature), {},
+        law = CFunc(function, sigutils.normalize_signature(self.signature), {},
                     {"error_model": "numpy"}, BorrowingCompiler)
         # Functions typed into a console have no file beside which they could be stored.
         if Path(inspect.getfile(function)).is_file():

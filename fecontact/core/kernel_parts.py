@@ -206,7 +206,7 @@ class _OfParts:
         return super().define_pipelines()  # type: ignore[misc]
 
 
-class _PartCompiler(_OfParts, _PlainCompiler):
+class PartCompiler(_OfParts, _PlainCompiler):
     """A compiler of parts."""
 
 
@@ -243,4 +243,4 @@ def part(function: Callable[..., Any], *, borrows: bool = False, **options: Any)
     """A function that kernels call; ``options`` are those of numba."""
     return _Part(function, targetoptions={"nopython": True, "boundscheck": None, **_NO_ENTRY,
                                           **options},
-                 pipeline_class=_BorrowingPartCompiler if borrows else _PartCompiler)
+                 pipeline_class=_BorrowingPartCompiler if borrows else PartCompiler)

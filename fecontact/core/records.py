@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from operator import add, mul, sub
 from types import NoneType
-from typing import Annotated, Any, TypeVar, get_args, get_origin
+from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin
 
 import numpy as np
 from numba import types
@@ -29,13 +29,16 @@ from numba.extending import typeof_impl
 from numpy.typing import NDArray
 from typing_extensions import TypeAliasType
 
-from fecontact.core.references import reference_to
+from fecontact.core.references import Reference, reference_to
+from fecontact.core.simd.kinds import WIDTH, has_eight, lane_array, lanes
 from fecontact.core.types import Array, ComplexArray, Integers
 
 Record = TypeVar("Record", bound=tuple[Any, ...])
 
 Flags = TypeAliasType("Flags", NDArray[np.bool_])
 ShortIntegers = TypeAliasType("ShortIntegers", NDArray[np.int32])
+# Arrays of eight numbers each, which are their last axis; without other axes eight numbers.
+Eights = TypeAliasType("Eights", NDArray[np.float64])
 
 
 @dataclass(frozen=True, repr=False)
@@ -103,7 +106,7 @@ _NUMBERS: dict[Any, Any] = {
 }
 _ENTRIES: dict[Any, Any] = {
     Array: types.float64, Integers: types.int64, ComplexArray: types.complex128,
-    Flags: types.boolean, ShortIntegers: types.int32,
+    Flags: types.boolean, ShortIntegers: types.int32, Eights: lanes,
 }
 
 
@@ -122,11 +125,18 @@ def numba_type(annotation: Any) -> Any:
     if is_record(annotation):
         return _record_type(annotation)
     if get_origin(annotation) is Annotated:
-        entries, *axes = get_args(annotation)
-        return types.Array(_ENTRIES[entries], len(axes), "C")
+        entries, axes = _entries_and_axes(annotation)
+        kind = types.Array(_ENTRIES[entries], len(axes), "C")
+        return lane_array(kind.ndim) if kind.dtype == lanes else kind
     if get_origin(annotation) is tuple:
         return types.BaseTuple.from_types([numba_type(item) for item in get_args(annotation)])
     raise TypeError(f"{annotation!r} stands for no type of compiled functions")
+
+
+def _entries_and_axes(annotation: Any) -> tuple[Any, list[Any]]:
+    """Entries of an annotated array, and the lengths of its axes."""
+    entries, *axes = get_args(annotation)
+    return entries, [axis for axis in axes if axis is not None]
 
 
 @cache
@@ -139,18 +149,23 @@ def read_from_python(record: Any) -> None:
 
 
 def _typeof(value: Any, context: Any) -> Any:
-    kinds = [typeof_impl(item, context) for item in value]
-    return None if None in kinds else types.BaseTuple.from_types(
-        list(map(_writeable, kinds)), type(value))
+    return _declared(value, numba_type(type(value)), context)
 
 
-def _writeable(kind: Any) -> Any:
-    """The type with arrays that may be written to."""
-    if isinstance(kind, types.Array):
-        return kind.copy(readonly=False)
-    if isinstance(kind, types.BaseNamedTuple):
-        return types.BaseTuple.from_types(list(map(_writeable, kind)), kind.instance_class)
-    return kind
+def _declared(value: Any, kind: Any, context: Any) -> Any:
+    """The type of a value of a record where ``kind`` is declared; None for what numba cannot read.
+
+    Arrays may be written to.
+    """
+    if isinstance(kind, types.BaseNamedTuple) and isinstance(value, kind.instance_class):
+        items = [_declared(item, inner, context) for item, inner in zip(value, kind, strict=True)]
+        return None if None in items else types.BaseTuple.from_types(items, kind.instance_class)
+    found = typeof_impl(value, context)
+    if not isinstance(found, types.Array):
+        return found
+    found = found.copy(readonly=False)
+    stored = types.Array(types.float64, found.ndim, "C")
+    return kind if has_eight(kind) and found == stored and value.shape[-1] == WIDTH else found
 
 
 def is_record(annotation: Any) -> bool:
@@ -202,11 +217,13 @@ def _maker(record: Any, name: str, kind: Any, sizes: Mapping[Size, int]) -> Call
         return partial(allocate, kind, sizes)
     if get_origin(kind) is not Annotated:
         return partial(kind)
-    entries, *axes = get_args(kind)
+    entries, axes = _entries_and_axes(kind)
     shape = [_length(axis, sizes) for axis in axes]
     if None in shape:
         return partial(_refuse, f"the shape {axes} of {record.__name__}.{name} does not follow "
                                 f"from sizes")
+    if entries is Eights:
+        return partial(np.zeros, [*shape, WIDTH])
     return partial(np.zeros, shape, _ENTRIES[entries].name)
 
 
@@ -226,7 +243,7 @@ def shapes(sizes: Mapping[Size, int], *records: Any) -> dict[Any, dict[str, Any]
             if is_record(kind):
                 found |= shapes(sizes, kind)
             elif get_origin(kind) is Annotated:
-                shape = tuple(_length(axis, sizes) for axis in get_args(kind)[1:])
+                shape = tuple(_length(axis, sizes) for axis in _entries_and_axes(kind)[1])
                 if any(length is not None for length in shape):
                     own[name] = shape
     return found
@@ -252,3 +269,47 @@ def holds_arrays(kind: Any) -> bool:
     """Whether a type of numba is an array, or a tuple that has some."""
     return isinstance(kind, types.Array) or (
         isinstance(kind, types.BaseTuple) and any(map(holds_arrays, kind)))
+
+
+@cache
+def of_eight(record: Any) -> Any:
+    """The record whose numbers are eight each, of eight systems that share all integers.
+
+    Fields have the names that they have in ``record``, so that functions which take one take the
+    other.
+    """
+    fields = [(name, _eight(kind)) for name, kind in _fields(record).items()]
+    return NamedTuple(f"Eight{record.__name__}", fields)
+
+
+def _eight(kind: Any) -> Any:
+    if is_record(kind):
+        return of_eight(kind)
+    if kind is float:
+        return Annotated[Eights, None]
+    if get_origin(kind) is Annotated and get_args(kind)[0] is Array:
+        return Annotated[Eights, *get_args(kind)[1:]]
+    return kind
+
+
+def eight_type(kind: Any) -> Any:
+    """The type of what is eight numbers where ``kind`` is one; integers stay what they are."""
+    if isinstance(kind, Signature):
+        return Signature(eight_type(kind.return_type), tuple(map(eight_type, kind.args)), None)
+    if isinstance(kind, Reference):
+        return reference_to(eight_type(kind.tuple_type))
+    if isinstance(kind, types.BaseNamedTuple):
+        return numba_type(of_eight(kind.instance_class)) if holds_arrays(
+            kind) else types.BaseTuple.from_types(list(map(eight_type, kind)), kind.instance_class)
+    if isinstance(kind, types.BaseTuple):
+        return types.BaseTuple.from_types(list(map(eight_type, kind)))
+    if isinstance(kind, types.Array) and kind.dtype == types.float64:
+        return lane_array(kind.ndim, kind.layout)
+    return lanes if kind == types.float64 else kind
+
+
+def is_eight(kind: Any) -> bool:
+    """Whether a type is that of eight numbers, of arrays of them or of a record with such."""
+    if isinstance(kind, Reference):
+        return is_eight(kind.tuple_type)
+    return any(map(is_eight, kind)) if isinstance(kind, types.BaseTuple) else has_eight(kind)

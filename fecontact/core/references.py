@@ -25,6 +25,8 @@ from numba.extending import (
     unbox,
 )
 
+from fecontact.core.simd.kinds import has_eight
+
 _I32, _I64 = ir.IntType(32), ir.IntType(64)
 
 
@@ -78,6 +80,8 @@ class _Fields(AttributeTemplate):
         if name not in kind.tuple_type.fields:
             return None
         field = _field_type(kind.tuple_type, kind.tuple_type.fields.index(name))
+        if isinstance(field, types.Array) and field.ndim == 0:
+            return field.dtype
         return Reference(field) if isinstance(field, types.BaseNamedTuple) else field
 
 
@@ -104,14 +108,19 @@ def _read(context: Any, builder: Any, kind: Any, value: Any, index: int) -> Any:
         return cgutils.gep_inbounds(builder, value, 0, index)
     name = f"{kind.name}.{kind.tuple_type.fields[index]}"
     if isinstance(field, types.Array):
-        return _array(context, builder, field, name, value, index)
+        array = _array(context, builder, field, name, value, index)
+        return array._getvalue() if field.ndim else context.unpack_value(
+            builder, field.dtype, array.data, align=1)
     if isinstance(context.get_value_type(field), ir.Aggregate):
         raise NotImplementedError(f"{name} is neither a number nor an array")
     return _asked(builder, name, value, index)
 
 
 def _array(context: Any, builder: Any, field: Any, name: str, value: Any, index: int) -> Any:
-    """An array without reference counts; all else follows from its shape."""
+    """An array without reference counts; all else follows from its shape.
+
+    An array without axes is read as its entry.
+    """
     array = context.make_array(field)(context, builder)
     members = array._datamodel._fields
     shape = [_asked(builder, f"{name}.{axis}", value, index, members.index("shape"), axis)
@@ -127,9 +136,9 @@ def _array(context: Any, builder: Any, field: Any, name: str, value: Any, index:
     array.parent = cgutils.get_null_value(array.parent.type)
     array.nitems, array.itemsize = count, item
     array.data = _asked(builder, f"{name}.data", value, index, members.index("data"))
-    array.shape = cgutils.pack_array(builder, shape)
-    array.strides = cgutils.pack_array(builder, strides)
-    return array._getvalue()
+    array.shape = cgutils.pack_array(builder, shape, _I64)
+    array.strides = cgutils.pack_array(builder, strides, _I64)
+    return array
 
 
 def _asked(builder: Any, name: str, value: Any, *place: int) -> Any:
@@ -206,8 +215,15 @@ def _filler(kind: Any, c: Any) -> Any:
         item = inside.pyapi.tuple_getitem(function.args[0], index)
         target = cgutils.gep_inbounds(builder, function.args[1], 0, index)
         if isinstance(field, types.Array):
-            code = builder.call(adapt, [item, builder.bitcast(target, cgutils.voidptr_t)])
+            whole = target
+            if has_eight(field):
+                # Python has a last axis of the eight numbers.
+                stored = types.Array(types.float64, field.ndim + 1, "C")
+                whole = builder.alloca(c.context.get_value_type(stored))
+            code = builder.call(adapt, [item, builder.bitcast(whole, cgutils.voidptr_t)])
             wrong = cgutils.is_not_null(builder, code)
+            if has_eight(field):
+                _write_rows(c.context, builder, field, stored, whole, target)
         elif isinstance(field, types.BaseNamedTuple):
             wrong = builder.call(_filler(Reference(field), inside), [item, target])
         else:
@@ -217,6 +233,17 @@ def _filler(kind: Any, c: Any) -> Any:
         failed = builder.or_(failed, wrong)
     builder.ret(failed)
     return function
+
+
+def _write_rows(
+    context: Any, builder: Any, field: Any, stored: Any, whole: Any, target: Any,
+) -> None:
+    """Fill the place of an array of eight numbers each by that with an axis of them."""
+    given = context.make_array(stored)(context, builder, ref=whole)
+    found = context.make_array(field)(context, builder, ref=target)
+    found.data = builder.bitcast(given.data, found.data.type)
+    found.shape = cgutils.pack_array(
+        builder, cgutils.unpack_tuple(builder, given.shape, stored.ndim)[: field.ndim], _I64)
 
 
 @lower_cast(types.BaseTuple, Reference)

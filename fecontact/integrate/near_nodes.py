@@ -15,6 +15,7 @@ import math
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, kernel
+from fecontact.core.simd.functions import opposite, somewhere
 from fecontact.integrate.rodas5p import dynamics, state
 from fecontact.integrate.step_polynomials import HIGHEST
 
@@ -129,7 +130,8 @@ def extend_near(y, problem, progress, workspace):
 def reach_out(move, problem, progress, workspace):
     """Take all nodes as near that may touch where no node has moved further than ``move``."""
     near = problem.control.near
-    if near != 0 and not move < workspace.clearance[len(problem.blocks.nodes)]:
+    clearance = workspace.clearance[len(problem.blocks.nodes)]
+    if near != 0 and somewhere(opposite(move < clearance)):
         _take_near_at(near)(0.0, 2.0 * move, problem, progress, workspace)
 
 

@@ -7,6 +7,7 @@ modes. For few nodes on flat ground it is cheaper to evaluate the coefficients t
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, kernel, routine
+from fecontact.core.simd.functions import opposite
 from fecontact.core.types import Array
 from fecontact.integrate.near_nodes import reach_out
 from fecontact.integrate.rodas5p import dynamics as motion
@@ -65,18 +66,20 @@ def _nodes_may_switch(moved, h, s, blocks, control, workspace):
         touching = nodes[2, n + j] != 0.0
         for level in range(levels.shape[0]):
             shift = s.gap[j] + levels[level, j] - control.ground[HIGHEST]
+            bottom = low + shift
             at_ends = 2.0 * min(min(first, last) + shift, 0.0)
-            mixed = low + shift < 0.0 and high + shift > 0.0
-            some |= (mixed or low + shift < at_ends) and not monotone
-            touching |= low + shift < 0.0 or level > 0
+            mixed = (bottom < 0.0) & (high + shift > 0.0)
+            some = some | ((mixed | (bottom < at_ends)) & opposite(monotone))
+            touching = touching | (bottom < 0.0) | (level > 0)
         if s.rows.shape[1] > 2:
             continue
         first, last = ends[1, j] - passing, nodes[1, j] - passing
         low, high, monotone = coefficient_range(first, last, r1, r2, r3)
         largest = max(-low, high) + spread
-        mixed = low < spread and high > -spread and largest > control.slip_scale[j]
+        mixed = (low < spread) & (high > -spread) & (largest > control.slip_scale[j])
         at_ends = 2.0 * max(max(abs(first), abs(last)), control.slip_scale[j]) + spread
-        some |= touching and (mixed or largest > at_ends) and not (monotone and spread == 0.0)
+        some = some | (touching & (mixed | (largest > at_ends))
+                       & opposite(monotone & (spread == 0.0)))
     return some
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.constants import constants
-from fecontact.core.records import Size, shapes
+from fecontact.core.records import Size, of_eight, shapes
 from fecontact.integrate.rodas5p import stage_solver, state
 from fecontact.integrate.rodas5p.blocks import Blocks, one_block
 from fecontact.system.nodes import (
@@ -34,27 +34,34 @@ FEW = ((1, 1), (2, 1), (3, 1), (2, 2))
 Values = dict[Any, dict[str, Any]]
 
 
-def sizes_of(modes: int, nodes: int) -> dict[Size, int]:
-    """Sizes of the records of small systems: plane ones without internal variables.
+def sizes_of(modes: int, nodes: int, states: int = 0) -> dict[Size, int]:
+    """Sizes of the records of small systems, plane ones without polynomial forces.
 
-    They have no polynomial forces.
+    ``states`` is the number of internal variables of a node.
     """
-    return {MODES: modes, NODES: nodes, AXES: 2, MEMORY: 0, COMBINATIONS: 0, PRODUCTS: 0}
+    return {MODES: modes, NODES: nodes, AXES: 2, MEMORY: states, COMBINATIONS: 0, PRODUCTS: 0}
 
 
-def _same_values(modes: int, nodes: int) -> Values:
+def _same_values(modes: int, nodes: int, states: int) -> Values:
     """Values that all small systems of a size share, for each record.
 
-    They have one block and one motion of the ground.
+    They have one block and one motion of the ground. Systems of which eight go side by side are on
+    level ground.
     """
     blocks = one_block(np.zeros((modes, 2 * nodes)), nodes)
-    return {
+    same: Values = {
         Blocks: {name: value for name, value in blocks._asdict().items() if name != "shapes"}
         | {"shapes": blocks.shapes.shape},
-        SystemArrays: {"memory": np.zeros(nodes, dtype=np.int64), "second_motion": 0},
+        SystemArrays: {"memory": np.full(nodes, states), "second_motion": 0},
         state.Control: {"sliders": 0},
         stage_solver.Reduced: {"solver": (modes, 2 * modes)},
     }
+    eight = {of_eight(record): dict(fields) for record, fields in same.items()}
+    eight[of_eight(SystemArrays)] |= {
+        "on_ground": np.zeros(nodes, dtype=np.int64), "surface": 0, "friction_scale": 0,
+        "follows_surface": 0, "polynomial": 0}
+    eight[of_eight(state.Control)] |= {"near": 0, "many": 0}
+    return same | eight
 
 
 def is_small(problem: state.Problem) -> bool:
@@ -100,19 +107,19 @@ class Sized:
     more: Callable[[int, int], Values] = lambda modes, nodes: {}
     lengths: Callable[[int], dict[Size, int]] = lambda nodes: {}
 
-    def values(self, modes: int, nodes: int) -> Values:
+    def values(self, modes: int, nodes: int, states: int = 0) -> Values:
         """Values and shapes that are the same in all calls of the kernel of a size, by record."""
-        found = shapes(sizes_of(modes, nodes) | self.lengths(nodes), *self.records)
-        same = {record: fields for record, fields in _same_values(modes, nodes).items()
+        found = shapes(sizes_of(modes, nodes, states) | self.lengths(nodes), *self.records)
+        same = {record: fields for record, fields in _same_values(modes, nodes, states).items()
                 if record in found}
         for values in (same, self.more(modes, nodes)):
             for record, fields in values.items():
                 found[record] = found.get(record, {}) | fields
         return found
 
-    def of(self, modes: int, nodes: int) -> Any:
+    def of(self, modes: int, nodes: int, states: int = 0) -> Any:
         """The kernel of a size."""
-        return _compiled(self, modes, nodes)
+        return _compiled(self, modes, nodes, states)
 
     @property
     def compilers(self) -> list[Callable[[], object]]:
@@ -121,5 +128,5 @@ class Sized:
 
 
 @cache
-def _compiled(sized: Sized, modes: int, nodes: int) -> Any:
-    return sized.kernel(constants(sized.values(modes, nodes)))
+def _compiled(sized: Sized, modes: int, nodes: int, states: int) -> Any:
+    return sized.kernel(constants(sized.values(modes, nodes, states)))

@@ -320,7 +320,7 @@ class ContactSystem(Summarised):
     def breakpoints(self, start: float, end: float) -> tuple[float, ...]:
         """Times between two [s] at which drive, loads or ground motion have kinks, ascending."""
         given: tuple[Any, ...] = (
-            *self.drive.motions, *self.load.signals.values(), *self._motions())
+            *self.drive.motions, *self.load.signals.values(), *self._motions)
         return tuple(sorted({time for source in given
                              for time in source.breakpoints(start, end)}))
 
@@ -331,17 +331,19 @@ class ContactSystem(Summarised):
         """
         given: list[Any] = [motion for motion in self.drive.motions if motion.largest > 0.0]
         given += self.load.signals.values()
-        given += self._motions()
+        given += self._motions
         periods = [source.shortest_period for source in given]
         wavelength, speed = self.ground.shortest_wavelength, self.ground.largest_speed(start, end)
         if wavelength is not None and speed > 0.0:
             periods.append(wavelength / speed)
         return float(min((period for period in periods if period is not None), default=np.inf))
 
-    def _motions(self) -> list[Any]:
+    @cached_property
+    def _motions(self) -> tuple[Any, ...]:
         """Motions in time of ground and sliding interfaces."""
-        return [source.motion for source in motion_sources(self.basis, self.ground, self.sliding)
-                if source.motion is not None]
+        return tuple(source.motion
+                     for source in motion_sources(self.basis, self.ground, self.sliding)
+                     if source.motion is not None)
 
     def stored_energy(self, penetration: Array) -> Array:
         """Energy (...,) stored in the contact [J] at penetrations (..., n) [m]."""

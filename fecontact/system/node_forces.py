@@ -12,6 +12,8 @@ import numpy as np
 
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import IntegerVector, Matrix, Vector
+from fecontact.core.simd.functions import everywhere, somewhere
+from fecontact.core.simd.vectors import select
 from fecontact.laws.friction.planar import direction
 from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, planar_at
 from fecontact.system.nodes import NodeContact, most_memory, node_contact
@@ -78,7 +80,9 @@ def friction_scale(j, contact, s):
 @helper
 def pressing_force(j, contact, F, s):
     """The force that friction sees under a normal force: |F| times the ground's variation."""
-    return abs(F) * friction_scale(j, contact, s)[0] if F != 0.0 else 0.0
+    if everywhere(F == 0.0):
+        return abs(F)
+    return abs(F) * friction_scale(j, contact, s)[0]
 
 
 @helper
@@ -106,8 +110,11 @@ def set_friction(j, slip, pressing, z, p, s, force, rates):
         planar_at(s.planar[j])(s.friction[j], slip[0], slip[1], pressing, z, p, force, rates)
     elif s.memory[j] > 0:
         memory_at(s.friction[j])(slip[0], pressing, z, p, force, rates)
-    elif pressing != 0.0:
-        force[0], force[1], force[2] = friction_at(s.friction[j])(slip[0], pressing, p)
+    elif somewhere(pressing != 0.0):
+        R, R_v, R_F = friction_at(s.friction[j])(slip[0], pressing, p)
+        force[0] = select(pressing != 0.0, R, 0.0)
+        force[1] = select(pressing != 0.0, R_v, 0.0)
+        force[2] = select(pressing != 0.0, R_F, 0.0)
     else:
         force[0], force[1], force[2] = 0.0, 0.0, 0.0
 
@@ -163,9 +170,9 @@ def normal_gradients(j, contact, s, out):
         out[1, axis] = F_u * slope + F_v * (bend[0] * slip[0] + bend[1] * slip[1])
         out[1, d + axis] = F_v * slope
     size, scale, rise = abs(F), 1.0, (0.0, 0.0)
-    if F != 0.0:
+    if somewhere(F != 0.0):
         scale, rise = friction_scale(j, contact, s)
-    sign = scale if F >= 0.0 else -scale
+    sign = select(F >= 0.0, scale, -scale)
     for k in range(2 * d):
         out[d, k] = sign * out[1, k]
     for tangent in range(d - 1):

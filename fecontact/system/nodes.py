@@ -12,6 +12,7 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.records import ANY, IntegerVector, Matrix, Size, Vector
+from fecontact.core.simd.functions import everywhere
 from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import ground_at, signal_at, surface_at
 
@@ -151,7 +152,9 @@ def ground_travel(tangent, j, moved, s):
 @helper
 def size_of(pair):
     """Magnitude of a vector along the tangents."""
-    return np.hypot(pair[0], pair[1]) if pair[1] != 0.0 else abs(pair[0])
+    if everywhere(pair[1] == 0.0):
+        return abs(pair[0])
+    return np.hypot(pair[0], pair[1])
 
 
 @helper

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Matrix, Vector
+from fecontact.core.simd.functions import somewhere
 from fecontact.core.types import Array
 from fecontact.system.nodes import SystemArrays
 
@@ -168,7 +169,7 @@ def add_polynomial_stiffness(factor, gradient, s, out):
         for i in range(m):
             part = factor * rows[a, i]
             # Most combinations are coordinates themselves.
-            if part != 0.0:
+            if somewhere(part != 0.0):
                 for k in range(m):
                     out[i, k] += part * gradient[a, k]
                 for k in range(m):

@@ -191,7 +191,7 @@ def test_the_node_that_shortens_steps():
         run, status = ended(system, np.zeros(4), np.linspace(0.0, 1.0, 11))
         assert status == step_loop.FINISHED
         assert run.progress.counts[REJECTIONS] > 0
-        assert run.progress.counts[WORST_NODE] == (forces[0] == 0.0)
+        assert run.progress.numbers[WORST_NODE] == (forces[0] == 0.0)
 
 
 @normal_law

@@ -92,7 +92,7 @@ def test_turned_belt_turns_the_motion(friction):
         system, state = mass_on_belt(friction, fc.Ground(speed=belt[0], speed_y=belt[1]),
                                      [*thrown, 0.0], 2e-5)
         state = np.concatenate([state, np.zeros(system.size - len(state))])
-        run = fc.simulate(system, 0.2, initial=state, outputs=101, rtol=1e-9)
+        run = fc.simulate(system, 0.2, initial=state, outputs=101, rtol=1e-10)
         found.append((run.displacement(0)[:, :2], run.friction_forces[:, 0]))
     (path, force), (turned, turned_force) = found
     assert turned == pytest.approx(path @ turn.T, abs=1e-9)

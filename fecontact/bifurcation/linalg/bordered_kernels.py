@@ -25,7 +25,8 @@ from fecontact.core.dense_lu import (
 )
 from fecontact.core.dense_lu import solve as solve_dense
 from fecontact.core.records import Matrix, Vector
-from fecontact.core.simd.vectors import WIDTH, gather, read, spread, write
+from fecontact.core.simd.kinds import WIDTH
+from fecontact.core.simd.vectors import gather, read, spread, write
 
 
 @helper

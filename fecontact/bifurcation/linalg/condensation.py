@@ -24,7 +24,8 @@ from fecontact.bifurcation.linalg.simd_lu import eliminate_simd
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.dense_lu import factorise
 from fecontact.core.records import Array4, Block, IntegerBlock, IntegerMatrix, Matrix, Vector
-from fecontact.core.simd.vectors import WIDTH, gather, read, spread, write
+from fecontact.core.simd.kinds import WIDTH
+from fecontact.core.simd.vectors import gather, read, spread, write
 from fecontact.core.types import Array
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from fecontact.bifurcation.linalg.simd_lu import eliminate_simd
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Block, Matrix, Vector
-from fecontact.core.simd.vectors import WIDTH, gather, read, spread, write
+from fecontact.core.simd.kinds import WIDTH
+from fecontact.core.simd.vectors import gather, read, spread, write
 from fecontact.core.types import Array
 
 

@@ -7,7 +7,8 @@ for 48. What is left in place of a matrix is the same; arrays have a last axis o
 """
 
 from fecontact.core.compiled import helper
-from fecontact.core.simd.vectors import WIDTH, magnitude, read, select, spread, write
+from fecontact.core.simd.kinds import WIDTH
+from fecontact.core.simd.vectors import magnitude, read, select, spread, write
 
 
 @helper

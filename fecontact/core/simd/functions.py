@@ -19,19 +19,16 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core.datamodel.models import PrimitiveModel
-from numba.extending import intrinsic, overload, register_model
+from numba.extending import intrinsic, overload
 
-from fecontact.core.compiled import helper
+from fecontact.core.compiled import OVERLOAD, helper
+from fecontact.core.records import is_eight
+from fecontact.core.simd.kinds import WIDTH, lanes, mask
 from fecontact.core.simd.vectors import (
-    _VECTOR,
-    WIDTH,
     _code,
     exponent,
     fused,
-    lanes,
     magnitude,
-    mask,
     root,
     scaled,
     select,
@@ -162,9 +159,6 @@ def reciprocal_fifth_root(x):
     return exponential(-0.2 * logarithm(x))
 
 
-_JIT = {"error_model": "numpy", "forceinline": True}
-
-
 def _folded(all_lanes: bool) -> Any:
     """Intrinsic that makes one truth value of those of the lanes: of all of them, or of any."""
 
@@ -197,16 +191,32 @@ def everywhere(where):
     return _all(where)
 
 
+@helper
+def opposite(where):
+    """Where a condition does not hold, of one number or of eight."""
+    return _opposite(where)
+
+
+@intrinsic
+def _opposite(typingctx: Any, where: Any) -> Any:
+    return where(where), _code(ir.IRBuilder.not_)
+
+
 def by_kind(one: Callable[..., Any], eight: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of x for kernels that calls ``one`` of a float and ``eight`` of eight numbers."""
+    """A function for kernels that calls ``eight`` where an argument is eight numbers, else ``one``.
 
-    def function(x):
-        return one(x) if isinstance(x, float) else eight(x)
+    Arguments may be arrays and records of eight numbers too.
+    """
 
-    def typed(x):
-        return (lambda x: eight(x)) if x == lanes else (lambda x: one(x))
+    def function(*given):
+        return one(*given)
 
-    overload(function, jit_options=_JIT)(typed)
+    def typed(*given):
+        if any(map(is_eight, given)):
+            return lambda *given: eight(*given)
+        return lambda *given: one(*given)
+
+    overload(function, jit_options=OVERLOAD)(typed)
     return function
 
 
@@ -256,7 +266,7 @@ def _whole_power(x, exponent):
     return power if exponent >= 0 else 1.0 / power
 
 
-@overload(operator.pow, jit_options=_JIT)
+@overload(operator.pow, jit_options=OVERLOAD)
 def _typed_power(a, b):
     if a != lanes:
         return None
@@ -269,7 +279,7 @@ def _typed_power(a, b):
 
 def _for_eight(function: Any, eight: Any) -> None:
     """Let a function of one number, as Python has it, take eight."""
-    overload(function, jit_options=_JIT)(
+    overload(function, jit_options=OVERLOAD)(
         lambda x: (lambda x: eight(x)) if x == lanes else None)
 
 
@@ -282,55 +292,21 @@ def _for_eight_pairs(function: Any, eight: Any) -> None:
             return lambda a, b: eight(a, b)
         return None
 
-    overload(function, jit_options=_JIT)(typed)
+    overload(function, jit_options=OVERLOAD)(typed)
+
+
+@helper
+def _hypotenuse(a, b):
+    return root(a * a + b * b)
 
 
 for _of_one, _of_eight in (
         (math.exp, exponential), (math.log, _logarithm), (math.atan, arctangent),
         (math.tanh, hyperbolic_tangent), (math.sqrt, root), (abs, magnitude)):
     _for_eight(_of_one, _of_eight)
-for _of_two, _of_eight in ((min, _smaller), (max, _larger)):
+copysign = by_kind(math.copysign, signed)
+for _of_two, _of_eight in ((min, _smaller), (max, _larger), (np.hypot, _hypotenuse)):
     _for_eight_pairs(_of_two, _of_eight)
-
-
-class _Rows(types.Type):
-    def __init__(self) -> None:
-        super().__init__(name="Rows")
-
-
-_rows = _Rows()
-
-
-@register_model(_Rows)
-class _RowsModel(PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, ir.DoubleType().as_pointer())
-
-
-@intrinsic
-def rows(typingctx: Any, table: Any) -> Any:
-    """A table (k, 8) of which ``rows(table)[i]`` are eight numbers."""
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return context.make_array(signature.args[0])(context, builder, args[0]).data
-
-    return _rows(table), codegen
-
-
-@intrinsic
-def _row(typingctx: Any, table: Any, i: Any) -> Any:
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        place = builder.gep(args[0], [builder.mul(args[1], ir.Constant(args[1].type, WIDTH))])
-        return builder.load(builder.bitcast(place, _VECTOR.as_pointer()), align=8)
-
-    return lanes(table, types.int64), codegen
-
-
-@overload(operator.getitem)
-def _typed_row(table, i):
-    if isinstance(table, _Rows) and isinstance(i, types.Integer):
-        return lambda table, i: _row(table, i)
-    return None
 
 
 @intrinsic
@@ -344,3 +320,38 @@ def with_lane(typingctx: Any, numbers: Any, lane: Any, number: Any) -> Any:
     """Eight numbers, one of which is replaced."""
     return lanes(lanes, types.int64, types.float64), _code(
         lambda builder, numbers, lane, number: builder.insert_element(numbers, number, lane))
+
+
+@intrinsic
+def in_lane(typingctx: Any, numbers: Any, lane: Any) -> Any:
+    """One lane of an array of eight numbers each: an array of numbers that shares its memory."""
+    kind = types.Array(types.float64, numbers.ndim, "A")
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        given = context.make_array(numbers)(context, builder, args[0])
+        found = context.make_array(kind)(context, builder)
+        for name in ("meminfo", "parent", "nitems", "shape", "strides"):
+            setattr(found, name, getattr(given, name))
+        found.itemsize = context.get_constant(types.intp, 8)
+        first = builder.bitcast(given.data, ir.DoubleType().as_pointer())
+        found.data = builder.gep(first, [args[1]])
+        return found._getvalue()
+
+    return kind(numbers, types.int64), codegen
+
+
+@intrinsic
+def at_unknown_place(typingctx: Any, numbers: Any) -> Any:
+    """An array of eight numbers each, read from a place that the compiler does not know.
+
+    What replaces some lanes of a place by others of the same place would become a masked store,
+    which takes ten times as long as a whole one on many processors.
+    """
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        array = context.make_array(numbers)(context, builder, args[0])
+        kind = array.data.type
+        array.data = builder.asm(ir.FunctionType(kind, [kind]), "", "=r,0", [array.data], False)
+        return array._getvalue()
+
+    return numbers(numbers), codegen

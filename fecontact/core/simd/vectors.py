@@ -15,47 +15,20 @@ from numba import types
 from numba.core import cgutils
 from numba.core.typeconv.rules import default_type_manager
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model
+from numba.extending import intrinsic, lower_builtin, lower_cast
 
 from fecontact.core.compiled import helper
+from fecontact.core.simd.kinds import TRUTHS, VECTOR, WIDTH, lanes, mask
 
-WIDTH = 8
-_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
-_TRUTHS = ir.VectorType(ir.IntType(1), WIDTH)
 _BYTE = ir.IntType(8)
-
-
-class _Lanes(types.Type):
-    def __init__(self) -> None:
-        super().__init__(name="Lanes")
-
-
-class _Mask(types.Type):
-    def __init__(self) -> None:
-        super().__init__(name="Mask")
-
-
-lanes, mask = _Lanes(), _Mask()
-
-
-@register_model(_Lanes)
-class _Model(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _VECTOR)
-
-
-@register_model(_Mask)
-class _MaskModel(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _TRUTHS)
 
 
 def _pointer(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     array = context.make_array(kind)(context, builder, value)
-    return builder.bitcast(array.data, _VECTOR.as_pointer())
+    return builder.bitcast(array.data, VECTOR.as_pointer())
 
 
-def _spread(builder: Any, number: Any, kind: Any = _VECTOR) -> Any:
+def _spread(builder: Any, number: Any, kind: Any = VECTOR) -> Any:
     empty, index = ir.Constant(kind, ir.Undefined), ir.IntType(32)
     first = builder.insert_element(empty, number, ir.Constant(index, 0))
     return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(index, WIDTH), None))
@@ -95,7 +68,7 @@ def gather(typingctx: Any, values: Any, places: Any, further: Any) -> Any:
         source = context.make_array(signature.args[0])(context, builder, args[0]).data
         where = context.make_array(signature.args[1])(context, builder, args[1]).data
         first = builder.gep(source, [args[2]])
-        result = ir.Constant(_VECTOR, ir.Undefined)
+        result = ir.Constant(VECTOR, ir.Undefined)
         for lane in range(WIDTH):
             index = ir.Constant(ir.IntType(32), lane)
             place = builder.load(builder.gep(where, [index]))
@@ -121,10 +94,19 @@ def _float_to_lanes(context: Any, builder: Any, fromty: Any, toty: Any, value: A
     return _spread(builder, value)
 
 
+default_type_manager.set_promote(types.boolean, mask)
+
+
+@lower_cast(types.boolean, mask)
+@lower_cast(types.BooleanLiteral, mask)
+def _truth_to_mask(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) -> Any:
+    return _spread(builder, value, TRUTHS)
+
+
 def _library(name: str) -> Callable[..., Any]:
     def build(builder: Any, *args: Any) -> Any:
         function = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(_VECTOR, [_VECTOR] * len(args)),
+            builder.module, ir.FunctionType(VECTOR, [VECTOR] * len(args)),
             f"llvm.{name}.v{WIDTH}f64")
         return builder.call(function, args)
 
@@ -170,7 +152,7 @@ def scaled(typingctx: Any, numbers: Any, powers: Any) -> Any:
         # The sum's last bits are those of the whole number; they become those of the exponent.
         shifted = builder.fadd(args[1], _constant(1.5 * 2.0**52))
         power = builder.shl(builder.bitcast(shifted, integers), _constant(52, integers))
-        return builder.bitcast(builder.add(builder.bitcast(args[0], integers), power), _VECTOR)
+        return builder.bitcast(builder.add(builder.bitcast(args[0], integers), power), VECTOR)
 
     return lanes(lanes, lanes), codegen
 
@@ -184,12 +166,12 @@ def exponent(typingctx: Any, numbers: Any) -> Any:
         bits = builder.lshr(builder.bitcast(args[0], integers), _constant(52, integers))
         # The bits of 2^52 and those of the exponent are 2^52 + exponent.
         whole = builder.or_(bits, _constant(0x4330000000000000, integers))
-        return builder.fsub(builder.bitcast(whole, _VECTOR), _constant(2.0**52 + 1023.0))
+        return builder.fsub(builder.bitcast(whole, VECTOR), _constant(2.0**52 + 1023.0))
 
     return lanes(lanes), codegen
 
 
-def _constant(value: Any, kind: Any = _VECTOR) -> Any:
+def _constant(value: Any, kind: Any = VECTOR) -> Any:
     return ir.Constant(kind, [value] * WIDTH)
 
 
@@ -223,12 +205,12 @@ def bits(typingctx: Any, where: Any) -> Any:
 def mask_of(typingctx: Any, given: Any) -> Any:
     """The mask of an integer with one bit per lane."""
     return mask(types.int64), _code(
-        lambda builder, given: builder.bitcast(builder.trunc(given, _BYTE), _TRUTHS))
+        lambda builder, given: builder.bitcast(builder.trunc(given, _BYTE), TRUTHS))
 
 
 def _provide(operation: Any, kind: Any, result: Any, build: Callable[..., Any],
              count: int = 2) -> None:
-    """Let lanes, or masks, take an operator; one of two lanes may be a number.
+    """Let lanes, or masks, take an operator; one of two operands may be a single value.
 
     It is one instruction where it stands. Functions of Python that return one would be compiled
     and copied for each.
@@ -247,13 +229,14 @@ def _compared(sign: str) -> Callable[[Any, Any, Any], Any]:
     return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
 
 
-for _operation, _build in ((operator.add, ir.IRBuilder.fadd), (operator.iadd, ir.IRBuilder.fadd),
-                           (operator.sub, ir.IRBuilder.fsub), (operator.mul, ir.IRBuilder.fmul),
-                           (operator.truediv, ir.IRBuilder.fdiv)):
-    _provide(_operation, lanes, lanes, _build)
+for _name, _build in (("add", ir.IRBuilder.fadd), ("sub", ir.IRBuilder.fsub),
+                      ("mul", ir.IRBuilder.fmul), ("truediv", ir.IRBuilder.fdiv)):
+    _provide(getattr(operator, _name), lanes, lanes, _build)
+    _provide(getattr(operator, f"i{_name}"), lanes, lanes, _build)
 for _operation, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt, ">"),
                           (operator.ge, ">="), (operator.eq, "==")):
     _provide(_operation, lanes, mask, _compared(_sign))
+_provide(operator.ne, lanes, mask, lambda builder, a, b: builder.fcmp_unordered("!=", a, b))
 for _operation, _build in ((operator.and_, ir.IRBuilder.and_), (operator.or_, ir.IRBuilder.or_)):
     _provide(_operation, mask, mask, _build)
 _provide(operator.neg, lanes, lanes, ir.IRBuilder.fneg, 1)

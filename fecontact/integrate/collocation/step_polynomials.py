@@ -145,7 +145,7 @@ def step_error(step, problem, progress, workspace, c):
                 part = abs(slip) * g / (control.slip_part * (control.slip_scale[j] + distance))
                 if part > error:
                     error = part
-                    progress.counts[WORST_NODE] = j
+                    progress.numbers[WORST_NODE] = j
     progress.counts[RATES] += LOOKS
     return error
 

@@ -5,6 +5,7 @@ An interface moves with the modes of its two bodies only, so the rows, the matri
 consist of blocks, and a chain of bodies costs so many times one body. One body is one block.
 """
 
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -98,8 +99,14 @@ def blocks_of(basis: ModalBasis, arrays: SystemArrays) -> Blocks:
 
 def one_block(shapes: Array, nodes: int) -> Blocks:
     """The blocks of a system that is one block, with rows ``shapes`` (m, 2 n) or (m, 3 n)."""
+    return _one_block(shapes.shape, nodes)._replace(shapes=shapes)
+
+
+@lru_cache(maxsize=16)
+def _one_block(shape: tuple[int, ...], nodes: int) -> Blocks:
+    """Blocks for rows of a shape, of which many systems in turn may be."""
     whole = np.ones((1, 1), dtype=bool)
-    return _blocks(shapes, [(0, len(shapes))], [(0, nodes)], whole, whole, whole)
+    return _blocks(np.zeros(shape), [(0, shape[0])], [(0, nodes)], whole, whole, whole)
 
 
 def near_blocks(blocks: Blocks) -> Blocks:

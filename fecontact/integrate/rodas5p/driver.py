@@ -311,5 +311,5 @@ def integrate(task: Task, method: str, checkpoint: Path | None) -> Solution:
 def _place(run: Run, ended: Status) -> str:
     where = f"It ended at t = {run.time:.9g} s"
     if ended is Status.MINIMUM_STEP and run.progress.counts[step_loop.REJECTIONS]:
-        where += f", near contact node {int(run.progress.counts[run_arrays.WORST_NODE])}"
+        where += f", near contact node {int(run.progress.numbers[run_arrays.WORST_NODE])}"
     return f"{where}."

@@ -7,7 +7,11 @@ The same equations as :mod:`fecontact.system.kernels`, laid out for speed, by th
 import math
 from typing import Annotated, NamedTuple
 
+import numpy as np
+
 from fecontact.core.compiled import helper, routine
+from fecontact.core.simd.functions import by_kind, copysign, somewhere
+from fecontact.core.simd.vectors import select
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.laws.signatures import signal_at
@@ -57,7 +61,7 @@ def set_given(t, s, given, load):
     kernels.set_constant_load(s, load)
     for axis in range(len(s.drive)):
         stiffness, damping = s.drive_stiffness[axis], s.drive_damping[axis]
-        if stiffness != 0.0 or damping != 0.0:
+        if somewhere((stiffness != 0.0) | (damping != 0.0)):
             value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
             given[PULL + axis] = stiffness * value + damping * rate
             given[PULL_RATE + axis] = stiffness * rate
@@ -83,8 +87,7 @@ def motion_of(j, w, s):
 
 
 @helper
-def project(blocks, y, places, speeds):
-    """Fill displacements and velocities (d n,) of the nodes: from 0 on x, n on y, 2 n on across."""
+def _project_by_tiles(blocks, y, places, speeds):
     shapes = blocks.shapes
     columns = shapes.shape[1]
     count = blocks.used[0]
@@ -94,6 +97,22 @@ def project(blocks, y, places, speeds):
             speeds[j] = 0.0
     for tile in range(len(blocks.tiles)):
         project_block(block_at(blocks.tiles, tile), shapes, y, places, speeds)
+
+
+@helper
+def _project_by_columns(blocks, y, places, speeds):
+    """Sums of eight systems, which have one block, stay in registers."""
+    shapes, m = blocks.shapes, len(blocks.shapes)
+    for j in range(shapes.shape[1]):
+        place, speed = 0.0, 0.0
+        for i in range(m):
+            place += shapes[i, j] * y[i]
+            speed += shapes[i, j] * y[m + i]
+        places[j], speeds[j] = place, speed
+
+
+# Fill displacements and velocities (d n,) of the nodes: from 0 on x, n on y, 2 n on across.
+project = by_kind(_project_by_tiles, _project_by_columns)
 
 
 @helper
@@ -170,11 +189,7 @@ def add_block_forces(ends, shapes, forces, out):
 
 
 @helper
-def gather(y, s, blocks, load, forces, rate):
-    """Fill the first 2 m entries of ``rate`` from node forces (d n,), see :func:`add_node_forces`.
-
-    Without polynomial forces.
-    """
+def _gather_by_blocks(y, s, blocks, load, forces, rate):
     m = len(load)
     v = y[m : 2 * m]
     for i in range(m):
@@ -188,6 +203,23 @@ def gather(y, s, blocks, load, forces, rate):
                 total += s.stiffness[i, k] * y[k] + s.damping[i, k] * v[k]
             rate[m + i] -= total
     add_node_forces(blocks, forces, rate[m : 2 * m])
+
+
+@helper
+def _gather_by_rows(y, s, blocks, load, forces, rate):
+    m, shapes = len(load), blocks.shapes
+    for i in range(m):
+        total = load[i]
+        for k in range(m):
+            total -= s.stiffness[i, k] * y[k] + s.damping[i, k] * y[m + k]
+        for j in range(shapes.shape[1]):
+            total += shapes[i, j] * forces[j]
+        rate[i], rate[m + i] = y[m + i], total
+
+
+# Fill the first 2 m entries of ``rate`` from node forces (d n,), see :func:`add_node_forces`.
+# Without polynomial forces.
+gather = by_kind(_gather_by_blocks, _gather_by_rows)
 
 
 @helper
@@ -303,6 +335,21 @@ def copy_gradients(there, here, blocks):
 
 
 @helper
+def _next_number(t, end):
+    return np.nextafter(t, end)
+
+
+@helper
+def _itself(t, end):
+    return t
+
+
+# The time just after t, on the way to the end: what is given may jump at t, but not in systems of
+# which eight go side by side.
+just_after = by_kind(_next_number, _itself)
+
+
+@helper
 def t_plus(step):
     """A time in a step so close to its begin that rates of what is given hardly change."""
     return min(step.t + 1e-4 * step.h, step.latest)
@@ -311,11 +358,15 @@ def t_plus(step):
 @helper
 def ground_acceleration(t, later, moved, s):
     """Accelerations of the ground's two motions, by how fast they are ``later``; 0 at t itself."""
-    if not later > t:
-        return 0.0, 0.0
-    ahead = nodes.ground_motion(later, s)
-    return ((ahead.speed - moved.speed) / (later - t),
-            (ahead.second_speed - moved.second_speed) / (later - t))
+    ahead, per_time = nodes.ground_motion(later, s), _per(later - t)
+    return ((ahead.speed - moved.speed) * per_time,
+            (ahead.second_speed - moved.second_speed) * per_time)
+
+
+@helper
+def _per(duration):
+    """One by a duration, zero where there is none."""
+    return select(duration > 0.0, 1.0 / duration, 0.0)
 
 
 @helper
@@ -327,11 +378,12 @@ def set_load_rate(t, later, after_t, s, out):
     for i in range(len(out)):
         out[i] = 0.0
     for axis in range(len(s.drive)):
-        if s.drive_damping[axis] != 0.0 and later > t:
+        if somewhere(s.drive_damping[axis] != 0.0):
             rise = (signal_at(s.drive[axis])(later, s.drive_parameters[axis])[1]
                     - signal_at(s.drive[axis])(after_t, s.drive_parameters[axis])[1])
+            quickening = s.drive_damping[axis] * (rise * _per(later - t))
             for i in range(len(out)):
-                out[i] += s.drive_damping[axis] * rise / (later - t) * s.drive_shapes[axis, i]
+                out[i] += quickening * s.drive_shapes[axis, i]
     for k in range(len(s.load)):
         rate = signal_at(s.load[k])(after_t, s.load_parameters[k])[1]
         for i in range(len(out)):
@@ -399,33 +451,25 @@ def next_kink(moved, problem, progress, w, within):
         first = _crossing(u, v, a, first)
         first = _crossing(u - depth[j], v, a, first)
         force = normal_force(j, u, v, s)[0]
-        if force > 0.0:
-            fall = g.partial[j, 1, 1] * -v + g.partial[j, 1, d + 1] * -a
-            if fall < 0.0 and -force / fall < first:
-                first = -force / fall
-            motion = nodes.motion_at(j, w[1], w[2], n, d)
-            slip = nodes.slip_velocity(j, motion.places, moved, s)
-            size = nodes.size_of(slip)
-            if size > 1.5 * slow[j]:
-                towards = -(slip[0] * motion.speeds[0] + slip[1] * motion.speeds[2]) / size
-                if size - slow[j] < towards * first:
-                    first = (size - slow[j]) / towards
+        lift = -force / (g.partial[j, 1, 1] * -v + g.partial[j, 1, d + 1] * -a)
+        first = select((force > 0.0) & (lift > 0.0) & (lift < first), lift, first)
+        motion = nodes.motion_at(j, w[1], w[2], n, d)
+        slip = nodes.slip_velocity(j, motion.places, moved, s)
+        size = nodes.size_of(slip)
+        towards = -(slip[0] * motion.speeds[0] + slip[1] * motion.speeds[2])
+        stop = (size - slow[j]) * size / towards
+        first = select((force > 0.0) & (size > 1.5 * slow[j]) & (towards > 0.0) & (stop < first),
+                       stop, first)
     return first
 
 
 @helper
 def _crossing(u, v, a, within):
-    """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier."""
-    if u * v > 0.0 and u * a >= 0.0:
-        return within
-    discriminant = v * v - 2.0 * a * u
-    if discriminant < 0.0:
-        return within
-    q = -(v + math.copysign(math.sqrt(discriminant), v))
-    one = q / a if a != 0.0 else -1.0
-    other = 2.0 * u / q if q != 0.0 else -1.0
-    if 0.0 < one < within:
-        within = one
-    if 0.0 < other < within:
-        within = other
-    return within
+    """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier.
+
+    Roots that do not exist are no numbers, which no comparison holds for.
+    """
+    q = -(v + copysign(math.sqrt(v * v - 2.0 * a * u), v))
+    one, other = q / a, 2.0 * u / q
+    within = select((one > 0.0) & (one < within), one, within)
+    return select((other > 0.0) & (other < within), other, within)

@@ -4,6 +4,8 @@
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.simd.functions import everywhere, somewhere
+from fecontact.core.simd.vectors import select
 from fecontact.integrate.brackets import Bracket, between, narrowed
 from fecontact.integrate.near_nodes import extend_near
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
@@ -25,10 +27,10 @@ def state_error(control, progress, workspace):
     """Error of the modes in a step, as a multiple of the allowed error."""
     error = modal_error(workspace.stages[tableau.STAGES - 1], control, progress, workspace)
     # Comparisons with NaN are false: make sure that it is not lost.
+    finite = error < np.inf
     for k in range(len(workspace.after)):
-        if not abs(workspace.after[k]) < np.inf:
-            error = np.inf
-    return error
+        finite = finite & (abs(workspace.after[k]) < np.inf)
+    return select(finite, error, np.inf)
 
 
 @helper
@@ -59,19 +61,20 @@ def memory_error(error, problem, progress, workspace):
     states = len(control.memory_scale) // max(n, 1)
     difference = workspace.stages[tableau.STAGES - 1]
     for j in range(n):
-        begins = (progress.signs[j] == 0 and control.slider_counts[j] > 0
-                  and problem.system.rows.shape[1] > 2)
-        if workspace.nodes[2, n + j] != 0.0 and not begins:
+        begins = (control.slider_counts[j] > 0 and problem.system.rows.shape[1] > 2
+                  and everywhere(progress.signs[j] == 0.0))
+        if not begins:
+            touching = workspace.nodes[2, n + j] != 0.0
             for k in range(j * states, (j + 1) * states):
-                error = max(error, abs(difference[2 * m + k]) / (
-                    control.memory_scale[k] * control.rtol))
+                part = abs(difference[2 * m + k]) / (control.memory_scale[k] * control.rtol)
+                error = select(touching, max(error, part), error)
     return error
 
 
 @helper
 def sign_of(force):
     """1, 0 or -1."""
-    return 1 if force > 0.0 else (-1 if force < 0.0 else 0)
+    return select(force > 0.0, 1.0, select(force < 0.0, -1.0, 0.0))
 
 
 @routine
@@ -86,7 +89,7 @@ def switches(places, nodes, forces, signs):
     """True if one of so many normal forces has another sign than at the start of the step."""
     n, some = len(signs), False
     for at in range(places):
-        some |= sign_of(forces[n + at]) != signs[nodes[at]]
+        some = some | (sign_of(forces[n + at]) != signs[nodes[at]])
     return some
 
 
@@ -144,7 +147,7 @@ def slip_error(error, problem, progress, workspace):
     moved = dynamics.motion_given(workspace.given)
     for at in range(near.used[0]):
         j = near.nodes[at]
-        if s.memory[j] == 0 and workspace.nodes[2, n + j] != 0.0:
+        if s.memory[j] == 0 and somewhere(workspace.nodes[2, n + j] != 0.0):
             slip, distance = 0.0, 0.0
             for tangent in range(s.rows.shape[1] - 1):
                 first = 2 * tangent * n
@@ -152,9 +155,9 @@ def slip_error(error, problem, progress, workspace):
                 distance = size_of((workspace.nodes[1, first + j] - ground_speed(
                     tangent, j, moved, s), distance))
             part = slip / (control.slip_part * (control.slip_scale[j] + distance))
-            if part > error:
-                error = part
-                progress.counts[WORST_NODE] = j
+            worse = (part > error) & (workspace.nodes[2, n + j] != 0.0)
+            error = select(worse, part, error)
+            progress.numbers[WORST_NODE] = select(worse, float(j), progress.numbers[WORST_NODE])
     return error
 
 

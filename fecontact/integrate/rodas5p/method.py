@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.simd.functions import somewhere
+from fecontact.core.simd.vectors import select
 from fecontact.integrate.near_nodes import choose_near, set_end
 from fecontact.integrate.polynomial_bounds import may_switch, needs_search
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
@@ -179,7 +181,7 @@ def _linearise(step, after_t, problem, progress, workspace):
 
 
 @routine
-def _stages(step, G, problem, progress, workspace):
+def stages(step, G, problem, progress, workspace):
     """Compute all stages of a step, and its end ``workspace.after``.
 
     Returns True if a normal force has another sign at a stage than at the start.
@@ -194,21 +196,20 @@ def _stages(step, G, problem, progress, workspace):
             for k in range(size):
                 workspace.right[k] = progress.rate[k]
         else:
-            tableau.next_stage(i, rise, workspace.stages[i - 1], workspace.sums, workspace.stage,
-                               workspace.right)
+            tableau.next_stage(i, rise, progress.state, workspace.stages, workspace.sums,
+                               workspace.stage, workspace.right)
             now = min(step.t + tableau.NODES[i] * step.h, step.latest)
-            if now != last:
+            if somewhere(now != last):
                 dynamics.set_given(now, s, workspace.given, workspace.load)
                 last = now
             set_stage_rate(problem, progress, workspace)
-            switched |= switches(workspace.near.used[0], workspace.near.nodes, workspace.nodes[2],
-                                 progress.signs)
+            switched = switched | switches(workspace.near.used[0], workspace.near.nodes,
+                                           workspace.nodes[2], progress.signs)
             for k in range(size):
                 workspace.right[k] += workspace.base[k]
-        factor = tableau.TIME[i] * step.h
-        if factor != 0.0:
+        if tableau.TIME[i] != 0.0:
             for k in range(m, size):
-                workspace.right[k] += factor * workspace.time_rate[k]
+                workspace.right[k] += tableau.TIME[i] * step.h * workspace.time_rate[k]
         stage_solver.solve_stage(G, s, blocks, progress.gradients, workspace.reduced,
                                  workspace.right, workspace.nodes, workspace.stages[i])
     for k in range(size):
@@ -218,7 +219,7 @@ def _stages(step, G, problem, progress, workspace):
 
 
 @routine
-def _solve(step, G, new, end, problem, progress, workspace):
+def solve(step, G, new, end, problem, progress, workspace):
     """Compute a step; ``new`` if it is the first attempt from where it begins.
 
     Returns True if a normal force has another sign at a stage than at the start.
@@ -226,38 +227,41 @@ def _solve(step, G, new, end, problem, progress, workspace):
     s = problem.system
     memory = len(progress.state) > 2 * len(problem.control.largest)
     if new:
-        _linearise(step, np.nextafter(step.t, end), problem, progress, workspace)
+        _linearise(step, dynamics.just_after(step.t, end), problem, progress, workspace)
     if memory:
         stage_solver.eliminate_memory(G, s, progress.gradients, workspace.reduced)
     if new or memory:
         stage_solver.assemble(s, workspace.near, progress.gradients, workspace.reduced)
     stage_solver.factorise_step(G, problem.blocks, workspace.reduced)
-    return _stages(step, G, problem, progress, workspace)
+    return stages(step, G, problem, progress, workspace)
 
 
 @routine
-def _error_at_end(step, end, problem, progress, workspace):
+def error_at_end(step, end, problem, progress, workspace):
     """Error of the state and of the slip velocities at the end of a step.
 
     Where the state is within its tolerance, its rates and gradients are evaluated too.
     """
     error = state_error(problem.control, progress, workspace)
-    if error <= 1.0:
+    if somewhere(error <= 1.0):
         if step.at_break:
-            dynamics.set_given(np.nextafter(step.target, end), problem.system, workspace.given,
-                               workspace.load)
+            dynamics.set_given(dynamics.just_after(step.target, end), problem.system,
+                               workspace.given, workspace.load)
         set_end(problem, progress, workspace)
-        error = memory_error(slip_error(error, problem, progress, workspace), problem, progress,
-                             workspace)
+        at_nodes = memory_error(slip_error(error, problem, progress, workspace), problem, progress,
+                                workspace)
+        error = select(error <= 1.0, at_nodes, error)
     return error
 
 
 @routine
-def _switch_error(step, G, end, problem, progress, workspace):
+def switch_error(step, G, end, problem, progress, workspace):
     """Error of a step in which a normal force begins or ends; what is known of the end stays."""
     error = defect_error(step, G, problem, progress, workspace)
-    if error <= 1.0:
-        last = np.nextafter(step.target, end) if step.at_break else min(step.target, step.latest)
+    if somewhere(error <= 1.0):
+        last = min(step.target, step.latest)
+        if step.at_break:
+            last = dynamics.just_after(step.target, end)
         dynamics.set_given(last, problem.system, workspace.given, workspace.load)
         set_end(problem, progress, workspace)
     return error
@@ -309,8 +313,8 @@ def _attempt(step, last, smallest, data):
     if last == TAKEN and control.sliders != 0:
         attend_at(control.sliders)(BEGIN, step, problem, progress, workspace, vary, step.t,
                                    workspace.right)
-    switched = _solve(step, G, last <= ANEW, end, problem, progress, workspace)
-    error = _error_at_end(step, end, problem, progress, workspace)
+    switched = solve(step, G, last <= ANEW, end, problem, progress, workspace)
+    error = error_at_end(step, end, problem, progress, workspace)
     if error <= 1.0:
         tableau.dense_coefficients(workspace.stages, workspace.dense)
         part = _missed_part(step, smallest, problem, progress, workspace)
@@ -319,7 +323,7 @@ def _attempt(step, last, smallest, data):
             return CUT, step.h * part
         if switched or switches(len(problem.system.gap), problem.blocks.nodes, workspace.nodes[2],
                                 progress.signs):
-            error = max(error, _switch_error(step, G, end, problem, progress, workspace))
+            error = max(error, switch_error(step, G, end, problem, progress, workspace))
         if error <= 1.0 and control.work:
             error = max(error, work_error(step, problem, progress, workspace))
     if error <= 1.0:

@@ -21,6 +21,8 @@ import numpy as np
 from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise_within, solve_within
 from fecontact.core.records import Matrix, allocate
+from fecontact.core.simd.functions import at_unknown_place, by_kind
+from fecontact.core.simd.vectors import select
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.dynamics import change_of, project
@@ -291,12 +293,66 @@ def factorise_step(G, blocks, w):
                 factors[k] = -G * by_speed[k] - by_place[k]
     for i in range(m):
         w.factors[i, i] += G * G
+    eliminate_modes(G, blocks, w)
+
+
+@helper
+def _factorise(G, blocks, w):
+    """Factorise ``w.factors``; for few modes fill ``w.solver`` too."""
     factorise_within(w.factors, blocks.reach, w.starts, w.pivots)
-    if m <= _FEW and w.inverse.shape[1] == 0:
+    if len(w.pivots) <= _FEW:
         set_solver(G, blocks, w, w.solver)
         if not G * G < np.inf:  # noqa: SIM300
             # All answers would be zero.
             w.solver[0, 0] = np.nan
+
+
+@helper
+def _invert(G, blocks, w):
+    """Fill ``w.solver`` for eight systems of few modes and one block.
+
+    Gauss-Jordan elimination with row interchanges, lane by lane by selection.
+    """
+    m, work, inverse = len(w.pivots), w.factors, w.solver[:, len(w.pivots) :]
+    for i in range(m):
+        for k in range(m):
+            inverse[i, k] = G if i == k else 0.0
+    for k in range(m):
+        for i in range(k + 1, m):
+            larger = abs(work[i, k]) > abs(work[k, k])
+            _exchange(larger, work[:, k:], k, i)
+            _exchange(larger, inverse, k, i)
+        pivot = 1.0 / work[k, k]
+        for c in range(k + 1, m):
+            work[k, c] *= pivot
+        for c in range(m):
+            inverse[k, c] *= pivot
+        for i in range(m):
+            if i != k:
+                factor = work[i, k]
+                for c in range(k + 1, m):
+                    work[i, c] -= factor * work[k, c]
+                for c in range(m):
+                    inverse[i, c] -= factor * inverse[k, c]
+    per_G = 1.0 / G
+    for i in range(m):
+        for k in range(m):
+            total = 0.0
+            for c in range(m):
+                total += inverse[i, c] * w.J[c, k]
+            w.solver[i, k] = total * per_G
+
+
+@helper
+def _exchange(where, table, k, i):
+    """Exchange two rows of a table in the lanes where a condition holds."""
+    before = at_unknown_place(table)
+    for c in range(table.shape[1]):
+        above, below = before[k, c], before[i, c]
+        table[k, c], table[i, c] = select(where, below, above), select(where, above, below)
+
+
+eliminate_modes = by_kind(_factorise, _invert)
 
 
 @helper
@@ -321,22 +377,39 @@ def set_solver(G, blocks, w, out):
 
 
 @helper
+def _solve_by_factors(G, blocks, w, r):
+    """Fill ``w.workspace`` with u_v, in the order of elimination."""
+    x, m = w.workspace, len(w.pivots)
+    for i in range(m):
+        x[blocks.position[i]] = G * r[m + i]
+    for part in range(len(blocks.coupled)):
+        top, bottom, left, right = block_at(blocks.coupled, part)
+        row = blocks.coupled[part, 4]
+        for i in range(top, bottom):
+            total = 0.0
+            for k in range(left, right):
+                total += w.J[i, k] * r[k]
+            x[row + i - top] += total
+    solve_within(w.factors, blocks.reach, w.starts, w.pivots, x)
+
+
+@helper
+def _never(G, blocks, w, r):
+    """Eight systems have few modes."""
+
+
+solve_modes = by_kind(_solve_by_factors, _never)
+
+
+@helper
 def solve_stage(G, s, blocks, g, w, r, motion, out):
-    """Fill ``out`` (size,) with u for the right side r; ``motion`` (3, d n) is a work array."""
+    """Fill ``out`` (size,) with u for the right side r, which is overwritten.
+
+    ``motion`` (3, d n) is a work array.
+    """
     shapes = blocks.shapes
     m, n, d = len(shapes), len(g.partial), g.partial.shape[2] // 2
     states = w.inverse.shape[1]
-    x = w.workspace
-    if m <= _FEW and states == 0:
-        part = 1.0 / G
-        for i in range(m):
-            speed = 0.0
-            for k in range(2 * m):
-                speed += w.solver[i, k] * r[k]
-            out[i], out[m + i] = part * (r[i] + speed), speed
-        return
-    for i in range(m):
-        out[m + i] = r[m + i]
     if states > 0:
         for j in range(n):
             for tangent in range(d - 1):
@@ -352,22 +425,19 @@ def solve_stage(G, s, blocks, g, w, r, motion, out):
                     rows, forces = shapes[i, 2 * tangent * n :], motion[2, 2 * tangent * n :]
                     for j in range(left, right):
                         total += rows[j] * forces[j]
-                out[m + i] += total
-    for i in range(m):
-        x[blocks.position[i]] = G * out[m + i]
-    for part in range(len(blocks.coupled)):
-        top, bottom, left, right = block_at(blocks.coupled, part)
-        row = blocks.coupled[part, 4]
-        for i in range(top, bottom):
-            total = 0.0
-            for k in range(left, right):
-                total += w.J[i, k] * r[k]
-            x[row + i - top] += total
-    solve_within(w.factors, blocks.reach, w.starts, w.pivots, x)
-    for i in range(m):
-        speed = x[blocks.position[i]]
-        out[m + i] = speed
-        out[i] = (r[i] + speed) / G
+                r[m + i] += total
+    part = 1.0 / G
+    if m <= _FEW:
+        for i in range(m):
+            speed = 0.0
+            for k in range(m):
+                speed += w.solver[i, k] * r[k] + w.solver[i, m + k] * r[m + k]
+            out[i], out[m + i] = part * (r[i] + speed), speed
+    else:
+        solve_modes(G, blocks, w, r)
+        x = w.workspace
+        for i in range(m):
+            out[i], out[m + i] = part * (r[i] + x[blocks.position[i]]), x[blocks.position[i]]
     if states == 0:
         return
     project(blocks, out, motion[0], motion[1])

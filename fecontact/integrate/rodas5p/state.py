@@ -26,13 +26,13 @@ from fecontact.system.powers import NODE_POWERS, POWER_COUNT, WORKS
 
 # Entries of Progress.numbers, after those of `step_length`. CAUTIOUS is the length of a step that
 # failed, while what made it fail may still lie ahead, else zero. ENERGY is the largest energy or
-# work so far; MISSED the number of attempts at a step that missed a force.
-NUMBERS = 9
-SPEED_SCALE, CAUTIOUS, ENERGY, MISSED = range(LAST_ROOT + 1, NUMBERS)
-# Entries of Progress.counts after those of the step loop: the node at which the error is largest,
-# and switches at one time so far.
-COUNTS = step_loop.COUNTS + 2
-WORST_NODE, SWITCHES = range(step_loop.COUNTS, COUNTS)
+# work so far; MISSED the number of attempts at a step that missed a force; WORST_NODE the number of
+# the node at which the error is largest.
+NUMBERS = 10
+SPEED_SCALE, CAUTIOUS, ENERGY, MISSED, WORST_NODE = range(LAST_ROOT + 1, NUMBERS)
+# Entry of Progress.counts after those of the step loop: switches at one time so far.
+COUNTS = step_loop.COUNTS + 1
+SWITCHES = step_loop.COUNTS
 
 
 class Control(NamedTuple):
@@ -154,7 +154,7 @@ class Progress(NamedTuple):
         Work so far and powers: those of POWERS, p of them, then those of each node.
     gradients : Gradients
         Derivatives of the node forces.
-    signs : (n,) integer array
+    signs : (n,) array
         Signs of the normal forces: 1, 0 or -1.
     """
 
@@ -166,7 +166,7 @@ class Progress(NamedTuple):
     work: Annotated[Array, WORKS]
     power: Annotated[Array, WORKS]
     gradients: motion.Gradients
-    signs: Annotated[Integers, NODES]
+    signs: Annotated[Array, NODES]
 
 
 class Output(NamedTuple):

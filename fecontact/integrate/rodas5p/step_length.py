@@ -7,6 +7,8 @@ step would have to change for the error that is allowed.
 import numpy as np
 
 from fecontact.core.compiled import helper
+from fecontact.core.simd.functions import by_kind, reciprocal_fifth_root
+from fecontact.core.simd.vectors import select
 from fecontact.integrate.rodas5p.tableau import ORDER
 from fecontact.integrate.step_loop import STEP
 
@@ -17,16 +19,24 @@ REJECTED_LAST, LAST_STEP, LAST_ROOT = range(STEP + 1, STEP + 4)
 SMALLEST_FACTOR = 0.1
 _SAFETY, _LARGEST_FACTOR = 0.9, 8.0
 _POWER = -1.0 / ORDER
-# Errors count as this at least.
-_LEAST = 1e-6
+# Errors count as within these bounds.
+_LEAST, _LARGEST = 1e-6, 1e10
 # The last error counted as a hundredth at least.
 _LARGEST_LAST_ROOT = 1e-2**_POWER
 
 
 @helper
+def _power(error):
+    return error**_POWER
+
+
+_root = by_kind(_power, reciprocal_fifth_root)
+
+
+@helper
 def root_of(error):
     """The root of an error, given as a multiple of what is allowed; not for NaN."""
-    return max(error, _LEAST) ** _POWER
+    return _root(min(max(error, _LEAST), _LARGEST))
 
 
 @helper
@@ -44,12 +54,11 @@ def next_length(h, root, longest, numbers):
 @helper
 def predicted(factor, h, root, largest_root, numbers):
     """``factor`` of the length of the next step, or less by the trend; ``numbers`` take note."""
-    if numbers[LAST_STEP] > 0.0:
-        # Steps that had to shrink will have to shrink on.
-        trend = h / numbers[LAST_STEP] * (root / numbers[LAST_ROOT])
-        factor = max(SMALLEST_FACTOR, min(factor, factor * trend))
-    if numbers[REJECTED_LAST] != 0.0:
-        factor = min(factor, 1.0)
+    # Steps that had to shrink will have to shrink on.
+    trend = h / numbers[LAST_STEP] * (root / numbers[LAST_ROOT])
+    factor = select(numbers[LAST_STEP] > 0.0,
+                    max(SMALLEST_FACTOR, min(factor, factor * trend)), factor)
+    factor = select(numbers[REJECTED_LAST] != 0.0, min(factor, 1.0), factor)
     numbers[LAST_STEP], numbers[LAST_ROOT] = h, min(root, largest_root)
     numbers[REJECTED_LAST] = 0.0
     return factor
@@ -75,8 +84,6 @@ def target_of(t, h, exactly, stop):
     What would leave a short rest is as long as it takes, or half of that.
     """
     target = t + h
-    if exactly:
-        return min(target, stop)
-    if target + 0.01 * h >= stop:
-        return stop
-    return t + 0.5 * (stop - t) if target + h > stop else target
+    near = select(target + h > stop, t + 0.5 * (stop - t), target)
+    near = select(target + 0.01 * h >= stop, stop, near)
+    return select(exactly, min(target, stop), near)

@@ -16,6 +16,7 @@ numerical benchmarks within the Julia Differential Equations package, BIT 63 (20
 import numpy as np
 
 from fecontact.core.compiled import helper
+from fecontact.core.simd.functions import by_kind
 from fecontact.core.simd.vectors import fused, read, spread, write
 
 STAGES = 8
@@ -69,6 +70,8 @@ DENSE = np.array([
 ])
 
 
+# From here on, stages begin at the end of the stage before.
+_ENDS = 6
 # By stages that add something, and what the stage just before adds.
 _A_COLUMNS, _C_COLUMNS = np.ascontiguousarray(A.T), np.ascontiguousarray(C.T)
 _A_LAST, _C_LAST = (np.array([0.0, *np.diagonal(table, -1)]) for table in (A, C))
@@ -85,23 +88,30 @@ def combined(row, factor, base, stages, out):
 
 
 @helper
-def begin_stages(base, sums):
-    """Fill ``sums`` (2, size, 8) for steps from the state ``base``; see :func:`next_stage`."""
+def _begin_sums(base, sums):
     for k in range(len(base)):
         write(sums[0, k], spread(base[k]))
         write(sums[1, k], spread(0.0))
 
 
 @helper
-def next_stage(i, rise, last, sums, place, right):
-    """Fill place = base + sum_j A_ij u_j and right = rise * sum_j C_ij u_j of stage i > 0.
+def _need_no_sums(base, sums):
+    """The stages of eight systems are summed up anew."""
 
-    ``last`` is u_{i-1}. ``sums`` hold what the stages before it add, for all stages to come, so
-    that it is one product away from what it is needed for.
+
+# Fill ``sums`` (2, size, 8) for steps from the state ``base``; see :func:`next_stage`.
+begin_stages = by_kind(_begin_sums, _need_no_sums)
+
+
+@helper
+def _by_sums(i, rise, base, stages, sums, place, right):
+    """The last stage is one product away from what it is needed for.
+
+    ``sums`` hold what the stages before it add, for all stages to come.
     """
     a, c = read(_A_COLUMNS[i - 1]), read(_C_COLUMNS[i - 1])
-    for k in range(len(last)):
-        u = last[k]
+    for k in range(len(base)):
+        u = stages[i - 1, k]
         place[k] = sums[0, k, i] + _A_LAST[i] * u
         right[k] = rise * (sums[1, k, i] + _C_LAST[i] * u)
         write(sums[0, k], fused(a, spread(u), read(sums[0, k])))
@@ -109,9 +119,31 @@ def next_stage(i, rise, last, sums, place, right):
 
 
 @helper
-def combined_twice(i, h, base, stages, place, right):
-    """Fill place = base + sum_j A_ij stages_j and right = sum_j C_ij stages_j / h of stage i."""
-    row, r = A[i], 1.0 / h
+def _by_stages(i, rise, base, stages, sums, place, right):
+    """The last two stages begin where the stage before each ends."""
+    if i < _ENDS:
+        for k in range(len(base)):
+            moved, pushed = 0.0, 0.0
+            for j in range(i):
+                moved += A[i, j] * stages[j, k]
+                pushed += C[i, j] * stages[j, k]
+            place[k], right[k] = base[k] + moved, rise * pushed
+    else:
+        for k in range(len(base)):
+            pushed = 0.0
+            for j in range(i):
+                pushed += C[i, j] * stages[j, k]
+            place[k], right[k] = place[k] + stages[i - 1, k], rise * pushed
+
+
+# Fill place = base + sum_j A_ij u_j and right = rise * sum_j C_ij u_j of stage i > 0.
+next_stage = by_kind(_by_sums, _by_stages)
+
+
+@helper
+def combined_twice(i, r, base, stages, place, right):
+    """Fill place = base + sum_j A_ij u_j and right = r sum_j C_ij u_j of stage i."""
+    row = A[i]
     a0, a1, a2, a3, a4, a5, a6 = row[0], row[1], row[2], row[3], row[4], row[5], row[6]
     row = C[i]
     c0, c1, c2, c3 = r * row[0], r * row[1], r * row[2], r * row[3]

@@ -313,7 +313,7 @@ def _next_target(t, h, last, smallest, data):
 def _attempt(step, last, smallest, data):
     """Whether the step can be taken, and the length of the next one."""
     if step.error > 0.0:
-        data.progress.counts[WORST_NODE] = 0
+        data.progress.numbers[WORST_NODE] = 0
         return FAILED if step.error < np.inf else NOT_A_NUMBER, step.next
     if data.problem.control.work:
         integrate_powers(step.unit, data.series)

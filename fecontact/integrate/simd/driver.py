@@ -12,97 +12,97 @@ from fecontact.core.checks import require_state
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.blocks import one_block
 from fecontact.integrate.rodas5p.driver import control_for, start
-from fecontact.integrate.rodas5p.state import Control, Problem, Progress, Workspace
+from fecontact.integrate.rodas5p.state import NUMBERS, Problem, Progress, Workspace
 from fecontact.integrate.series.branches import series_pay
 from fecontact.integrate.simd import arrays, step_loop
-from fecontact.integrate.simd.arrays import (
-    ATTEMPTS,
-    OPEN,
-    TAKEN,
-    WAITING,
-    LaneRuns,
-    Lanes,
-    lanes_for,
-)
+from fecontact.integrate.simd.arrays import ATTEMPTS, OPEN, TAKEN, WAITING, Lanes, Runs
 from fecontact.integrate.small_systems import FEW
-from fecontact.integrate.step_loop import FINISHED, RUNNING
-from fecontact.integrate.step_polynomials import QUICKEST
+from fecontact.integrate.step_loop import FINISHED, RUNNING, TIME
 from fecontact.integrate.step_runs import ENDS
 from fecontact.integrate.trajectory import Status
-from fecontact.laws.ground.motion import constant_speed
 from fecontact.laws.simd import simd_address
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.elastic_sliders import slider_counts
 
 # Steps of a call, in all lanes; runs that a worker takes at once, at most.
 _STEPS, _DEALT = 20_000, 32
 
-# Fields of `SystemArrays` that are parameters of lanes, in the order of `LaneSystem`.
-_FIELDS = arrays.LaneSystem._fields[:15]
+# Runs with internal variables from which on it pays to compile their steps, which no one does
+# ahead of time.
+_MANY = 64
+
+# Integers of a system that are addresses of laws.
+_LAWS = ("normal", "friction", "drive", "load", "ground_motion")
 
 
 @dataclass(frozen=True)
 class Kind:
-    """Common properties of runs that go side by side: laws by address, shapes of parameters."""
+    """Common properties of runs that go side by side: laws by address, integers, and shapes.
+
+    ``size`` are the numbers of modes, contact nodes and internal variables of a node, ``levels``
+    that of penetrations at which normal forces begin or end.
+    """
 
     laws: tuple[tuple[int, ...], ...]
-    steady: bool
+    integers: tuple[bytes, ...]
     shapes: tuple[tuple[int, ...], ...]
-    limits: tuple[tuple[int, ...], ...]
+    levels: int
+    size: tuple[int, int, int]
 
-    @property
-    def modes(self) -> int:
-        """Number of modes."""
-        return self.shapes[_FIELDS.index("rows")][2]
-
-    @property
-    def nodes(self) -> int:
-        """Number of contact nodes."""
-        return self.shapes[_FIELDS.index("rows")][0]
+    def eight(self, problem: Problem) -> Problem:
+        """A problem of this kind with the integers that eight systems have."""
+        laws: dict[str, Any] = {
+            name: np.array(given, dtype=np.int64) if np.ndim(getattr(problem.system, name))
+            else given[0] for name, given in zip(_LAWS, self.laws, strict=True)}
+        return problem._replace(system=problem.system._replace(
+            **laws, on_ground=np.zeros_like(problem.system.on_ground), follows_surface=0))
 
 
 def kind_of(system: ContactSystem, begin: float, end: float) -> Kind | None:
     """The kind of a system; None if it does not go side by side with others.
 
     It does if it is plane and of a usual size, on level ground that moves as one, without
-    friction with memory and large deflections, without breaks of what is given in time, and if
-    there are functions for lanes of all its laws and signals.
+    elastic Coulomb elements and large deflections, without breaks of what is given in time, and if
+    there are functions for eight of all its laws and signals.
     """
     s = system.arrays
-    n, _, m = s.rows.shape
-    if ((m, n) not in FEW or s.rows.shape[1] > 2 or s.memory.any() or s.second_motion
+    (n, d, m), states = s.rows.shape, system.memory
+    if ((m, n) not in FEW or d > 2 or states > 1 or (s.memory != states).any() or s.second_motion
             or s.friction_scale or len(s.polynomial_pairs) or system.ground.wavy
-            or system.breakpoints(begin, end)):
+            or slider_counts(system).any() or system.breakpoints(begin, end)):
         return None
     acts = (s.drive_stiffness != 0.0) | (s.drive_damping != 0.0)
-    drive = np.where(acts, s.drive, 0)
     laws = []
-    for given in (s.normal, s.friction, drive, s.load, [s.ground_motion]):
+    for name in _LAWS:
         # Along axes without spring or dashpot nothing is driven.
-        found = [0 if given is drive and not law else simd_address(int(law)) for law in given]
+        given = np.where(acts, s.drive, 0) if name == "drive" else np.atleast_1d(getattr(s, name))
+        found = [simd_address(int(law)) if law else 0 for law in given]
         if None in found:
             return None
         laws.append(tuple(law for law in found if law is not None))
+    none: dict[str, Any] = dict.fromkeys(_LAWS, 0)
+    others = s._replace(**none)
     levels = max(len(law.onsets(nodes.stop - nodes.start))
                  for nodes, _, law in system.law_groups("normal"))
-    return Kind(tuple(laws), s.ground_motion == constant_speed.address,
-                tuple(getattr(s, name).shape for name in _FIELDS),
-                ((m,), (n,), (n,), (n,), (m,), (levels, n), (arrays.LIMITS,)))
+    return Kind(tuple(laws), tuple(one.tobytes() for one in arrays.integers_of(others)),
+                tuple(one.shape for one in arrays.numbers_of(s)), levels, (m, n, states))
 
 
-def _parameters(system: ContactSystem, control: Control) -> Array:
-    """The column of a run in the table of parameters."""
-    limits = [control.rtol, control.longest, control.speed_scale, control.ground[QUICKEST]]
-    return np.concatenate([
-        *(getattr(system.arrays, name).ravel() for name in _FIELDS), control.displacement_scale,
-        control.slip_scale, control.slow, control.depth, control.largest, control.levels.ravel(),
-        limits])
+def problem_of(
+    system: ContactSystem, times: Array, rtol: float, max_step: float | None,
+) -> Problem:
+    """A system in one block, and the limits of its steps as single runs have them."""
+    s = system.arrays
+    shapes = s.rows.swapaxes(0, 1).reshape(-1, s.rows.shape[2]).T.copy()
+    return Problem(s, one_block(shapes, len(s.gap)), control_for(
+        system, np.zeros(system.size), times, rtol=rtol, max_step=max_step, work=False))
 
 
-def _starts(times: Array, modes: int) -> Array:
-    """Columns of runs from rest in the table of progress, which first steps are not yet in."""
-    found = np.zeros((len(times), arrays.NUMBERS + 3 * modes))
+def _starts(times: Array, size: int, modes: int) -> Array:
+    """Columns of runs from rest in the table of starts, which first steps are not yet in."""
+    found = np.zeros((len(times), arrays.LIMITS + NUMBERS + size + modes))
     begin, end = times[:, 0], times[:, -1]
-    found[:, arrays.TIME], found[:, arrays.END] = begin, end
+    found[:, arrays.LIMITS + TIME], found[:, arrays.END] = begin, end
     found[:, arrays.SMALLEST] = 1e-14 * np.maximum(np.abs(begin), np.abs(end))
     found[:, arrays.NEXT_OUTPUT] = times[:, min(1, times.shape[1] - 1)]
     return found
@@ -127,7 +127,7 @@ class SideBySide:
 
     Attributes
     ----------
-    runs : LaneRuns
+    runs : Runs
         The runs and what is known of them.
     attempts : int
         Steps that workers which are done have tried, each in all lanes at once.
@@ -139,20 +139,20 @@ class SideBySide:
         max_step: float | None,
     ) -> None:
         self.numbers, self._kind, self._state_of = numbers, kind, state_of
-        count, rest = len(members), np.zeros(2 * kind.modes)
+        count, size, modes = len(members), members[0].size, kind.size[0]
         known: dict[tuple[int, float, float], Array] = {}
         keys = [_key(*pair) for pair in zip(members, times, strict=True)]
         for key, member, row in zip(keys, members, times, strict=True):
             if key not in known:
-                known[key] = _parameters(member, control_for(
-                    member, rest, row, rtol=rtol, max_step=max_step, work=False))
-        self.runs = LaneRuns(
-            np.array([known[key] for key in keys]), _starts(times, kind.modes),
-            np.ascontiguousarray(times), np.full((count, times.shape[1], len(rest)), np.nan),
+                known[key] = arrays.column_of(problem_of(member, row, rtol, max_step))
+        self.runs = Runs(
+            np.array([known[key] for key in keys]), _starts(times, size, modes),
+            np.ascontiguousarray(times), np.full((count, times.shape[1], size), np.nan),
             np.array(follows, dtype=np.int64), np.zeros((count, 4), dtype=np.int64),
             np.zeros(0, dtype=np.int64), np.zeros(4, dtype=np.int64))
-        self._spare = start(members[0], rest, times[0], rtol=rtol, max_step=max_step, work=False,
-                            method="rodas5p")
+        self._spare = start(members[0], np.zeros(size), times[0], rtol=rtol, max_step=max_step,
+                            work=False, method="rodas5p")
+        self._problem = problem_of(members[0], times[0], rtol, max_step)
         self._waiting = np.flatnonzero(self.runs.follows == 0).tolist()
         self._lock, self.attempts = Lock(), 0
 
@@ -160,7 +160,8 @@ class SideBySide:
         """Let a run begin from its initial state."""
         state = self._state_of(run)
         require_state(state, np.inf)
-        self.runs.starts[run, arrays.NUMBERS : arrays.NUMBERS + len(state)] = state
+        first = arrays.LIMITS + NUMBERS
+        self.runs.starts[run, first : first + len(state)] = state
 
     @property
     def done(self) -> int:
@@ -180,9 +181,10 @@ class SideBySide:
 
     def work(self, workers: int, wanted: Callable[[], bool]) -> None:
         """Go on with runs that no other worker has until none is left, or they are not wanted."""
-        lanes, spare = self.lanes(), self.spare()
+        lanes = self.lanes()
+        spare = self.spare(lanes)
         runs = self.runs._replace(counts=np.zeros(4, dtype=np.int64))
-        advance = step_loop.SMALL.of(self._kind.modes, self._kind.nodes)
+        advance = step_loop.SMALL.of(*self._kind.size)
         ended = step_loop.GOES_ON
         while wanted() and (ended != step_loop.DONE or self._resume()):
             runs = self._dealt_to(runs, workers)
@@ -192,22 +194,18 @@ class SideBySide:
 
     def lanes(self) -> Lanes:
         """Empty lanes for these runs."""
-        kind = self._kind
-        *laws, ground = (np.array(given, dtype=np.int64) for given in kind.laws)
-        return lanes_for(kind.shapes, kind.limits, [*laws, int(ground[0]), int(kind.steady)],
-                         kind.modes, kind.nodes)
+        return arrays.lanes_for(self._problem, self._kind.eight(self._problem),
+                                self.runs.starts.shape[1])
 
-    def spare(self) -> tuple[Problem, Progress, Workspace]:
-        """Arrays of a run for checks of single lanes, which take the numbers of a lane."""
-        problem = self._spare.problem
-        own = _copied(problem._replace(
-            blocks=one_block(problem.blocks.shapes, self._kind.nodes),
-            control=problem.control._replace(speed_scale=0.0)))
+    def spare(self, lanes: Lanes) -> tuple[Problem, Progress, Workspace]:
+        """A run for checks of single lanes, whose parameters lie in ``lanes.column``."""
+        own = arrays.seen_in(lanes.column, self._problem)
+        own = own._replace(control=own.control._replace(speed_scale=0.0))
         # All nodes are near.
         workspace = _copied(self._spare.workspace)._replace(near=own.blocks)
         return own, _copied(self._spare.progress), workspace
 
-    def _dealt_to(self, runs: LaneRuns, workers: int) -> LaneRuns:
+    def _dealt_to(self, runs: Runs, workers: int) -> Runs:
         """Return the runs with a longer queue; at the end each worker takes few at once."""
         rest = runs.queue[runs.counts[TAKEN] : runs.counts[WAITING]]
         with self._lock:
@@ -239,14 +237,15 @@ def side_by_side(
 ) -> list[SideBySide]:
     """The runs of an ensemble that go through lanes, kind by kind; chains as a whole.
 
-    Runs whose motion is expanded in power series, which takes less time, are left out.
+    Runs whose motion is expanded in power series, which takes less time, are left out, and so are
+    few runs with internal variables.
     """
     kinds: dict[Kind, list[int]] = {}
     known: dict[tuple[int, float, float], Kind | None] = {}
 
     def kind(index: int) -> Kind | None:
         member, key = members[index], _key(members[index], times[index])
-        if not isinstance(member, ContactSystem) :
+        if not isinstance(member, ContactSystem):
             return None
         if key not in known:
             begin, end = key[1:]
@@ -265,7 +264,7 @@ def side_by_side(
     return [SideBySide(one, numbers, [members[index] for index in numbers],
                        partial(_state_of, state_of, numbers),
                        [index % chain != 0 for index in numbers], times[numbers], rtol, max_step)
-            for one, numbers in kinds.items()]
+            for one, numbers in kinds.items() if one.size[2] == 0 or len(numbers) >= _MANY]
 
 
 def _key(member: Any, times: Array) -> tuple[int, float, float]:

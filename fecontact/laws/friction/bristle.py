@@ -7,6 +7,8 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from fecontact.core.compiled import helper
+from fecontact.core.simd.functions import somewhere
+from fecontact.core.simd.vectors import select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NotNegative, OneOrAbove, PerNode, Positive
@@ -19,14 +21,18 @@ _FADING = 1e-7
 
 
 @helper
-def _fade(tangents, z, rates):
-    """Decay rates of one internal variable along each tangent without normal force."""
-    for i in range(tangents):
-        for k in range(3 + tangents):
-            rates[i, k] = 0.0
-        if tangents > 1:
-            rates[i, 3 + len(rates)] = 0.0
-        rates[i, 0], rates[i, 3 + i] = -z[i] / _FADING, -1.0 / _FADING
+def _fade(F, tangents, z, rates):
+    """Let one internal variable along each tangent decay where there is no normal force."""
+    is_open = F <= 0.0
+    if somewhere(is_open):
+        for i in range(tangents):
+            for k in range(3 + tangents):
+                rate, unit = rates[i, k], 1.0 if k == 3 + i else 0.0
+                rates[i, k] = select(is_open, -unit / _FADING, rate)
+            rates[i, 0] = select(is_open, -z[i] / _FADING, rates[i, 0])
+            if tangents > 1:
+                last = 3 + len(rates)
+                rates[i, last] = select(is_open, 0.0, rates[i, last])
 
 
 @memory_friction_law
@@ -37,16 +43,14 @@ def dahl(v, F, z, p, force, rates):
     force[1] = 0.0
     force[2] = stiffness * z[0]
     force[3] = F * stiffness
-    if F <= 0.0:
-        _fade(1, z, rates)
-        return
-    sign = 1.0 if v >= 0.0 else -1.0
+    sign = select(v >= 0.0, 1.0, -1.0)
     left = 1.0 - sign * stiffness * z[0] / mu
     power = abs(left) ** (exponent - 1.0)
     rates[0, 0] = v * power * left
     rates[0, 1] = power * left
     rates[0, 2] = 0.0
     rates[0, 3] = -abs(v) * exponent * power * stiffness / mu
+    _fade(F, 1, z, rates)
 
 
 @helper
@@ -73,7 +77,7 @@ def _planar_dahl(law, v1, v2, F, z, p, force, rates):
     clear(force, rates)
     mu, stiffness, exponent = p[0], p[1], p[2]
     if F <= 0.0:
-        _fade(2, z, rates)
+        _fade(F, 2, z, rates)
         return
     a = stiffness / mu
     speed, e1, e2 = direction(v1, v2, z[0], z[1])
@@ -118,14 +122,13 @@ def _lugre(v, e, speed, F, z, p, force, rates):
             force[row + column] = F * (fade * (rate_v - 2.0 * decay * decay * v[k] * rate)
                                        + viscous * unit)
             force[row + 3 + k] = F * (stiffness * unit + fade * rate_z)
-    if F <= 0.0:
-        _fade(len(v), z, rates)
+    _fade(F, len(v), z, rates)
 
 
 @memory_friction_law
 def lugre(v, F, z, p, force, rates):
     """LuGre friction along a line."""
-    _lugre((v,), (1.0 if v >= 0.0 else -1.0,), abs(v), F, z, p, force, rates)
+    _lugre((v,), (select(v >= 0.0, 1.0, -1.0),), abs(v), F, z, p, force, rates)
 
 
 @planar_friction_law
@@ -143,7 +146,7 @@ def _bouc_wen(v, a, size, F, z, p, force, rates):
     along = 0.0
     for i in range(len(v)):
         along += v[i] * a[i]
-    share = beta * (1.0 if along >= 0.0 else -1.0) + 1.0 - beta
+    share = beta * select(along >= 0.0, 1.0, -1.0) + 1.0 - beta
     power = size ** (exponent - 1.0)
     for i in range(len(v)):
         row = i * (4 + len(rates))
@@ -155,14 +158,13 @@ def _bouc_wen(v, a, size, F, z, p, force, rates):
             rates[i, column] = (unit - share * power * size * a[i] * a[k]) / yielding
             rates[i, 3 + k] = -share * power * (
                 v[k] * a[i] + along * ((exponent - 2.0) * a[i] * a[k] + unit)) / yielding
-    if F <= 0.0:
-        _fade(len(v), z, rates)
+    _fade(F, len(v), z, rates)
 
 
 @memory_friction_law
 def bouc_wen(v, F, z, p, force, rates):
     """Bouc-Wen hysteresis along a line."""
-    _bouc_wen((v,), (1.0 if z[0] >= 0.0 else -1.0,), abs(z[0]), F, z, p, force, rates)
+    _bouc_wen((v,), (select(z[0] >= 0.0, 1.0, -1.0),), abs(z[0]), F, z, p, force, rates)
 
 
 @planar_friction_law
