@@ -144,17 +144,19 @@ def test_each_run_is_that_of_a_single_one(name):
         assert_as_a_single_one(system, state, times, states, steps)
 
 
+BRISTLES = LuGreFriction(0.8, 0.5, 1e-3, 2.0, 1e5, 300.0, 0.4, 1.0)
 MEMORY = {
-    "Dahl": DahlFriction(0.5, 1e5),
-    "LuGre": LuGreFriction(0.8, 0.5, 1e-3, 2.0, 1e5, 300.0, 0.4, 1.0),
-    "Bouc-Wen": BoucWenFriction(0.5, 1e-5),
+    "Dahl": slider(friction=DahlFriction(0.5, 1e5)),
+    "LuGre": slider(friction=BRISTLES),
+    "LuGre, two nodes": block(2, 2, friction=BRISTLES),
+    "Bouc-Wen": slider(friction=BoucWenFriction(0.5, 1e-5)),
 }
 
 
 @pytest.mark.parametrize("name", MEMORY)
 def test_friction_with_internal_variables(name):
     """Many runs of it go side by side, with the errors of single ones; few do not."""
-    base = slider(friction=MEMORY[name])
+    base = MEMORY[name]
     systems = [base.with_(**{"drive.frequency_hz": w / TURN}) for w in np.linspace(11.0, 16.0, 64)]
     state, times = np.zeros(base.size), np.linspace(0.0, 0.4, 41)
     rows = np.tile(times, (64, 1))
