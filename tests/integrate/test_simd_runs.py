@@ -121,13 +121,15 @@ def test_cases_are_of_all_sizes():
 def assert_as_a_single_one(system, state, times, states, steps):
     """Check errors against a run of tight tolerance: those of a single run of the same tolerance.
 
-    At all outputs but two: within a step in which a contact changes a single run is further off.
+    But at two outputs at most, within a step in which a contact changes: a single run too is up to
+    ten times as far off there.
     """
     exact = single(system, state, times, 1e-11).states
     own = single(system, state, times, 1e-7, method="rodas5p")
     size = np.abs(exact).max(axis=0) + 1e-300
     off, usual = (np.sort((np.abs(one - exact) / size).max(axis=1)) for one in (states, own.states))
     assert off[-3] < max(2e-5, 3.0 * usual[-3])
+    assert off[-1] < 2e-4
     assert steps == pytest.approx(own.statistics["steps"], rel=0.1)
 
 

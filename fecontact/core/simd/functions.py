@@ -193,7 +193,7 @@ def everywhere(where):
 
 @helper
 def opposite(where):
-    """Where a condition does not hold, of one number or of eight."""
+    """Where a condition is false, of one number or of eight."""
     return _opposite(where)
 
 

@@ -181,7 +181,7 @@ def _linearise(step, after_t, problem, progress, workspace):
 
 
 @routine
-def stages(step, G, problem, progress, workspace):
+def _stages(step, G, problem, progress, workspace):
     """Compute all stages of a step, and its end ``workspace.after``.
 
     Returns True if a normal force has another sign at a stage than at the start.
@@ -233,7 +233,7 @@ def solve(step, G, new, end, problem, progress, workspace):
     if new or memory:
         stage_solver.assemble(s, workspace.near, progress.gradients, workspace.reduced)
     stage_solver.factorise_step(G, problem.blocks, workspace.reduced)
-    return stages(step, G, problem, progress, workspace)
+    return _stages(step, G, problem, progress, workspace)
 
 
 @routine

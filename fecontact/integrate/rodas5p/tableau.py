@@ -141,9 +141,9 @@ next_stage = by_kind(_by_sums, _by_stages)
 
 
 @helper
-def combined_twice(i, r, base, stages, place, right):
-    """Fill place = base + sum_j A_ij u_j and right = r sum_j C_ij u_j of stage i."""
-    row = A[i]
+def combined_twice(i, h, base, stages, place, right):
+    """Fill place = base + sum_j A_ij stages_j and right = sum_j C_ij stages_j / h of stage i."""
+    row, r = A[i], 1.0 / h
     a0, a1, a2, a3, a4, a5, a6 = row[0], row[1], row[2], row[3], row[4], row[5], row[6]
     row = C[i]
     c0, c1, c2, c3 = r * row[0], r * row[1], r * row[2], r * row[3]

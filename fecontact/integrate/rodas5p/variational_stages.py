@@ -322,7 +322,7 @@ def all_at_once(i, h, problem, workspace, vary):
     for c in range(count):
         own = v.stages[tableau.STAGES * c : tableau.STAGES * (c + 1)]
         moved, right = v.moved[c], v.right[c]
-        tableau.combined_twice(i, 1.0 / h, v.columns[c], own, moved[:size], right)
+        tableau.combined_twice(i, h, v.columns[c], own, moved[:size], right)
         if i == 0:
             for k in range(size):
                 moved[size + k] = v.columns[c, k]
