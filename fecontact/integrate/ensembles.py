@@ -110,9 +110,9 @@ def ensemble(
     The results are those of :func:`fecontact.simulate`, except that compiled solvers do not
     integrate powers, which do not limit their steps. Threads share the cores. On each, eight runs
     of plane systems of one node and up to three modes, or two of each, go side by side: on level
-    and even ground, with friction of at most one internal variable per node, constant or harmonic
-    excitation, no events, by Rodas5P, or Auto at any tolerance. They differ by rounding from
-    single runs without it.
+    and even ground, with friction of at most eight internal variables per node, constant or
+    harmonic excitation, no events, by Rodas5P, or Auto at any tolerance. They differ by rounding
+    from single runs without it.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ import math
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, kernel
-from fecontact.core.simd.functions import opposite, somewhere
+from fecontact.core.simd.vectors import opposite, somewhere
 from fecontact.integrate.rodas5p import dynamics, state
 from fecontact.integrate.step_polynomials import HIGHEST
 

@@ -7,7 +7,7 @@ modes. For few nodes on flat ground it is cheaper to evaluate the coefficients t
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, kernel, routine
-from fecontact.core.simd.functions import opposite
+from fecontact.core.simd.vectors import opposite
 from fecontact.core.types import Array
 from fecontact.integrate.near_nodes import reach_out
 from fecontact.integrate.rodas5p import dynamics as motion

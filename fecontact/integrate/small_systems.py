@@ -42,18 +42,18 @@ def sizes_of(modes: int, nodes: int, states: int = 0) -> dict[Size, int]:
     return {MODES: modes, NODES: nodes, AXES: 2, MEMORY: states, COMBINATIONS: 0, PRODUCTS: 0}
 
 
-def _same_values(modes: int, nodes: int, states: int) -> Values:
+def _same_values(modes: int, nodes: int, states: int, sliders: bool) -> Values:
     """Values that all small systems of a size share, for each record.
 
-    They have one block and one motion of the ground. Systems of which eight go side by side are on
-    level ground.
+    They have one block and one motion of the ground, and elastic Coulomb elements only with
+    ``sliders``. Systems of which eight go side by side are on level ground.
     """
     blocks = one_block(np.zeros((modes, 2 * nodes)), nodes)
     same: Values = {
         Blocks: {name: value for name, value in blocks._asdict().items() if name != "shapes"}
         | {"shapes": blocks.shapes.shape},
         SystemArrays: {"memory": np.full(nodes, states), "second_motion": 0},
-        state.Control: {"sliders": 0},
+        state.Control: {} if sliders else {"sliders": 0},
         stage_solver.Reduced: {"solver": (modes, 2 * modes)},
     }
     eight = {of_eight(record): dict(fields) for record, fields in same.items()}
@@ -99,6 +99,8 @@ class Sized:
         Values of fields beside these sizes, by record: a shape, an integer array or a number.
     lengths(nodes)
         Sizes of the records beside those of all small systems.
+    sliders : bool
+        Whether the systems have elastic Coulomb elements.
     """
 
     kernel: Callable[[str], Any]
@@ -106,12 +108,13 @@ class Sized:
     sizes: tuple[tuple[int, int], ...] = SIZES
     more: Callable[[int, int], Values] = lambda modes, nodes: {}
     lengths: Callable[[int], dict[Size, int]] = lambda nodes: {}
+    sliders: bool = False
 
     def values(self, modes: int, nodes: int, states: int = 0) -> Values:
         """Values and shapes that are the same in all calls of the kernel of a size, by record."""
         found = shapes(sizes_of(modes, nodes, states) | self.lengths(nodes), *self.records)
-        same = {record: fields for record, fields in _same_values(modes, nodes, states).items()
-                if record in found}
+        same = {record: fields for record, fields
+                in _same_values(modes, nodes, states, self.sliders).items() if record in found}
         for values in (same, self.more(modes, nodes)):
             for record, fields in values.items():
                 found[record] = found.get(record, {}) | fields

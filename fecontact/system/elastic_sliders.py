@@ -16,7 +16,14 @@ from fecontact.core.types import Array, Integers
 from fecontact.laws.friction.planar import along_slip
 from fecontact.laws.friction.stribeck import no_friction
 from fecontact.system.node_forces import force_workspace, node_forces
-from fecontact.system.nodes import SystemArrays, ground_motion, memory_of, most_memory, node_motion
+from fecontact.system.nodes import (
+    SystemArrays,
+    ground_motion,
+    memory_of,
+    most_memory,
+    node_motion,
+    size_of,
+)
 from fecontact.system.powers import BRISTLES, FRICTION, POWER_COUNT
 
 # An element that sticks again is short of its limit by this part, so that a parameter that changes
@@ -56,10 +63,8 @@ def limits_at(moved, y, s, counts, force, rates):
 def deflection_of(z, i, s):
     """Magnitude of the deflection of element i [m]."""
     tangents = s.rows.shape[1] - 1
-    size = 0.0
-    for k in range(tangents * i, tangents * (i + 1)):
-        size = abs(z[k]) if size == 0.0 else np.hypot(size, z[k])
-    return size
+    across = z[tangents * i + 1] if tangents > 1 else 0.0
+    return size_of((z[tangents * i], across))
 
 
 @helper

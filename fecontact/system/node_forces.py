@@ -12,8 +12,7 @@ import numpy as np
 
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import IntegerVector, Matrix, Vector
-from fecontact.core.simd.functions import everywhere, somewhere
-from fecontact.core.simd.vectors import select
+from fecontact.core.simd.vectors import everywhere, select, somewhere
 from fecontact.laws.friction.planar import direction
 from fecontact.laws.signatures import friction_at, ground_at, memory_at, normal_at, planar_at
 from fecontact.system.nodes import NodeContact, most_memory, node_contact

@@ -12,7 +12,8 @@ import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.records import ANY, IntegerVector, Matrix, Size, Vector
-from fecontact.core.simd.functions import everywhere
+from fecontact.core.simd.functions import zero_of
+from fecontact.core.simd.vectors import everywhere
 from fecontact.core.types import Array, Integers
 from fecontact.laws.signatures import ground_at, signal_at, surface_at
 
@@ -160,8 +161,8 @@ def size_of(pair):
 @helper
 def node_motion(j, y, s):
     """Motion of node j in the state y."""
-    _, d, m = s.rows.shape
-    x, height, across, x_rate, height_rate, across_rate = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    (_, d, m), zero = s.rows.shape, zero_of(y)
+    x, height, across, x_rate, height_rate, across_rate = zero, zero, zero, zero, zero, zero
     for i in range(m):
         x += s.rows[j, 0, i] * y[i]
         height += s.rows[j, 1, i] * y[i]

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Matrix, Vector
-from fecontact.core.simd.functions import somewhere
+from fecontact.core.simd.vectors import somewhere
 from fecontact.core.types import Array
 from fecontact.system.nodes import SystemArrays
 

@@ -33,6 +33,8 @@ from fecontact.laws import (
     Harmonic,
     HarmonicSpeed,
     HyperbolicFriction,
+    IwanFriction,
+    JenkinsFriction,
     LinearContact,
     LuGreFriction,
     NormalLaw,
@@ -152,6 +154,9 @@ MEMORY = {
     "LuGre": slider(friction=BRISTLES),
     "LuGre, two nodes": block(2, 2, friction=BRISTLES),
     "Bouc-Wen": slider(friction=BoucWenFriction(0.5, 1e-5)),
+    "Jenkins": slider(friction=JenkinsFriction(1e5, 0.5)),
+    "Iwan": slider(friction=IwanFriction(1e5, 0.5, 3)),
+    "Jenkins, two nodes": block(2, 2, friction=JenkinsFriction(1e5, 0.5)),
 }
 
 
@@ -289,8 +294,8 @@ def test_parameters_of_a_system_are_looked_up_once(monkeypatch):
 
 def test_checks_of_single_lanes_know_one_set_of_blocks():
     one = many(1, lambda _: np.zeros(2))
-    problem, _, workspace = one.spare(one.lanes())
-    assert workspace.near is problem.blocks
+    spare = one.spare(one.lanes())
+    assert spare.workspace.near is spare.problem.blocks
 
 
 def test_no_reversal_of_slip_is_missed():

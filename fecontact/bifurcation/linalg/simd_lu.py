@@ -8,16 +8,16 @@ for 48. What is left in place of a matrix is the same; arrays have a last axis o
 
 from fecontact.core.compiled import helper
 from fecontact.core.simd.kinds import WIDTH
-from fecontact.core.simd.vectors import magnitude, read, select, spread, write
+from fecontact.core.simd.vectors import read, select, spread, write
 
 
 @helper
 def _with_pivot(a, k, order, workspace):
     """Move the largest entry of column k to row k in each lane; returns and stores its inverse."""
     rows, columns, _ = a.shape
-    largest, place = magnitude(read(a[k, k])), spread(float(k))
+    largest, place = abs(read(a[k, k])), spread(float(k))
     for i in range(k + 1, rows):
-        size = magnitude(read(a[i, k]))
+        size = abs(read(a[i, k]))
         above = size > largest
         place = select(above, float(i), place)
         largest = select(above, size, largest)

@@ -23,13 +23,11 @@ from numba.extending import intrinsic, overload
 
 from fecontact.core.compiled import OVERLOAD, helper
 from fecontact.core.records import is_eight
-from fecontact.core.simd.kinds import WIDTH, lanes, mask
+from fecontact.core.simd.kinds import lanes
 from fecontact.core.simd.vectors import (
     _code,
     exponent,
     fused,
-    magnitude,
-    root,
     scaled,
     select,
     signed,
@@ -116,7 +114,7 @@ def sine_and_cosine(x):
 @helper
 def arctangent(x):
     """Arctangent [rad]."""
-    size = magnitude(x)
+    size = abs(x)
     far, middle = size > 2.414213562373095, size > 0.66
     above = select(far, -1.0, select(middle, size - 1.0, size))
     below = select(far, size, select(middle, size + 1.0, spread(1.0)))
@@ -140,7 +138,7 @@ def arctangent(x):
 @helper
 def hyperbolic_tangent(x):
     """Hyperbolic tangent."""
-    size = magnitude(x)
+    size = abs(x)
     z = x * x
     p = spread(-9.64399179425052238628e-1)
     p = p * z - 9.92877231001918586564e1
@@ -157,49 +155,6 @@ def hyperbolic_tangent(x):
 def reciprocal_fifth_root(x):
     """x^(-1/5) of normal x above zero."""
     return exponential(-0.2 * logarithm(x))
-
-
-def _folded(all_lanes: bool) -> Any:
-    """Intrinsic that makes one truth value of those of the lanes: of all of them, or of any."""
-
-    @intrinsic
-    def fold(typingctx: Any, where: Any) -> Any:
-        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            if where != mask:
-                return args[0]
-            truths = builder.bitcast(args[0], ir.IntType(WIDTH))
-            sign, number = ("==", -1) if all_lanes else ("!=", 0)
-            return builder.icmp_unsigned(sign, truths, ir.Constant(truths.type, number))
-
-        return types.boolean(where), codegen
-
-    return fold
-
-
-_any, _all = _folded(all_lanes=False), _folded(all_lanes=True)
-
-
-@helper
-def somewhere(where):
-    """True if a condition holds, of eight numbers if it holds for at least one of them."""
-    return _any(where)
-
-
-@helper
-def everywhere(where):
-    """True if a condition holds, of eight numbers if it holds for each of them."""
-    return _all(where)
-
-
-@helper
-def opposite(where):
-    """Where a condition is false, of one number or of eight."""
-    return _opposite(where)
-
-
-@intrinsic
-def _opposite(typingctx: Any, where: Any) -> Any:
-    return where(where), _code(ir.IRBuilder.not_)
 
 
 def by_kind(one: Callable[..., Any], eight: Callable[..., Any]) -> Callable[..., Any]:
@@ -221,13 +176,18 @@ def by_kind(one: Callable[..., Any], eight: Callable[..., Any]) -> Callable[...,
 
 
 @helper
-def _smaller(a, b):
-    return select(b < a, b, a)
+def _zero(numbers):
+    return 0.0
 
 
 @helper
-def _larger(a, b):
-    return select(b > a, b, a)
+def _eight_zeros(numbers):
+    return spread(0.0)
+
+
+# Zero of the kind of some numbers: where tuples are made of sums, these begin with it, since numba
+# does not turn tuples of numbers into those of eight each.
+zero_of = by_kind(_zero, _eight_zeros)
 
 
 @helper
@@ -242,7 +202,7 @@ def _logarithm(x):
 @helper
 def _power(x, exponent):
     """x^exponent; of x below zero for whole exponents, else NaN."""
-    size = magnitude(x)
+    size = abs(x)
     usual = (size > 1e-290) & (size < np.inf)
     log = exponent * logarithm(select(usual, size, 1.0))
     power = select(log > 709.78, np.inf, select(log < -708.0, 0.0, exponential(log)))
@@ -283,30 +243,11 @@ def _for_eight(function: Any, eight: Any) -> None:
         lambda x: (lambda x: eight(x)) if x == lanes else None)
 
 
-def _for_eight_pairs(function: Any, eight: Any) -> None:
-    """Let a function of two numbers take eight for one or both."""
-
-    def typed(a, b):
-        kinds = (a, b)
-        if lanes in kinds and all(kind in (lanes, types.float64) for kind in kinds):
-            return lambda a, b: eight(a, b)
-        return None
-
-    overload(function, jit_options=OVERLOAD)(typed)
-
-
-@helper
-def _hypotenuse(a, b):
-    return root(a * a + b * b)
-
-
 for _of_one, _of_eight in (
         (math.exp, exponential), (math.log, _logarithm), (math.atan, arctangent),
-        (math.tanh, hyperbolic_tangent), (math.sqrt, root), (abs, magnitude)):
+        (math.tanh, hyperbolic_tangent)):
     _for_eight(_of_one, _of_eight)
 copysign = by_kind(math.copysign, signed)
-for _of_two, _of_eight in ((min, _smaller), (max, _larger), (np.hypot, _hypotenuse)):
-    _for_eight_pairs(_of_two, _of_eight)
 
 
 @intrinsic

@@ -6,18 +6,19 @@ which takes ``+ - * /`` and comparisons with others of its kind and with numbers
 what the processor has. Comparisons give a mask, eight truth values, which takes ``& | ~``.
 """
 
+import math
 import operator
 from collections.abc import Callable
 from typing import Any, ClassVar
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.typeconv.rules import default_type_manager
-from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.core.typing.templates import AbstractTemplate, ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, lower_cast
 
-from fecontact.core.compiled import helper
 from fecontact.core.simd.kinds import TRUTHS, VECTOR, WIDTH, lanes, mask
 
 _BYTE = ir.IntType(8)
@@ -110,37 +111,25 @@ def _library(name: str) -> Callable[..., Any]:
             f"llvm.{name}.v{WIDTH}f64")
         return builder.call(function, args)
 
-    return _code(build)
-
-
-@intrinsic
-def magnitude(typingctx: Any, numbers: Any) -> Any:
-    """Absolute values."""
-    return lanes(lanes), _library("fabs")
-
-
-@intrinsic
-def root(typingctx: Any, numbers: Any) -> Any:
-    """Square roots."""
-    return lanes(lanes), _library("sqrt")
+    return build
 
 
 @intrinsic
 def whole(typingctx: Any, numbers: Any) -> Any:
     """Largest whole numbers not above."""
-    return lanes(lanes), _library("floor")
+    return lanes(lanes), _code(_library("floor"))
 
 
 @intrinsic
 def signed(typingctx: Any, sizes: Any, signs: Any) -> Any:
     """Numbers of these sizes with the signs of others."""
-    return lanes(lanes, lanes), _library("copysign")
+    return lanes(lanes, lanes), _code(_library("copysign"))
 
 
 @intrinsic
 def fused(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
     """The sum a b + c, rounded once."""
-    return lanes(lanes, lanes, lanes), _library("fma")
+    return lanes(lanes, lanes, lanes), _code(_library("fma"))
 
 
 @intrinsic
@@ -176,25 +165,6 @@ def _constant(value: Any, kind: Any = VECTOR) -> Any:
 
 
 @intrinsic
-def _select(typingctx: Any, where: Any, then: Any, otherwise: Any) -> Any:
-    kind = lanes if lanes in (then, otherwise) or where == mask else types.float64
-
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        values = [_spread(builder, value) if kind == lanes != given else value
-                  for given, value in zip(signature.args[1:], args[1:], strict=True)]
-        return builder.select(args[0], *values)
-
-    numbers = [number if number == lanes else types.float64 for number in (then, otherwise)]
-    return kind(where, *numbers), codegen
-
-
-@helper
-def select(where, then, otherwise):
-    """``then`` where a condition holds, else ``otherwise``; both are computed."""
-    return _select(where, then, otherwise)
-
-
-@intrinsic
 def bits(typingctx: Any, where: Any) -> Any:
     """A mask as an integer with one bit per lane; zero where none is true."""
     return types.int64(mask), _code(
@@ -208,25 +178,79 @@ def mask_of(typingctx: Any, given: Any) -> Any:
         lambda builder, given: builder.bitcast(builder.trunc(given, _BYTE), TRUTHS))
 
 
-def _provide(operation: Any, kind: Any, result: Any, build: Callable[..., Any],
+def _provide(function: Any, kind: Any, result: Any, build: Callable[..., Any],
              count: int = 2) -> None:
-    """Let lanes, or masks, take an operator; one of two operands may be a single value.
+    """Let a function or an operator take lanes, or masks; one of two may be a single value.
 
     It is one instruction where it stands. Functions of Python that return one would be compiled
     and copied for each.
     """
 
-    @infer_global(operation)
-    class _Operation(ConcreteTemplate):
+    @infer_global(function)
+    class _Function(ConcreteTemplate):
         cases: ClassVar = [signature(result, *[kind] * count)]
 
-    @lower_builtin(operation, *[kind] * count)
+    @lower_builtin(function, *[kind] * count)
     def _code_of(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return build(builder, *args)
 
 
+def select(where: Any, then: Any, otherwise: Any) -> Any:
+    """``then`` where a condition holds, else ``otherwise``; both are computed."""
+    return then if where else otherwise
+
+
+@infer_global(select)
+class _Select(AbstractTemplate):
+    def generic(self, args: Any, kws: Any) -> Any:
+        """Eight numbers where a value or the condition is eight."""
+        where, *values = args
+        kind = lanes if lanes in values or where == mask else types.float64
+        return signature(kind, where if where == mask else types.boolean, kind, kind)
+
+
+def somewhere(where: Any) -> Any:
+    """True if a condition holds, of eight numbers if it holds for at least one of them."""
+    return where
+
+
+def everywhere(where: Any) -> Any:
+    """True if a condition holds, of eight numbers if it holds for each of them."""
+    return where
+
+
+def opposite(where: Any) -> Any:
+    """Where a condition is false, of one number or of eight."""
+    return not where
+
+
+def _of_any(builder: Any, where: Any) -> Any:
+    return builder.icmp_unsigned("!=", builder.bitcast(where, _BYTE), _BYTE(0))
+
+
+def _of_all(builder: Any, where: Any) -> Any:
+    return builder.icmp_unsigned("==", builder.bitcast(where, _BYTE), _BYTE(-1))
+
+
+lower_builtin(select, types.Any, types.Any, types.Any)(
+    lambda context, builder, sig, args: builder.select(*args))
+for _function, _folded in ((somewhere, _of_any), (everywhere, _of_all)):
+    _provide(_function, types.boolean, types.boolean, lambda builder, where: where, 1)
+    _provide(_function, mask, types.boolean, _folded, 1)
+for _kind in (types.boolean, mask):
+    _provide(opposite, _kind, _kind, ir.IRBuilder.not_, 1)
+
+
 def _compared(sign: str) -> Callable[[Any, Any, Any], Any]:
     return lambda builder, a, b: builder.fcmp_ordered(sign, a, b)
+
+
+def _chosen(sign: str) -> Callable[[Any, Any, Any], Any]:
+    return lambda builder, a, b: builder.select(builder.fcmp_ordered(sign, b, a), b, a)
+
+
+def _hypotenuse(builder: Any, a: Any, b: Any) -> Any:
+    return _library("sqrt")(builder, builder.fadd(builder.fmul(a, a), builder.fmul(b, b)))
 
 
 for _name, _build in (("add", ir.IRBuilder.fadd), ("sub", ir.IRBuilder.fsub),
@@ -239,5 +263,10 @@ for _operation, _sign in ((operator.lt, "<"), (operator.le, "<="), (operator.gt,
 _provide(operator.ne, lanes, mask, lambda builder, a, b: builder.fcmp_unordered("!=", a, b))
 for _operation, _build in ((operator.and_, ir.IRBuilder.and_), (operator.or_, ir.IRBuilder.or_)):
     _provide(_operation, mask, mask, _build)
+_provide(min, lanes, lanes, _chosen("<"))
+_provide(max, lanes, lanes, _chosen(">"))
+_provide(np.hypot, lanes, lanes, _hypotenuse)
+_provide(abs, lanes, lanes, _library("fabs"), 1)
+_provide(math.sqrt, lanes, lanes, _library("sqrt"), 1)
 _provide(operator.neg, lanes, lanes, ir.IRBuilder.fneg, 1)
 _provide(operator.invert, mask, mask, ir.IRBuilder.not_, 1)

@@ -10,8 +10,8 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.simd.functions import by_kind, copysign, somewhere
-from fecontact.core.simd.vectors import select
+from fecontact.core.simd.functions import by_kind, copysign
+from fecontact.core.simd.vectors import select, somewhere
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.laws.signatures import signal_at

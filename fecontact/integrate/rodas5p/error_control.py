@@ -4,8 +4,7 @@
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.simd.functions import everywhere, somewhere
-from fecontact.core.simd.vectors import select
+from fecontact.core.simd.vectors import everywhere, select, somewhere
 from fecontact.integrate.brackets import Bracket, between, narrowed
 from fecontact.integrate.near_nodes import extend_near
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau

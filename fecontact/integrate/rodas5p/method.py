@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.simd.functions import somewhere
-from fecontact.core.simd.vectors import select
+from fecontact.core.simd.vectors import select, somewhere
 from fecontact.integrate.near_nodes import choose_near, set_end
 from fecontact.integrate.polynomial_bounds import may_switch, needs_search
 from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau

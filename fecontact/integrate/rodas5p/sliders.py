@@ -18,6 +18,7 @@ import numpy as np
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law, helper, routine
 from fecontact.core.records import Matrix, Vector
+from fecontact.core.simd.vectors import opposite, select
 from fecontact.integrate.brackets import Bracket, between, narrowed
 from fecontact.integrate.rodas5p import dynamics, state, tableau
 from fecontact.integrate.rodas5p.step_length import LAST_STEP
@@ -103,13 +104,10 @@ class Moment(NamedTuple):
 @routine
 def _look(part, view):
     """Put the state at a part of the step into ``view.y``; returns the motion of the ground."""
-    step, before, workspace, y = view.step, view.progress.state, view.workspace, view.y
-    if part == 0.0:
-        y[:] = before
-    elif part == 1.0:
-        y[:] = workspace.after
-    else:
-        tableau.interpolated(part, before, workspace.after, workspace.dense, y)
+    step, workspace, y = view.step, view.workspace, view.y
+    tableau.interpolated(part, view.progress.state, workspace.after, workspace.dense, y)
+    for k in range(len(y)):
+        y[k] = select(part == 1.0, workspace.after[k], y[k])
     return ground_motion(min(step.t + part * step.h, step.latest), view.problem.system)
 
 
@@ -126,7 +124,7 @@ def _excess(part, j, i, view):
 @helper
 def _begins(before, now):
     """Whether a normal force ``now`` begins, or passes through zero, since it was ``before``."""
-    return now != 0.0 and not before * now > 0.0
+    return (now != 0.0) & opposite(before * now > 0.0)
 
 
 @routine
@@ -156,6 +154,14 @@ def _penetration_acceleration(j, contact, rate, acceleration, s):
     return found
 
 
+@helper
+def _around_touch(j, contact, deepening, earlier, s):
+    """Normal force of node j so much ``earlier`` and now; ``deepening`` is u''."""
+    u, v = contact.penetration, contact.rate
+    return (normal_force(j, u - v * earlier, v - deepening * earlier, s)[0],
+            normal_force(j, u, v, s)[0])
+
+
 @routine
 def _since_touch(j, contact, deepening, earlier, s):
     """Time since the normal force of node j began [s], and whether it came through zero.
@@ -163,8 +169,7 @@ def _since_touch(j, contact, deepening, earlier, s):
     The time is -1 if it is longer than ``earlier``; ``deepening`` is u''.
     """
     u, v = contact.penetration, contact.rate
-    now = normal_force(j, u, v, s)[0]
-    before = normal_force(j, u - v * earlier, v - deepening * earlier, s)[0]
+    before, now = _around_touch(j, contact, deepening, earlier, s)
     if not _begins(before, now):
         return -1.0, False
     low, high = 0.0, earlier
@@ -350,6 +355,97 @@ def _return_one(j, i, within, moment):
     return_deflection(memory_of(j, y, s), i, size, limit * part, s)
 
 
+@helper
+def _nearest(step):
+    """Part of the step within which a switch counts as lying on its end, at least."""
+    return max(min(_BRIEFEST * abs(step.t) / step.h, _NEAREST), _NEAR_VARIED)
+
+
+@helper
+def _part_at(look, near):
+    """Part of the step at which excesses are examined for the ``look``-th time.
+
+    The last two are close together, so that what begins to fall at the end is seen.
+    """
+    return 1.0 if look > _LOOKS else (1.0 - near if look == _LOOKS else look / _LOOKS)
+
+
+@routine
+def _examine(look, near, view, out):
+    """Fill ``out`` (n + n s,) with the normal forces and the excesses of all elements."""
+    s, y, counts = view.problem.system, view.y, view.problem.control.slider_counts
+    n, states = len(counts), most_memory(s)
+    moved = _look(_part_at(look, near), view)
+    for j in range(n):
+        if counts[j] == 0:
+            continue
+        F, pressing, _ = pressing_at(j, y, moved, s, view.force, view.rates)
+        out[j] = F
+        z = memory_of(j, y, s)
+        for i in range(counts[j]):
+            out[n + j * states + i] = (deflection_of(z, i, s)
+                                       - limit_of(j, i, counts[j], pressing, s))
+
+
+@helper
+def _may_end(rise, excess, fall, size, scale):
+    """Whether slip may end about a look at an element, of that deflection and scale of its node.
+
+    ``rise`` and ``fall`` of the excess are those to this look and to the next one.
+    """
+    least = max(_FALL * max(abs(excess), scale), _ROUNDING * size)
+    # The top may be above the looks by the fall on both sides.
+    return (fall > least) & (rise > -least) & (excess + max(rise, fall) > 0.0)
+
+
+@routine
+def touched(step, problem, progress, workspace):
+    """Whether contacts with elements closed at the end of the last step, of eight: in which.
+
+    Where not, ``attend`` with ``BEGIN`` does nothing.
+    """
+    s, counts, some = problem.system, problem.control.slider_counts, False
+    earlier = _PAST * max(_NEAR * progress.numbers[LAST_STEP], _BRIEFEST * abs(step.t))
+    moved = ground_motion(step.t, s)
+    acceleration = dynamics.ground_acceleration(step.t, dynamics.t_plus(step), moved, s)
+    for j in range(len(counts)):
+        if counts[j] > 0:
+            _, _, contact = pressing_at(j, progress.state, moved, s, workspace.scratch.force[0],
+                                        workspace.scratch.rates[0])
+            deepening = _penetration_acceleration(j, contact, progress.rate, acceleration, s)
+            before, now = _around_touch(j, contact, deepening, earlier, s)
+            some = some | _begins(before, now)
+    return some
+
+
+@routine
+def may_switch(step, problem, progress, workspace):
+    """Whether anything is to be done about elements in a step, of eight: in which.
+
+    Where not, ``attend`` with ``SWITCH`` returns 1.
+    """
+    s, control, found, doubt = problem.system, problem.control, workspace.inner, False
+    n, states = len(control.slider_counts), most_memory(s)
+    view = View(step, problem, progress, workspace, workspace.right, workspace.scratch.force[0],
+                workspace.scratch.rates[0])
+    near = max(_nearest(step), _NEAR)
+    for look in range(_LOOKS + 2):
+        now, last, older = found[look % 3], found[(look + 2) % 3], found[(look + 1) % 3]
+        _examine(look, near, view, now)
+        if look == 0:
+            continue
+        for j in range(n):
+            if control.slider_counts[j] > 0:
+                doubt = doubt | _begins(last[j], now[j])
+            for i in range(control.slider_counts[j]):
+                k = n + j * states + i
+                size = deflection_of(memory_of(j, progress.state, s), i, s)
+                rise = last[k] - older[k] if look > 1 else 0.0
+                doubt = doubt | ((last[k] <= 0.0) & (now[k] > 0.0)) | _may_end(
+                    rise, last[k], last[k] - now[k], size, control.memory_scale[j * states])
+    return doubt
+
+
 @routine
 def _switch(step, problem, progress, workspace, vary):
     s, control = problem.system, problem.control
@@ -358,12 +454,11 @@ def _switch(step, problem, progress, workspace, vary):
     force, rates = force_workspace(s)
     y = np.empty(len(progress.state))
     view = View(step, problem, progress, workspace, y, force, rates)
-    found, places = np.empty((3, n, states)), np.full((n, states), 2.0)
-    pushing, starts = np.zeros((3, n)), np.full((n, states), -1.0)
-    at_once = np.zeros((n, states), dtype=np.bool_)
+    found, places = np.zeros((3, n * (1 + states))), np.full((n, states), 2.0)
+    starts, at_once = np.empty(n * (1 + states)), np.zeros((n, states), dtype=np.bool_)
     begins = varies or control.slider_counts.sum() <= _FEW
     first, t, again = 2.0, step.t, False
-    nearest = max(_NEAR_VARIED, min(_BRIEFEST * abs(t) / step.h, _NEAREST))
+    nearest = _nearest(step)
     near = nearest if varies else max(_NEAR, nearest)
     least, past = near, 0.0
     after_t = np.nextafter(t, np.inf)
@@ -372,53 +467,36 @@ def _switch(step, problem, progress, workspace, vary):
     for look in range(_LOOKS + 2):
         if again:
             break
-        # The last two are close together, so that what begins to fall at the end is seen.
-        part = 1.0 if look == _LOOKS + 1 else (
-            1.0 - near if look == _LOOKS else look / _LOOKS)
-        before = max(0.0, (look - 2) / _LOOKS)
-        moved = _look(part, view)
+        part, before = _part_at(look, near), max(0.0, (look - 2) / _LOOKS)
+        begun = _part_at(max(look - 1, 0), near)
         now, last, older = found[look % 3], found[(look + 2) % 3], found[(look + 1) % 3]
+        _examine(look, near, view, now)
+        if look == 0:
+            starts[:] = now
+            continue
         for j in range(n):
-            count = control.slider_counts[j]
-            if count == 0:
-                continue
-            F, pressing, _ = pressing_at(j, y, moved, s, force, rates)
-            pushing[look % 3, j] = F
-            z = memory_of(j, y, s)
-            for i in range(count):
-                now[j, i] = deflection_of(z, i, s) - limit_of(j, i, count, pressing, s)
-            if look > 0 and _begins(pushing[(look + 2) % 3, j], F):
-                begun = 1.0 - near if look == _LOOKS + 1 else (look - 1) / _LOOKS
-                place = _touch(begun, part, F, j, view)
+            if control.slider_counts[j] > 0 and _begins(last[j], now[j]):
+                place = _touch(begun, part, now[j], j, view)
                 if place > nearest:
                     first, least, past = min(first, place), nearest, nearest
                 else:
-                    again |= _begin_contact(
-                        j, 0.0, pushing[(look + 2) % 3, j] != 0.0, dynamics.ground_acceleration(
-                            t, dynamics.t_plus(step), step.moved, s), start)
-                _look(part, view)
-        if look == 0:
-            starts[:, :] = now
-            continue
+                    again |= _begin_contact(j, 0.0, last[j] != 0.0, dynamics.ground_acceleration(
+                        t, dynamics.t_plus(step), step.moved, s), start)
         for j in range(n):
             # Elements of a contact that stays open have nothing to hold.
-            if not np.any(pushing[:, j] != 0.0):
+            if now[j] == 0.0 and last[j] == 0.0 and older[j] == 0.0:
                 continue
             for i in range(control.slider_counts[j]):
-                low, middle, high = older[j, i], last[j, i], now[j, i]
+                k = n + j * states + i
+                middle, high = last[k], now[k]
                 size = deflection_of(memory_of(j, progress.state, s), i, s)
-                scale = max(_FALL * max(abs(middle), control.memory_scale[j * states]),
-                            _ROUNDING * size)
-                # The top may be above the looks by the fall on both sides.
-                rise = middle - low if look > 1 else 0.0
-                falls = middle - high > scale and rise > -scale
-                if falls and middle + max(rise, middle - high) > 0.0:
+                rise = middle - older[k] if look > 1 else 0.0
+                if _may_end(rise, middle, middle - high, size, control.memory_scale[j * states]):
                     place = _largest(before, part, j, i, view)
-                    if (place > near or starts[j, i] > 0.0) and _excess(place, j, i, view) > 0.0:
+                    if (place > near or starts[k] > 0.0) and _excess(place, j, i, view) > 0.0:
                         places[j, i] = min(places[j, i], place)
                         first = min(first, place)
                 if begins and middle <= 0.0 < high:
-                    begun = 1.0 - near if look == _LOOKS + 1 else (look - 1) / _LOOKS
                     place = _root(False, begun, part, min(middle, -1e-300), high, j, i, view)
                     if look == 1 and middle >= -0.5 * SHORT * size:
                         # The last step ended just short of where slip begins. Without deflection

@@ -15,6 +15,7 @@ from fecontact.core.simd.kinds import WIDTH
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.stage_solver import Reduced
 from fecontact.integrate.rodas5p.state import NUMBERS, Problem, Progress, Workspace
+from fecontact.integrate.rodas5p.variational import Vary
 from fecontact.system.nodes import AXES, COMBINATIONS, MEMORY, MODES, NODES
 
 if TYPE_CHECKING:
@@ -26,9 +27,9 @@ else:
     EightProgress = of_eight(Progress)
     EightWorkspace = of_eight(Workspace)
 
-# Rows of `Lanes.limits`: last time of the run, shortest step, time of its next output, whether the
-# next step has to be of just the length that was said, and for when ``workspace.given`` holds.
-END, SMALLEST, NEXT_OUTPUT, EXACTLY, KNOWN = range(5)
+# Rows of `Lanes.limits`: last time of the run, shortest step, time of its next output, outcome of
+# the last attempt as the step loop names it, and for when ``workspace.given`` holds.
+END, SMALLEST, NEXT_OUTPUT, OUTCOME, KNOWN = range(5)
 LIMITS = 5
 # Entries of `Runs.counts` and of a row of `Runs.ends`.
 TAKEN, WAITING, OPEN, ATTEMPTS = range(4)
@@ -68,6 +69,19 @@ class Lanes(NamedTuple):
     runs: Annotated[Integers, WIDTH]
     rows: Annotated[Integers, WIDTH]
     fresh: Annotated[Integers, 1]
+
+
+class Alone(NamedTuple):
+    """A run alone, by which what is rare is looked at in single lanes.
+
+    The parameters of ``problem`` lie in ``Lanes.column``; but its ``control.speed_scale`` is zero.
+    Nothing varies by ``vary``.
+    """
+
+    problem: Problem
+    progress: Progress
+    workspace: Workspace
+    vary: Vary
 
 
 class Runs(NamedTuple):

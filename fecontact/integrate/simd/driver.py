@@ -12,17 +12,17 @@ from fecontact.core.checks import require_state
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.blocks import one_block
 from fecontact.integrate.rodas5p.driver import control_for, start
-from fecontact.integrate.rodas5p.state import NUMBERS, Problem, Progress, Workspace
+from fecontact.integrate.rodas5p.state import NUMBERS, Problem
 from fecontact.integrate.series.branches import series_pay
 from fecontact.integrate.simd import arrays, step_loop
-from fecontact.integrate.simd.arrays import ATTEMPTS, OPEN, TAKEN, WAITING, Lanes, Runs
+from fecontact.integrate.simd.arrays import ATTEMPTS, OPEN, TAKEN, WAITING, Alone, Lanes, Runs
 from fecontact.integrate.small_systems import FEW
 from fecontact.integrate.step_loop import FINISHED, RUNNING, TIME
 from fecontact.integrate.step_runs import ENDS
 from fecontact.integrate.trajectory import Status
 from fecontact.laws.simd import simd_address
 from fecontact.system.contact_system import ContactSystem
-from fecontact.system.elastic_sliders import slider_counts
+from fecontact.system.elastic_sliders import exact_arrays, slider_counts
 
 # Steps of a call, in all lanes; runs that a worker takes at once, at most.
 _STEPS, _DEALT = 20_000, 32
@@ -30,6 +30,10 @@ _STEPS, _DEALT = 20_000, 32
 # Runs with internal variables from which on it pays to compile their steps, which no one does
 # ahead of time.
 _MANY = 64
+
+# Internal variables of a node, at most. With four, runs side by side are ten times as fast as one
+# by one, with eight two and a half times.
+_MOST_STATES = 8
 
 # Integers of a system that are addresses of laws.
 _LAWS = ("normal", "friction", "drive", "load", "ground_motion")
@@ -40,7 +44,8 @@ class Kind:
     """Common properties of runs that go side by side: laws by address, integers, and shapes.
 
     ``size`` are the numbers of modes, contact nodes and internal variables of a node, ``levels``
-    that of penetrations at which normal forces begin or end.
+    that of penetrations at which normal forces begin or end, ``sliders`` those of elastic Coulomb
+    elements of each node.
     """
 
     laws: tuple[tuple[int, ...], ...]
@@ -48,6 +53,7 @@ class Kind:
     shapes: tuple[tuple[int, ...], ...]
     levels: int
     size: tuple[int, int, int]
+    sliders: tuple[int, ...]
 
     def eight(self, problem: Problem) -> Problem:
         """A problem of this kind with the integers that eight systems have."""
@@ -62,14 +68,15 @@ def kind_of(system: ContactSystem, begin: float, end: float) -> Kind | None:
     """The kind of a system; None if it does not go side by side with others.
 
     It does if it is plane and of a usual size, on level ground that moves as one, without
-    elastic Coulomb elements and large deflections, without breaks of what is given in time, and if
-    there are functions for eight of all its laws and signals.
+    large deflections, without breaks of what is given in time, and if there are functions for eight
+    of all its laws and signals.
     """
-    s = system.arrays
+    counts = slider_counts(system)
+    s = exact_arrays(system.arrays, counts)
     (n, d, m), states = s.rows.shape, system.memory
-    if ((m, n) not in FEW or d > 2 or states > 1 or (s.memory != states).any() or s.second_motion
-            or s.friction_scale or len(s.polynomial_pairs) or system.ground.wavy
-            or slider_counts(system).any() or system.breakpoints(begin, end)):
+    if ((m, n) not in FEW or d > 2 or states > _MOST_STATES or (s.memory != states).any()
+            or s.second_motion or s.friction_scale or len(s.polynomial_pairs)
+            or system.ground.wavy or system.breakpoints(begin, end)):
         return None
     acts = (s.drive_stiffness != 0.0) | (s.drive_damping != 0.0)
     laws = []
@@ -85,14 +92,15 @@ def kind_of(system: ContactSystem, begin: float, end: float) -> Kind | None:
     levels = max(len(law.onsets(nodes.stop - nodes.start))
                  for nodes, _, law in system.law_groups("normal"))
     return Kind(tuple(laws), tuple(one.tobytes() for one in arrays.integers_of(others)),
-                tuple(one.shape for one in arrays.numbers_of(s)), levels, (m, n, states))
+                tuple(one.shape for one in arrays.numbers_of(s)), levels, (m, n, states),
+                tuple(counts.tolist()))
 
 
 def problem_of(
     system: ContactSystem, times: Array, rtol: float, max_step: float | None,
 ) -> Problem:
     """A system in one block, and the limits of its steps as single runs have them."""
-    s = system.arrays
+    s = exact_arrays(system.arrays, slider_counts(system))
     shapes = s.rows.swapaxes(0, 1).reshape(-1, s.rows.shape[2]).T.copy()
     return Problem(s, one_block(shapes, len(s.gap)), control_for(
         system, np.zeros(system.size), times, rtol=rtol, max_step=max_step, work=False))
@@ -184,11 +192,12 @@ class SideBySide:
         lanes = self.lanes()
         spare = self.spare(lanes)
         runs = self.runs._replace(counts=np.zeros(4, dtype=np.int64))
-        advance = step_loop.SMALL.of(*self._kind.size)
+        loop = step_loop.WITH_SLIDERS if any(self._kind.sliders) else step_loop.SMALL
+        advance = loop.of(*self._kind.size)
         ended = step_loop.GOES_ON
         while wanted() and (ended != step_loop.DONE or self._resume()):
             runs = self._dealt_to(runs, workers)
-            ended = advance(lanes, runs, *spare, _STEPS)
+            ended = advance(lanes, runs, spare, _STEPS)
         with self._lock:
             self.attempts += int(runs.counts[ATTEMPTS])
 
@@ -197,13 +206,13 @@ class SideBySide:
         return arrays.lanes_for(self._problem, self._kind.eight(self._problem),
                                 self.runs.starts.shape[1])
 
-    def spare(self, lanes: Lanes) -> tuple[Problem, Progress, Workspace]:
-        """A run for checks of single lanes, whose parameters lie in ``lanes.column``."""
+    def spare(self, lanes: Lanes) -> Alone:
+        """A run alone for what is looked at in single lanes."""
         own = arrays.seen_in(lanes.column, self._problem)
         own = own._replace(control=own.control._replace(speed_scale=0.0))
         # All nodes are near.
         workspace = _copied(self._spare.workspace)._replace(near=own.blocks)
-        return own, _copied(self._spare.progress), workspace
+        return Alone(own, _copied(self._spare.progress), workspace, self._spare.variation)
 
     def _dealt_to(self, runs: Runs, workers: int) -> Runs:
         """Return the runs with a longer queue; at the end each worker takes few at once."""

@@ -8,12 +8,15 @@ Stages, errors and checks are those of single runs, :mod:`fecontact.integrate.ro
 with eight numbers in place of each.
 """
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
-from fecontact.core.simd.functions import at_unknown_place, lane_of, opposite, somewhere, with_lane
+from fecontact.core.simd.functions import at_unknown_place, lane_of, with_lane
 from fecontact.core.simd.kinds import WIDTH
-from fecontact.core.simd.vectors import bits, mask_of, select, spread
+from fecontact.core.simd.vectors import bits, mask_of, opposite, select, somewhere, spread
 from fecontact.integrate.near_nodes import set_end
 from fecontact.integrate.polynomial_bounds import may_switch, needs_search
 from fecontact.integrate.rodas5p import state as run_arrays
@@ -22,6 +25,16 @@ from fecontact.integrate.rodas5p.dynamics import motion_given, next_kink, set_gi
 from fecontact.integrate.rodas5p.error_control import sign_of, switches
 from fecontact.integrate.rodas5p.method import error_at_end, solve, switch_error
 from fecontact.integrate.rodas5p.missed_contacts import first_missed_at
+from fecontact.integrate.rodas5p.sliders import (
+    BEGIN,
+    OUTPUT,
+    SWITCH,
+    attend_at,
+    touched,
+)
+from fecontact.integrate.rodas5p.sliders import (
+    may_switch as sliders_may_switch,
+)
 from fecontact.integrate.rodas5p.state import CAUTIOUS, MISSED, SPEED_SCALE, Step
 from fecontact.integrate.rodas5p.step_length import (
     LAST_ROOT,
@@ -36,16 +49,26 @@ from fecontact.integrate.simd import arrays
 from fecontact.integrate.simd.arrays import (
     ATTEMPTS,
     END,
-    EXACTLY,
     KNOWN,
     NEXT_OUTPUT,
     OPEN,
+    OUTCOME,
     SMALLEST,
     TAKEN,
     WAITING,
 )
 from fecontact.integrate.small_systems import FEW, Sized
-from fecontact.integrate.step_loop import FINISHED, MINIMUM_STEP, NOT_FINITE, STEP, TIME
+from fecontact.integrate.step_loop import (
+    ANEW,
+    CUT,
+    FAILED,
+    FINISHED,
+    MINIMUM_STEP,
+    NOT_FINITE,
+    STEP,
+    TIME,
+)
+from fecontact.integrate.step_loop import TAKEN as ACCEPTED
 from fecontact.integrate.step_polynomials import set_polynomials
 from fecontact.system.nodes import GroundMotion
 
@@ -171,7 +194,7 @@ def _next_step(b):
         set_given(t, problem.system, w.given, w.load)
     b.limits[KNOWN] = t
     moved = motion_given(w.given)
-    target = target_of(t, h, b.limits[EXACTLY] > 0.0, stop)
+    target = target_of(t, h, b.limits[OUTCOME] == float(CUT), stop)
     limit, caution = numbers[CAUTIOUS], spread(0.0)
     if somewhere(limit > 0.0):
         reach = max(limit, target - t)
@@ -185,24 +208,21 @@ def _next_step(b):
 
 
 @routine
-def _missed_part(lane, step, b, problem, progress, workspace):
-    """Part of a lane's step to which it has to be shortened; 1 if none.
-
-    By the functions for one run, on ``problem``, ``progress`` and ``workspace``, which take the
-    lane's numbers; but ``problem.control.speed_scale`` is zero.
-    """
-    mine, w, s, control = b.progress, b.workspace, problem.system, problem.control
-    again, smallest = lane_of(mine.numbers[MISSED], lane), lane_of(b.limits[SMALLEST], lane)
-    if again >= _MOST_AGAIN:
-        return 1.0
+def _take_out(lane, step, b, spare):
+    """Let a run alone take the parameters, state and step of a lane; the step."""
+    mine, w = b.progress, b.workspace
+    progress, workspace = spare.progress, spare.workspace
     for row in range(len(b.column)):
         b.column[row] = b.parameters[row, lane]
-    for i in range(len(control.largest)):
+    for i in range(len(progress.extremes)):
         progress.extremes[i] = lane_of(mine.extremes[i], lane)
-    progress.numbers[SPEED_SCALE] = max(lane_of(mine.numbers[SPEED_SCALE], lane),
+    for k in range(len(progress.numbers)):
+        progress.numbers[k] = lane_of(mine.numbers[k], lane)
+    progress.numbers[SPEED_SCALE] = max(progress.numbers[SPEED_SCALE],
                                         lane_of(b.problem.control.speed_scale, lane))
     for k in range(len(progress.state)):
         progress.state[k] = lane_of(mine.state[k], lane)
+        progress.rate[k] = lane_of(mine.rate[k], lane)
         workspace.after[k] = lane_of(w.after[k], lane)
         for row in range(3):
             workspace.dense[row, k] = lane_of(w.dense[row, k], lane)
@@ -212,17 +232,62 @@ def _missed_part(lane, step, b, problem, progress, workspace):
     moved = GroundMotion(lane_of(step.moved.travel, lane), lane_of(step.moved.speed, lane),
                          0.0, 0.0)
     t, h, target = lane_of(step.t, lane), lane_of(step.h, lane), lane_of(step.target, lane)
+    return Step(t, h, target, target, moved, 0.0, False)
+
+
+@routine
+def _put_back(lane, b, spare):
+    """Let a lane take the state of the run alone, its rates and gradients."""
+    mine, progress = b.progress, spare.progress
+    for k in range(len(progress.state)):
+        mine.state[k] = with_lane(mine.state[k], lane, progress.state[k])
+        mine.rate[k] = with_lane(mine.rate[k], lane, progress.rate[k])
+    there, here = mine.gradients, progress.gradients
+    for j in range(len(here.partial)):
+        for row in range(here.partial.shape[1]):
+            for k in range(here.partial.shape[2]):
+                there.partial[j, row, k] = with_lane(there.partial[j, row, k], lane,
+                                                     here.partial[j, row, k])
+        for k in range(here.force.shape[1]):
+            there.force[j, k] = with_lane(there.force[j, k], lane, here.force[j, k])
+        for row in range(here.rates.shape[1]):
+            for k in range(here.rates.shape[2]):
+                there.rates[j, row, k] = with_lane(there.rates[j, row, k], lane,
+                                                   here.rates[j, row, k])
+
+
+@routine
+def _missed_part(lane, step, b, spare):
+    """Part of a lane's step to which it has to be shortened; 1 if none."""
+    again, smallest = lane_of(b.progress.numbers[MISSED], lane), lane_of(b.limits[SMALLEST], lane)
+    if again >= _MOST_AGAIN:
+        return 1.0
+    one = _take_out(lane, step, b, spare)
+    problem, progress, workspace = spare.problem, spare.progress, spare.workspace
+    s, control = problem.system, problem.control
     set_polynomials(s, problem.blocks, control.ground, progress.state, workspace.after, workspace)
-    if needs_search(moved, h, s, control.ground, control.levels, control.slip_scale, workspace):
-        one = Step(t, h, target, target, moved, 0.0, False)
+    if needs_search(one.moved, one.h, s, control.ground, control.levels, control.slip_scale,
+                    workspace):
         part = first_missed_at(control.missed)(one, int(again), problem, progress, workspace)
-        if part * h > 100.0 * smallest and part < 1.0:
+        if part * one.h > 100.0 * smallest and part < 1.0:
             return part
     return 1.0
 
 
 @routine
-def _write_outputs(lane, step, b, runs):
+def _attend(kind, lane, step, b, spare):
+    """What is to be done about elastic Coulomb elements in a lane: as ``attend``."""
+    one = _take_out(lane, step, b, spare)
+    problem, progress, workspace = spare.problem, spare.progress, spare.workspace
+    part = attend_at(problem.control.sliders)(kind, one, problem, progress, workspace, spare.vary,
+                                              one.t, workspace.right)
+    if kind == BEGIN or part == 0.0:
+        _put_back(lane, b, spare)
+    return part
+
+
+@routine
+def _write_outputs(lane, step, b, runs, spare):
     """Write the outputs of a lane up to the end of its step; whether they were the last."""
     progress, w = b.progress, b.workspace
     t, h, target = lane_of(step.t, lane), lane_of(step.h, lane), lane_of(step.target, lane)
@@ -232,6 +297,11 @@ def _write_outputs(lane, step, b, runs):
         for k in range(len(w.after)):
             runs.states[run, row, k] = lane_of(tableau.one_interpolated(
                 part, k, progress.state, w.after, w.dense), lane)
+        if spare.problem.control.sliders != 0:
+            one = _take_out(lane, step, b, spare)
+            attend_at(spare.problem.control.sliders)(
+                OUTPUT, one, spare.problem, spare.progress, spare.workspace, spare.vary,
+                runs.times[run, row], runs.states[run, row])
         row += 1
     b.rows[lane] = row
     if row == count:
@@ -241,30 +311,69 @@ def _write_outputs(lane, step, b, runs):
 
 
 @helper
-def _set_next(step, error, good, missed, part, b):
-    """Lengths of the next steps: of lanes whose step was ``good``, missed something, or failed."""
+def _set_next(step, error, good, missed, again, part, b):
+    """Lengths of the next steps: of lanes whose step was ``good``, missed something, or failed.
+
+    Those that are tried ``again``, as something was missed or for their elements, go on with a
+    ``part`` of the step.
+    """
     numbers, root = b.progress.numbers, root_of(error)
-    failed = opposite(good | missed)
+    failed = opposite(good | again)
     step_before, root_before, rejected = (numbers[LAST_STEP], numbers[LAST_ROOT],
                                           numbers[REJECTED_LAST])
     longer = next_length(step.h, root, b.problem.control.longest, numbers)
-    numbers[STEP] = select(good, longer, step.h * select(missed, part, growth(root)))
+    numbers[STEP] = select(good, longer, step.h * select(again, part, growth(root)))
     numbers[LAST_STEP] = select(good, numbers[LAST_STEP], step_before)
     numbers[LAST_ROOT] = select(good, numbers[LAST_ROOT], root_before)
     numbers[REJECTED_LAST] = select(failed, 1.0, select(good, 0.0, rejected))
     after_failure = select(failed & opposite(step.caution > 0.0), step.h, 0.0)
     numbers[CAUTIOUS] = select(good, step.caution, after_failure)
-    b.limits[EXACTLY] = select(missed, spread(1.0), 0.0)
+    b.limits[OUTCOME] = select(good, float(ACCEPTED), select(again, select(
+        part < 1.0, float(CUT), float(ANEW)), float(FAILED)))
     numbers[MISSED] = select(good, 0.0, select(missed, numbers[MISSED] + 1.0, numbers[MISSED]))
 
 
 @helper
-def _attempt(active, b, runs, problem, progress, workspace):
-    """Try a step in all lanes."""
+def _nothing(active, step, b, spare):
+    """Nothing is to be done at the begin of a step."""
+
+
+@helper
+def _parts_below_one(good, part, step, b, spare):
+    """Lanes whose steps are shortened, and to which part."""
+    return part < 1.0, part
+
+
+@helper
+def _begin_sliders(active, step, b, spare):
+    """Set the deflections of contacts that closed at the end of the last step."""
+    begun = b.limits[OUTCOME] == float(ACCEPTED)
+    closed = active & bits(begun & touched(step, b.problem, b.progress, b.workspace))
+    for lane in range(WIDTH):
+        if (closed >> lane) & 1:
+            _attend(BEGIN, lane, step, b, spare)
+
+
+@helper
+def _switch_sliders(good, part, step, b, spare):
+    """Lanes whose steps are tried again, the whole of it or a part, as slip begins or ends."""
+    doubt, anew = bits(good & sliders_may_switch(step, b.problem, b.progress, b.workspace)), 0
+    for lane in range(WIDTH):
+        if (doubt >> lane) & 1:
+            found = _attend(SWITCH, lane, step, b, spare)
+            part = with_lane(part, lane, found)
+            anew |= int(found == 0.0) << lane
+    return part < 1.0, select(mask_of(anew), 1.0, part)
+
+
+@helper
+def _attempt(active, b, runs, spare, begin, switch):
+    """Try a step in all lanes; ``begin`` and ``switch`` attend to elastic Coulomb elements."""
     mine, w = b.progress, b.workspace
     numbers, end = mine.numbers, b.limits[END]
     step = _next_step(b)
     G = 1.0 / (step.h * tableau.GAMMA)
+    begin(active, step, b, spare)
     switched = solve(step, G, True, end, b.problem, mine, w)
     b.limits[KNOWN] = step.target
     error = error_at_end(step, end, b.problem, mine, w)
@@ -275,8 +384,7 @@ def _attempt(active, b, runs, problem, progress, workspace):
     if doubt != 0:
         for lane in range(WIDTH):
             if (doubt >> lane) & 1:
-                part = with_lane(part, lane, _missed_part(lane, step, b, problem, progress,
-                                                          workspace))
+                part = with_lane(part, lane, _missed_part(lane, step, b, spare))
         missed = part < 1.0
     switched = (switched | switches(len(b.problem.system.gap), w.near.nodes, w.nodes[2],
                                     mine.signs)) & passed & opposite(missed)
@@ -284,22 +392,24 @@ def _attempt(active, b, runs, problem, progress, workspace):
         found = switch_error(step, G, end, b.problem, mine, w)
         error = select(switched, max(found, error), error)
     good = passed & opposite(missed) & (error <= 1.0)
+    again, part = switch(good, part, step, b, spare)
+    good = good & opposite(again)
     outputs = bits(good & (b.limits[NEXT_OUTPUT] <= step.target))
     complete = 0
     if outputs != 0:
         for lane in range(WIDTH):
-            if (outputs >> lane) & 1 and _write_outputs(lane, step, b, runs):
+            if (outputs >> lane) & 1 and _write_outputs(lane, step, b, runs, spare):
                 complete |= 1 << lane
     _go_to_end(good, b)
     numbers[TIME] = select(good, step.target, step.t)
-    _set_next(step, error, good, missed, part, b)
+    _set_next(step, error, good, missed, again, part, b)
     hopeless = opposite(error < np.inf)
     if somewhere(hopeless):
         # Stages to come have no part in one, but are multiplied by zero.
         for i in range(tableau.STAGES):
             for k in range(len(w.after)):
                 w.stages[i, k] = select(hopeless, 0.0, w.stages[i, k])
-    going = good | missed | (numbers[STEP] >= b.limits[SMALLEST])
+    going = good | again | (numbers[STEP] >= b.limits[SMALLEST])
     stopped, accepted = active & bits(opposite(going)), bits(good)
     for lane in range(WIDTH):
         if (active >> lane) & 1:
@@ -310,37 +420,38 @@ def _attempt(active, b, runs, problem, progress, workspace):
             _end(lane, MINIMUM_STEP if lane_of(error, lane) < np.inf else NOT_FINITE, b, runs)
 
 
-def advance(
-    b: arrays.Lanes, runs: arrays.Runs, problem: run_arrays.Problem,
-    progress: run_arrays.Progress, workspace: run_arrays.Workspace, most: int,
-) -> int:
-    """Go on until ``most`` steps have been tried in all lanes; returns how it ended.
+def _loop(begin: Any, switch: Any, constants: str) -> Any:
+    """The compiled loop ``advance(b, runs, spare, most)``, with what attends to elements.
 
-    ``problem``, ``progress`` and ``workspace`` are those of some run of the same kind, as room for
-    checks of single lanes; the parameters of ``problem`` lie in ``b.column``. It is compiled for
-    each size: ``SMALL``.
+    It goes on until ``most`` steps have been tried in all lanes, and returns how it ended.
     """
-    active = _fill(b, runs)
-    for _ in range(most):
-        if active != (1 << WIDTH) - 1:
-            active = _fill(b, runs)
-            if active == 0:
-                return HUNGRY if runs.counts[OPEN] else DONE
-            if active != (1 << WIDTH) - 1 and runs.counts[OPEN]:
-                return HUNGRY
-        if b.fresh[0] != 0:
-            _begin(b)
-        _attempt(active, b, runs, problem, progress, workspace)
-        runs.counts[ATTEMPTS] += 1
-        active = 0
-        for lane in range(WIDTH):
-            if b.runs[lane] >= 0:
-                active |= 1 << lane
-    return GOES_ON
+
+    def advance(b, runs, spare, most):
+        active = _fill(b, runs)
+        for _ in range(most):
+            if active != (1 << WIDTH) - 1:
+                active = _fill(b, runs)
+                if active == 0:
+                    return HUNGRY if runs.counts[OPEN] else DONE
+                if active != (1 << WIDTH) - 1 and runs.counts[OPEN]:
+                    return HUNGRY
+            if b.fresh[0] != 0:
+                _begin(b)
+            _attempt(active, b, runs, spare, begin, switch)
+            runs.counts[ATTEMPTS] += 1
+            active = 0
+            for lane in range(WIDTH):
+                if b.runs[lane] >= 0:
+                    active |= 1 << lane
+        return GOES_ON
+
+    advance.__annotations__ = {"b": arrays.Lanes, "runs": arrays.Runs, "spare": arrays.Alone,
+                               "most": int, "return": int}
+    return kernel(advance, constants=constants, nogil=True)
 
 
+_RECORDS = (run_arrays.Problem, run_arrays.Progress, run_arrays.Workspace, arrays.Lanes,
+            arrays.Runs, arrays.Alone)
 # The arrays of the run that checks of single lanes are made with are among these.
-SMALL = Sized(
-    lambda given: kernel(advance, constants=given, nogil=True),
-    (run_arrays.Problem, run_arrays.Progress, run_arrays.Workspace, arrays.Lanes, arrays.Runs),
-    FEW)
+SMALL = Sized(partial(_loop, _nothing, _parts_below_one), _RECORDS, FEW)
+WITH_SLIDERS = Sized(partial(_loop, _begin_sliders, _switch_sliders), _RECORDS, FEW, sliders=True)

@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from fecontact.core.errors import InputError, require_positive, shown
+from fecontact.core.simd.vectors import select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NotNegative, Positive
@@ -33,34 +34,27 @@ def _maxwell_slip(v, F, z, p, force, rates):
     zero, z_i' = v: a run returns an element to its limit when sliding ends, and the part of z_i
     beyond the limit is the distance that the element has slid.
     """
-    count = len(z)
-    return_time = p[0]
-    force[0] = 0.0
-    force[1] = 0.0
-    force[2] = 0.0
+    count, return_time = len(z), p[0]
+    returns, exact = return_time > 0.0, return_time == 0.0
+    for entry in range(3):
+        force[entry] = 0.0
     for i in range(count):
         spring, mu = p[1 + i], p[1 + count + i]
         limit = mu * F / spring
-        sign = 1.0 if z[i] > 0.0 else -1.0
+        sign = select(z[i] > 0.0, 1.0, -1.0)
         excess = abs(z[i]) - limit
+        slides = (excess > 0.0) | (exact & (
+            (F <= 0.0) | ((excess > -AT_LIMIT * limit) & (sign * v > 0.0))))
+        force[0] += select(slides, sign * mu * F, spring * z[i])
+        force[2] += select(slides, sign * mu, 0.0)
+        force[3 + i] = select(slides, 0.0, spring)
+        back = slides & returns
         for k in range(3 + count):
             rates[i, k] = 0.0
-        rates[i, 0] = v
+        rates[i, 0] = select(back, v - sign * excess / return_time, v)
         rates[i, 1] = 1.0
-        slides = excess > 0.0
-        if return_time == 0.0:
-            slides = slides or F <= 0.0 or (excess > -AT_LIMIT * limit and sign * v > 0.0)
-        if slides:
-            force[0] += sign * mu * F
-            force[2] += sign * mu
-            force[3 + i] = 0.0
-            if return_time > 0.0:
-                rates[i, 0] -= sign * excess / return_time
-                rates[i, 2] = sign * mu / (spring * return_time)
-                rates[i, 3 + i] = -1.0 / return_time
-        else:
-            force[0] += spring * z[i]
-            force[3 + i] = spring
+        rates[i, 2] = select(back, sign * mu / (spring * return_time), 0.0)
+        rates[i, 3 + i] = select(back, -1.0 / return_time, 0.0)
 
 
 @planar_friction_law

@@ -7,8 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from fecontact.core.compiled import helper
-from fecontact.core.simd.functions import somewhere
-from fecontact.core.simd.vectors import select
+from fecontact.core.simd.vectors import select, somewhere
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import NotNegative, PerNode, Positive

@@ -9,8 +9,7 @@ from typing import Annotated, ClassVar, Literal, get_args
 import numpy as np
 
 from fecontact.core.errors import InputError, choices, nearest
-from fecontact.core.simd.functions import everywhere
-from fecontact.core.simd.vectors import select
+from fecontact.core.simd.vectors import everywhere, select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NormalLaw, NotNegative, PerNode, Positive, UpToOne

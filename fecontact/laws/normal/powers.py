@@ -3,8 +3,7 @@
 import math
 
 from fecontact.core.compiled import helper
-from fecontact.core.simd.functions import everywhere
-from fecontact.core.simd.vectors import select
+from fecontact.core.simd.vectors import everywhere, select
 
 
 @helper

@@ -6,8 +6,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from fecontact.core.simd.functions import everywhere
-from fecontact.core.simd.vectors import select
+from fecontact.core.simd.vectors import everywhere, select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw, NotNegative, PerNode, Positive
