@@ -256,7 +256,10 @@ def _set_rates(after_t, problem, progress, workspace):
 
 @routine
 def _after_touch(step, t, problem, progress, workspace, vary):
-    """Set the deflections of contacts that closed at the end of the last step, at the time t."""
+    """Set the deflections of contacts that closed at the end of the last step, at the time t.
+
+    Returns True if any changes.
+    """
     s, control, changed = problem.system, problem.control, False
     near = _NEAR_VARIED if len(vary.variation.columns) > 0 else _NEAR
     earlier = _PAST * max(near * progress.numbers[LAST_STEP], _BRIEFEST * abs(t))
@@ -275,6 +278,7 @@ def _after_touch(step, t, problem, progress, workspace, vary):
             changed |= _begin_contact(j, since, through, acceleration, moment)
     if changed:
         _set_rates(t, problem, progress, workspace)
+    return changed
 
 
 @routine
@@ -556,7 +560,7 @@ def _attend(kind, step, problem, progress, workspace, vary, t, y):
     """Part of the step until slip ends, 0 if it was to end at its start, 1 if it does not.
 
     Or fill in what ``kind`` asks for: ``y`` at the time t, or the end of the step, within limits,
-    or its start after a touch.
+    or its start after a touch; 0 if that has changed.
     """
     if kind == SWITCH:
         return _switch(step, problem, progress, workspace, vary)
@@ -564,8 +568,8 @@ def _attend(kind, step, problem, progress, workspace, vary, t, y):
         _at_end(step, problem, progress, workspace, vary)
         return 1.0
     if kind == BEGIN:
-        _after_touch(step, np.nextafter(t, np.inf), problem, progress, workspace, vary)
-        return 1.0
+        changed = _after_touch(step, np.nextafter(t, np.inf), problem, progress, workspace, vary)
+        return 0.0 if changed else 1.0
     s = problem.system
     return_to_limits(t, y, s, problem.control.slider_counts, *force_workspace(s))
     return 1.0

@@ -276,12 +276,15 @@ def _missed_part(lane, step, b, spare):
 
 @routine
 def _attend(kind, lane, step, b, spare):
-    """What is to be done about elastic Coulomb elements in a lane: as ``attend``."""
+    """What is to be done about elastic Coulomb elements in a lane: as ``attend``.
+
+    Where it returns 0, the state at the begin of the step has changed.
+    """
     one = _take_out(lane, step, b, spare)
     problem, progress, workspace = spare.problem, spare.progress, spare.workspace
     part = attend_at(problem.control.sliders)(kind, one, problem, progress, workspace, spare.vary,
                                               one.t, workspace.right)
-    if kind == BEGIN or part == 0.0:
+    if part == 0.0:
         _put_back(lane, b, spare)
     return part
 
