@@ -101,6 +101,7 @@ def ensemble(
     rtol: float = 1e-6,
     max_step: float | None = None,
     chain: int = 1,
+    in_all: int | None = None,
     events: AnyEvent | Sequence[AnyEvent] | None = None,
     workers: int | None = None,
     progress: bool | Callable[[int], None] | None = None,
@@ -132,6 +133,9 @@ def ensemble(
     chain : int
         Length of chains of runs, each on one core, in which a run starts from the last state of the
         one before, as when a parameter is moved slowly; from its own behind a run that failed.
+    in_all : int, optional
+        Number of runs of a computation that these are part of. Runs with internal variables go side
+        by side if it is 64 or more, whatever the number of these.
     events : ContactEvents, Crossing, Event or sequence of them, optional
         Events to locate; a run that stops at one has no states after it.
     workers : int, optional
@@ -150,6 +154,7 @@ def ensemble(
     require_rtol(rtol)
     require_max_step(max_step)
     chain = as_count(chain, "chain")
+    in_all = None if in_all is None else as_count(in_all, "in_all")
     workers = None if workers is None else as_count(workers, "workers")
     count, kept = instants.shape
     states = np.full((count, kept, state_size(members[0])), np.nan)
@@ -207,7 +212,7 @@ def ensemble(
     together: list[SideBySide] = []
     if method in ("auto", "rodas5p") and not watched:
         together = side_by_side(members, starts, instants, float(rtol), max_step, method,
-                                int(chain))
+                                int(chain), in_all)
     apart = set(range(count)).difference(*(one.numbers for one in together))
     firsts, turn = iter([first for first in range(0, count, chain) if first in apart]), Lock()
 

@@ -54,6 +54,8 @@ class Batch:
         Number of fields in each of them.
     strobe : Strobing or None
         Settings of stroboscopic runs, which keep only the states once per period.
+    in_all : int
+        Number of cases of the sweep.
     """
 
     study: Mapping[str, Any]
@@ -65,6 +67,7 @@ class Batch:
     files: str | None = None
     frames: int = 0
     strobe: Strobing | None = None
+    in_all: int = 1
 
 
 class UnwritableError(FecontactError):
@@ -86,7 +89,8 @@ def run_batch(batch: Batch) -> list[Row]:
     path = None if batch.path is None else Path(batch.path)
     study = Study.from_tables(batch.study, path)
     if batch.strobe is not None:
-        return strobed_rows(batch.cases, batch.strobe, lambda case: prepared(batch, study, case))
+        return strobed_rows(batch.cases, batch.strobe,
+                            lambda case: prepared(batch, study, case), batch.in_all)
     summaries: dict[Any, Functions] = {}
     return [_row(batch, study, case, summaries) for case in batch.cases]
 

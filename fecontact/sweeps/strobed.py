@@ -20,11 +20,13 @@ _PHASES = 8  # states per period, to measure the range of the motion
 
 
 def strobed_rows(
-    cases: Sequence[SweepCase], strobing: Strobing, study_of: Callable[[SweepCase], Study]
+    cases: Sequence[SweepCase], strobing: Strobing, study_of: Callable[[SweepCase], Study],
+    in_all: int,
 ) -> list[Row]:
     """Rows of cases, computed in ensembles of cases with equal numbers of states.
 
-    The results are those of :func:`fecontact.ensemble` for each case alone.
+    The results are those of :func:`fecontact.ensemble` for each case alone, with the number of
+    cases ``in_all``.
     """
     rows: dict[str, Row] = {}
     groups: dict[tuple[int, float], list[tuple[SweepCase, ContactSystem, Array, Array]]] = {}
@@ -44,7 +46,7 @@ def strobed_rows(
         found = ensemble([system for _, system, _, _ in members],
                          np.array([times for _, _, times, _ in members]),
                          initial=np.array([state for _, _, _, state in members]), rtol=rtol,
-                         workers=1)
+                         in_all=in_all, workers=1)
         for (case, system, _, _), states, status in zip(members, found.states, found.status,
                                                         strict=True):
             if status is Status.INTERRUPTED:

@@ -169,7 +169,7 @@ class _Work:
             self.settings.summaries, self.settings.t_start,
             files=str(store.cases.absolute()) if store.files else None,
             frames=self.study.output.frames if self.settings.keep == "fields" else 0,
-            strobe=self.settings.strobe)
+            strobe=self.settings.strobe, in_all=len(self.cases))
         for start in range(0, len(different), size):
             yield replace(common, cases=tuple(different[start : start + size]))
 

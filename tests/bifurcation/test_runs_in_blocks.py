@@ -12,7 +12,7 @@ from concurrent.futures.process import BrokenProcessPool
 
 import numpy as np
 import pytest
-from systems import TURN, impact_oscillator
+from systems import TURN, friction_oscillator, impact_oscillator
 
 from fecontact import AnalysisError, InputError
 from fecontact.bifurcation import Axis, basins, poincare_scan
@@ -21,6 +21,7 @@ from fecontact.bifurcation.attractors.attractor import distinguished
 from fecontact.bifurcation.attractors.blocks import Place, work_off
 from fecontact.bifurcation.attractors.labels import Settled
 from fecontact.integrate import strobe
+from fecontact.laws import DahlFriction
 
 FREQUENCY = "drive.frequency_hz"
 # Impacts once in three periods, and a motion of one period, beside each other.
@@ -30,6 +31,13 @@ PLACES, SPEEDS = np.linspace(-4e-4, 2e-3, 12), np.linspace(-0.06, 0.06, 11)
 def two_motions(**settings):
     return basins(impact_oscillator(1, 47.5), (Axis("B", "y"), PLACES),
                   (Axis("B", "y", "velocity"), SPEEDS), transient_periods=150, keep=8, **settings)
+
+
+def sliding(**settings):
+    """Motions of a mass on a belt whose friction has an internal variable, from 72 starts."""
+    system = friction_oscillator(2, friction=DahlFriction(0.5, 1e5))
+    return basins(system, (Axis("B", "x"), PLACES), (Axis("B", "x", "velocity"), SPEEDS[:6]),
+                  transient_periods=5, keep=4, **settings)
 
 
 def same(one, other):
@@ -130,6 +138,13 @@ def test_a_motion_has_its_least_period():
 def pool():
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as processes:
         yield processes
+
+
+def test_blocks_of_runs_side_by_side_are_as_all_of_them(tmp_path):
+    """Few runs with internal variables are computed one by one: all runs count, not those here."""
+    whole = sliding()
+    assert len(whole.attractors) >= 1
+    same(whole, sliding(folder=tmp_path, workers=1))
 
 
 def test_a_folder_and_processes_change_nothing(tmp_path, pool):

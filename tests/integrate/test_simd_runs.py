@@ -172,6 +172,8 @@ def test_friction_with_internal_variables(name):
     assert not side_by_side(systems[1:], lambda _: state, rows[1:], 1e-7, None, "auto")
     found = ensemble(systems, times, initial=state, rtol=1e-7)
     assert found.finished.all()
+    part = ensemble(systems[:9], times, initial=state, rtol=1e-7, in_all=64)
+    assert (part.states == found.states[:9]).all()
     for k in range(0, 64, 13):
         assert_as_a_single_one(systems[k], state, times, found.states[k], found.steps[k])
 

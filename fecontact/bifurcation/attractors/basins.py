@@ -185,7 +185,7 @@ def basins(
         raise InputError(f"basins: transient = {text_of(transient)} must be a time above zero [s] "
                          f"before passages of the section count, without transient_periods.")
     settle = _Settle(moving, solver, rtol, keep, transient_periods, float(transient or 0.0),
-                     section, tolerance, np.abs(states).max(axis=0))
+                     section, tolerance, np.abs(states).max(axis=0), len(states))
     size_of_block = len(states) if folder is None else int(
         np.clip(len(states) // 64, 16, _LARGEST))
     blocks = [_Starts(settle, part) for part
@@ -203,7 +203,10 @@ def basins(
 
 @dataclass(frozen=True, eq=False)
 class _Settle:
-    """Settings of runs that are followed until they settle; ``farthest`` (size,) of all starts."""
+    """Settings of runs that are followed until they settle.
+
+    ``farthest`` (size,) is that of all starts, ``in_all`` their number.
+    """
 
     moving: Moving
     solver: Solver
@@ -214,13 +217,14 @@ class _Settle:
     section: Crossing | None
     tolerance: float
     farthest: Array
+    in_all: int
 
     def settled(
         self, states: Array, tell: Callable[[int], None] | None, workers: int | None,
     ) -> Settled:
         """Last states of runs from some initial states, and whether they have settled."""
         settings: dict[str, Any] = {"initial": states, "solver": self.solver, "rtol": self.rtol,
-                                    "workers": workers, "progress": tell}
+                                    "in_all": self.in_all, "workers": workers, "progress": tell}
         rows, still = np.full(len(states), -1), np.zeros(len(states), dtype=np.int64)
         if self.section is None:
             found = strobe(self.moving, transient_periods=self.transient_periods or 0,

@@ -181,7 +181,7 @@ def poincare_scan(
     places = [(way, chains_of_way[first : first + together])
               for way, chains_of_way in enumerate(ways)
               for first in range(0, len(order), together)]
-    blocks = [_Chains(task, points[chosen]) for _, chosen in places]
+    blocks = [_Chains(task, points[chosen], order.size * len(ways)) for _, chosen in places]
     known = "" if folder is None else task.fingerprint(points, ends, length, down)
     with shown(progress, lambda: progress_bar("Running", sum(one.runs for one in blocks))) as tell:
         readers = work_off(blocks, place, known, tell)
@@ -225,10 +225,14 @@ class _Task:
 
 @dataclass(frozen=True, eq=False)
 class _Chains:
-    """Values (c, length), each row run one after the other from where the one before it ended."""
+    """Values (c, length), each row run one after the other from where the one before it ended.
+
+    ``in_all`` is the number of runs of all blocks.
+    """
 
     task: _Task
     values: Array
+    in_all: int
 
     @property
     def runs(self) -> int:
@@ -244,7 +248,7 @@ class _Chains:
         runs = [task.system_at(float(value)) for value in self.values.ravel()]
         settings: dict[str, Any] = {
             "initial": task.initial, "solver": task.solver, "rtol": task.rtol, "workers": workers,
-            "progress": tell, "chain": self.values.shape[1]}
+            "progress": tell, "chain": self.values.shape[1], "in_all": self.in_all}
         if task.passes is not None:
             return {"states": _passages(runs, *task.passes, task.keep, **settings)}
         return {"states": strobe(runs, transient_periods=task.transient_periods, keep=task.keep,

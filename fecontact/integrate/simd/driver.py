@@ -242,13 +242,14 @@ class SideBySide:
 
 def side_by_side(
     members: Sequence[Any], state_of: Callable[[int], Array], times: Array, rtol: float,
-    max_step: float | None, method: str, chain: int = 1,
+    max_step: float | None, method: str, chain: int = 1, in_all: int | None = None,
 ) -> list[SideBySide]:
     """The runs of an ensemble that go through lanes, kind by kind; chains as a whole.
 
     Runs whose motion is expanded in power series, which takes less time, are left out, and so are
-    few runs with internal variables.
+    runs with internal variables if there are few ``in_all``.
     """
+    many = (in_all or len(members)) >= _MANY
     kinds: dict[Kind, list[int]] = {}
     known: dict[tuple[int, float, float], Kind | None] = {}
 
@@ -273,7 +274,7 @@ def side_by_side(
     return [SideBySide(one, numbers, [members[index] for index in numbers],
                        partial(_state_of, state_of, numbers),
                        [index % chain != 0 for index in numbers], times[numbers], rtol, max_step)
-            for one, numbers in kinds.items() if one.size[2] == 0 or len(numbers) >= _MANY]
+            for one, numbers in kinds.items() if one.size[2] == 0 or many]
 
 
 def _key(member: Any, times: Array) -> tuple[int, float, float]:
