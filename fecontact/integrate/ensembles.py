@@ -108,12 +108,11 @@ def ensemble(
 ) -> Ensemble:
     """Run many systems or fields, or one from many initial states; keep states at a few times.
 
-    The results are those of :func:`fecontact.simulate`, except that compiled solvers do not
-    integrate powers, which do not limit their steps. Threads share the cores. On each, eight runs
-    of plane systems of one node and up to three modes, or two of each, go side by side: on level
-    and even ground, with friction of at most eight internal variables per node, constant or
-    harmonic excitation, no events, by Rodas5P, or Auto at any tolerance. They differ by rounding
-    from single runs without it.
+    The results are those of :func:`fecontact.simulate`, but compiled solvers integrate no powers,
+    which limit no steps. Threads share the cores. On each, eight runs of plane systems of one node
+    and up to three modes, or two of each, go side by side: on level and even ground, with at most
+    eight internal variables per node, constant or harmonic excitation, no events, by Rodas5P, or
+    Auto at any tolerance. They differ by rounding from single runs without it.
 
     Parameters
     ----------
@@ -134,8 +133,8 @@ def ensemble(
         Length of chains of runs, each on one core, in which a run starts from the last state of the
         one before, as when a parameter is moved slowly; from its own behind a run that failed.
     in_all : int, optional
-        Number of runs of a computation that these are part of. Runs with internal variables go side
-        by side if it is 64 or more, whatever the number of these.
+        Number of runs that these are part of: from 64 on those with internal variables are among
+        the eight.
     events : ContactEvents, Crossing, Event or sequence of them, optional
         Events to locate; a run that stops at one has no states after it.
     workers : int, optional

@@ -2,7 +2,7 @@
 
 They serve runs of many small systems side by side (:mod:`fecontact.integrate.simd`). Arguments and
 results are those of :mod:`fecontact.laws.signatures`, eight of each. A law whose branches only
-choose values by :func:`fecontact.core.simd.functions.select` is compiled for eight numbers; one
+choose values by :func:`fecontact.core.simd.vectors.select` is compiled for eight numbers; one
 with other branches is called for one lane after the other.
 """
 

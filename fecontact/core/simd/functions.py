@@ -1,9 +1,9 @@
 """Functions that take one number or eight, so that a kernel is written once for both.
 
 ``math.exp``, ``log``, ``sqrt``, ``atan``, ``tanh``, ``abs``, ``min``, ``max`` and powers take eight
-numbers too, and a float beside eight numbers counts as eight equal ones. :func:`select` replaces a
-branch that chooses a value, since SIMD lanes share their branches; :func:`somewhere` and
-:func:`everywhere` guard work that no lane needs.
+numbers too, and a float beside eight numbers counts as eight equal ones. What replaces branches,
+which SIMD lanes share, is in :mod:`fecontact.core.simd.vectors`: ``select`` chooses a value;
+``somewhere`` and ``everywhere`` guard work that no lane needs.
 
 Functions of the C library take one number at a time, and a vector library that numba would use is
 not part of its wheels. The elementary functions of eight numbers here reduce the argument to a
