@@ -276,7 +276,7 @@ def _missed_part(lane, step, b, spare):
 
 @routine
 def _attend(kind, lane, step, b, spare):
-    """What is to be done about elastic Coulomb elements in a lane: as ``attend``.
+    """Attend to elastic Coulomb elements in a lane, as ``attend`` in a run.
 
     Where it returns 0, the state at the begin of the step has changed.
     """
