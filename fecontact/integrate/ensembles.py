@@ -133,8 +133,8 @@ def ensemble(
         Length of chains of runs, each on one core, in which a run starts from the last state of the
         one before, as when a parameter is moved slowly; from its own behind a run that failed.
     in_all : int, optional
-        Number of runs that these are part of: from 64 on those with internal variables are among
-        the eight.
+        Number of runs that these are part of, if there are more: from 64 on those with internal
+        variables go side by side.
     events : ContactEvents, Crossing, Event or sequence of them, optional
         Events to locate; a run that stops at one has no states after it.
     workers : int, optional

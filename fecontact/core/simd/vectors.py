@@ -220,7 +220,7 @@ def everywhere(where: Any) -> Any:
 
 
 def opposite(where: Any) -> Any:
-    """Where a condition is false, of one number or of eight."""
+    """The opposite of a condition, of one number or of eight."""
     return not where
 
 

@@ -249,7 +249,7 @@ def side_by_side(
     Runs whose motion is expanded in power series, which takes less time, are left out, and so are
     runs with internal variables if there are few ``in_all``.
     """
-    many = (in_all or len(members)) >= _MANY
+    many = max(in_all or 0, len(members)) >= _MANY
     kinds: dict[Kind, list[int]] = {}
     known: dict[tuple[int, float, float], Kind | None] = {}
 
