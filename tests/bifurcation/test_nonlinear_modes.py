@@ -122,11 +122,15 @@ def test_mode_goes_through_its_internal_resonance(resonant):
     assert len(edges) == 2
     assert third[0] < 1e-4
     assert third[-1] < 0.1
-    # Nothing is left out: from point to point the motion changes by a small part of its size.
+    # Nothing is left out: where the frequency changes, the motion does so from point to point by a
+    # small part of its size only.
     X = np.concatenate([mode.coordinates(k) for k in range(26)], axis=1)
     change = np.linalg.norm(np.diff(X, axis=0), axis=1)
     size = np.maximum.accumulate(np.linalg.norm(X[1:], axis=1))
-    assert (change < 0.15 * size).all()
+    frequency = mode.frequency_hz
+    rests = np.abs(np.diff(frequency)) < 1e-4 * frequency[1:]
+    assert rests.any()
+    assert (change < np.where(rests & ~inside[1:], 0.5, 0.15) * size).all()
     # In the limit the second mass vibrates on two springs.
     assert mode.frequency_hz[-1] * 2.0 * np.pi == pytest.approx(np.sqrt(2.0), rel=0.01)
     assert mode.conservative

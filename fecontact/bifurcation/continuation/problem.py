@@ -101,9 +101,6 @@ class Problem(Protocol):
     keeps_matrix : bool
         Whether the corrector reuses its factorised matrix (chord method with Broyden updates); for
         problems whose factorisation costs far more than a residual and a solve.
-    long_steps : bool
-        Whether steps may be longer than the largest one where a branch is straight, as long as the
-        parameter changes by no more than that.
     polishes : bool
         Whether a solution found with such a matrix gets one more step with its own one.
     precision : float
@@ -118,7 +115,6 @@ class Problem(Protocol):
     """
 
     keeps_matrix: ClassVar[bool] = False
-    long_steps: ClassVar[bool] = False
     polishes: ClassVar[bool] = False
     precision: float = 1e-12
     event_precision: ClassVar[float] = 1e-12
@@ -129,6 +125,13 @@ class Problem(Protocol):
     def kinked(self) -> bool:
         """Whether the equations may have kinks, where Newton's method suddenly converges slowly."""
         return False
+
+    def longest_step(self, tangent: Array, turn: float, options: "ContinuationOptions") -> float:
+        """Largest step from a point to which Newton's method converged at once.
+
+        ``turn`` is the angle between the tangent there and at the point before [rad].
+        """
+        return options.largest_step
 
     def linearise(self, u: Array) -> Linearisation:
         """Linearise the equations at u.
@@ -293,7 +296,8 @@ class ContinuationOptions:
     ----------
     step, smallest_step, largest_step : float
         First step, and limits of the steps. On straight parts of branches of equilibria the largest
-        step is the largest change of the parameter, in widths of the diagram.
+        step is the largest change of the parameter, in widths of the diagram; along a mode without
+        losses steps are up to four times as long where the frequency hardly changes.
     points : int
         Number of regular points after which the branch ends. To both sides they count together; if
         they do not suffice, each gets half of them, or what the other one leaves.

@@ -33,9 +33,9 @@ _CORNER_STEP = 1e-3
 _HALVINGS = 2
 # Factor between lengths tried beyond close corners.
 _FARTHER = 8.0
-# Newton steps of one that converges at once, turn on a step [rad] that counts as straight, and rate
-# of the parameter, in widths of the diagram, below which it rests.
-_AT_ONCE, _STRAIGHT, _RESTS = 2, 0.02, 1e-8
+# Newton steps of one that converges at once, and the factor by which a step above the largest one
+# may be longer than what its end allows.
+_AT_ONCE, _TOO_LONG = 2, 2.0
 # Overshoot of a bound by at most this factor: beyond it the motion may not exist.
 _OVERSHOOT = 1.2
 # Relative distance from a bound at which a start lies on it.
@@ -115,7 +115,8 @@ def continuation(
                 step = batch.step
                 continue
         # Scales that have grown make the same step longer.
-        step = min(step, _longest(problem, here, options), _OVERSHOOT * _to_bounds(here, options))
+        step = min(step, problem.longest_step(here.tangent, 0.0, options),
+                   _OVERSHOOT * _to_bounds(here, options))
         rounded = False
         try:
             reached = _step(problem, here, step, options)
@@ -264,7 +265,7 @@ def _step(
         return None
     there = finished(problem, *found, row, options)
     short = step < _CORNER_STEP * options.step
-    if not _believable(problem, here, there, options):
+    if not _believable(problem, here, there, step, options):
         if not short:
             return None
         # A corner; past one that is sharper than a right angle the tangent leads back.
@@ -299,13 +300,20 @@ def _to_bounds(here: Solution, options: ContinuationOptions) -> float:
 
 
 def _believable(
-    problem: Problem, here: Solution, there: Solution, options: ContinuationOptions
+    problem: Problem, here: Solution, there: Solution, step: float, options: ContinuationOptions
 ) -> bool:
-    """Whether tangent and chord turn by no more than the largest turn."""
+    """Whether tangent and chord turn by no more than the largest turn, and the length is right."""
     row = problem.weights() * here.tangent
-    chord = there.u - here.u
-    return min(float(row @ there.tangent), float(row @ chord) / norm(problem, chord)) >= np.cos(
-        options.largest_turn)
+    chord, along = there.u - here.u, float(row @ there.tangent)
+    if min(along, float(row @ chord) / norm(problem, chord)) < np.cos(options.largest_turn):
+        return False
+    return step <= options.largest_step or step <= _TOO_LONG * problem.longest_step(
+        there.tangent, _angle(along), options)
+
+
+def _angle(cosine: float) -> float:
+    """Angle [rad] between unit vectors; rounding may take their product above one."""
+    return float(np.arccos(min(1.0, cosine)))
 
 
 def _next_step(
@@ -313,24 +321,16 @@ def _next_step(
 ) -> float:
     """Step length from the Newton steps that the last one took, and from the turn on it.
 
-    The largest step is one along the branch; where the branch is straight and Newton's method
-    converges at once, it is one of the parameter, if the problem allows that.
+    Where Newton's method converges at once, the problem may allow steps above the largest one.
     """
     factor = {1: 2.0, 2: 2.0, 3: 1.5, 4: 1.1}.get(there.iterations, 0.7)
-    turn = np.arccos(min(1.0, float(problem.weights() * here.tangent @ there.tangent)))
+    turn = _angle(float(problem.weights() * here.tangent @ there.tangent))
     if turn > 0.0:
         factor = min(factor, max(0.5, 0.5 * options.largest_turn / turn))
-    straight = there.iterations <= _AT_ONCE and turn < _STRAIGHT
-    return min(factor * step,
-               _longest(problem, there, options) if straight else options.largest_step)
-
-
-def _longest(problem: Problem, here: Solution, options: ContinuationOptions) -> float:
-    """Largest step of a straight branch."""
-    rate = abs(float(here.tangent[-1])) * float(np.sqrt(problem.weights()[-1]))
-    if not (problem.long_steps and _RESTS < rate < 1.0):
-        return options.largest_step
-    return options.largest_step / rate
+    longest = options.largest_step
+    if there.iterations <= _AT_ONCE:
+        longest = problem.longest_step(there.tangent, turn, options)
+    return min(factor * step, longest)
 
 
 def _passes(

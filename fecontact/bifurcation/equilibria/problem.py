@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.problem import Problem
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
 from fecontact.bifurcation.equilibria.equilibrium import (
     Equilibrium,
     default_scales,
@@ -36,6 +36,9 @@ _OVERFLOW = 1e100
 # Crossing speed along the branch, relative to the largest eigenvalue, below which a pair stays on
 # the imaginary axis, as those of undamped modes do.
 _CROSSING = 1e-11
+# Turn on a step [rad] that counts as straight, and rate of the parameter, in widths of the diagram,
+# below which it rests.
+_STRAIGHT, _RESTS = 0.02, 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +62,6 @@ class _Bordered:
 
 class EquilibriumProblem(Problem):
     """f(x, p) = 0 with one parameter of the field free; unknowns u = [x, p]."""
-
-    long_steps: ClassVar[bool] = True
 
     def __init__(
         self, field: VectorField, values: Array, index: int, scales: Array, width: float,
@@ -88,6 +89,13 @@ class EquilibriumProblem(Problem):
     def weights(self) -> Array:
         """From the scales of the states and the width of the diagram."""
         return self._weights
+
+    def longest_step(self, tangent: Array, turn: float, options: ContinuationOptions) -> float:
+        """Largest change of the parameter, in widths of the diagram, on straight parts."""
+        rate = abs(float(tangent[-1])) * float(np.sqrt(self._weights[-1]))
+        if turn >= _STRAIGHT or not _RESTS < rate < 1.0:
+            return options.largest_step
+        return options.largest_step / rate
 
     def adapted(self, u: Array, tangent: Array) -> tuple[Problem, Array, Array] | None:
         """Problem with scales that grow with the states; None if scales were given, or suffice."""
