@@ -24,14 +24,16 @@ SLOW = {"test_documentation", "test_examples", "test_validation_cases", "test_be
         "test_half_space_compliance", "test_errors_of_fast_modes", "test_flights_from_stops",
         "test_orbits_by_shooting", "test_open", "test_mode_command",
         "test_large_deflection_modes", "test_fit_command", "test_resonances",
-        "test_tori", "test_intervals_along_branches"}
+        "test_tori", "test_intervals_along_branches", "test_hairpin", "test_corner_of_stick_slip",
+        "test_borders_of_stops", "test_codim2_switching", "test_tori_with_friction",
+        "test_static_friction_borders"}
 
 # Files whose tests start processes, draw movies, compile or follow motions for long.
 LONG = {
     "test_kinks_between_samples", "test_modes_at_an_amplitude", "test_bad_arguments",
     "test_damaged_caches", "test_prebuilt", "test_memory_laws", "test_laws_by_name",
     "test_plots", "test_sweep_statistics", "test_assembled",
-    "test_hairpin", "test_closed_and_flat_branches", "test_shooting", "test_orbit_curves",
+    "test_closed_and_flat_branches", "test_shooting", "test_orbit_curves",
     "test_critical_orbits", "test_intervals_along_curves",
     "test_changes_of_stability", "test_curves", "test_condensation", "test_diagrams",
     "test_bernstein", "test_harmonic_balance", "test_harmonics_of_orbits",
@@ -41,7 +43,6 @@ LONG = {
     "test_compiled_steps", "test_derivatives_of_steps", "test_compiled_bodies",
     "test_responses_of_bodies", "test_response_bifurcations",
     "test_benchmark_integrator", "test_impact_oscillator", "test_sliding_beam", "test_limits",
-    "test_borders_of_stops", "test_corner_of_stick_slip",
     "test_set_valued_beam", "test_sliding_bifurcations", "test_friction_oscillator",
     "test_disc_and_pads",
     "test_friction_damper", "test_lap_joint", "test_tipping_pad", "test_disc_brake",
@@ -67,8 +68,8 @@ LONG = {
     "test_simulate", "test_set_valued_space", "test_compliant_lift_off",
     "test_near_solver", "test_runs_in_blocks", "test_pickled_systems", "test_study_convergence",
     "test_executors", "test_event_branches", "test_homoclinic_by_projection",
-    "test_codim2_switching", "test_sampling_error", "test_ends_by_method", "test_canards",
-    "test_static_friction_borders", "test_touch_down", "test_fitted_models", "test_fit_statistics",
+    "test_sampling_error", "test_ends_by_method", "test_canards",
+    "test_touch_down", "test_fitted_models", "test_fit_statistics",
     "test_ring_down",
 }
 

@@ -237,7 +237,7 @@ print(simulate(mass, 0.01, outputs=3, solver=Scipy()).status.name)
 
 
 @pytest.mark.parametrize(("code", "output"), [
-    (OWN_KERNELS, "0 0"), pytest.param(ONE_MASS, "FINISHED", marks=pytest.mark.long)])
+    (OWN_KERNELS, "0 0"), pytest.param(ONE_MASS, "FINISHED", marks=pytest.mark.slow)])
 def test_code_is_compiled_in_memory_where_no_folder_can_store_it(tmp_path, code, output):
     (tmp_path / "own_kernels.py").write_text(MODULE)
     done = subprocess.run([sys.executable, "-c", NOWHERE + code, tmp_path], check=False,

@@ -12,7 +12,6 @@ import fecontact as fc
 from fecontact import ContactSystem, Drive, Ground, Load, PointLoad, simulate
 from fecontact.integrate import Radau, Rodas5P, step_loop
 from fecontact.integrate.collocation import tableau
-from fecontact.integrate.collocation.step_polynomials import first_switch
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.rodas5p.state import WORST_NODE
 from fecontact.integrate.step_loop import REJECTIONS
@@ -22,7 +21,6 @@ from fecontact.laws import (
     BilateralPolynomial,
     ConstantFriction,
     ExponentialFriction,
-    Frictionless,
     LinearContact,
     NormalLaw,
     PerNode,
@@ -252,19 +250,3 @@ def test_nodes_in_a_gap_end_no_steps(normal, speed):
         assert x == pytest.approx(wanted, abs=1e-8)
     assert run.statistics["rejected"] < 15
     assert run.statistics["steps"] < 550
-
-
-# Forces that vanish for a moment ------------------------------------------------------------------
-
-def test_force_that_vanishes_and_returns_within_a_step():
-    """F = c u + d v vanishes by damping at a constant penetration, where v passes -c u / d."""
-    c, d, u, begin, width, beyond = 1e4, 100.0, 1e-3, 0.625, 0.05, 1e-3
-    system = mass_in_y(normal=LinearContact(c, d), friction=Frictionless(), load=Load(10.0))
-    run = driver.start(system, np.array([-u, 0.0]), np.linspace(0.0, 1.0, 3), rtol=1e-8,
-                       method="radau")
-    # By powers of x = 2 s - 1: y = -u and y' = c u / d + beyond (1 - ((x - middle) / width)^2).
-    middle = 2.0 * begin - 1.0 + width
-    step, bend = run.collocation, beyond / width**2
-    step.places[0, 0] = -u
-    step.rates[:3, 0] = c * u / d + beyond - bend * middle**2, 2.0 * bend * middle, -bend
-    assert first_switch(1e-9, run.problem, step) == pytest.approx(begin, abs=1e-9)

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 import fecontact as fc
+from fecontact.core.compiled import kernel
+from fecontact.core.records import Matrix, Vector
 from fecontact.integrate import ContactEvents, Rodas5P, near_nodes
 from fecontact.integrate.rodas5p import driver, stage_solver
 from fecontact.integrate.rodas5p.blocks import FEW
+from fecontact.integrate.rodas5p.state import Problem, Progress, Workspace
 from fecontact.laws import (
     ConstantFriction,
     ExponentialContact,
@@ -21,6 +24,21 @@ from fecontact.laws import (
 
 NODES = 60
 FRICTION = ExponentialFriction(0.8, 0.55, 1000.0, 1e4)
+
+
+@kernel
+def choose(h: float, problem: Problem, progress: Progress, workspace: Workspace) -> None:
+    near_nodes.choose_near(h, problem, progress, workspace)
+
+
+@kernel
+def extend(y: Vector, problem: Problem, progress: Progress, workspace: Workspace) -> None:
+    near_nodes.extend_near(y, problem, progress, workspace)
+
+
+@kernel
+def multiply(a: Matrix, b: Matrix, out: Matrix) -> None:
+    stage_solver.products(a, b, out)
 
 
 def beam(**changes):
@@ -134,10 +152,10 @@ def test_states_far_from_the_start_find_their_nodes():
     blocks, near, rng = problem.blocks, workspace.near, np.random.default_rng(1)
     counts = []
     for size in 10.0 ** rng.uniform(-9.0, -4.0, 40):
-        near_nodes.choose_near(1e-12, problem, progress, workspace)
+        choose(1e-12, problem, progress, workspace)
         before = near.nodes[: near.used[0]].tolist()
         y = progress.state + size * rng.normal(size=10)
-        near_nodes.extend_near(y, problem, progress, workspace)
+        extend(y, problem, progress, workspace)
         k = near.used[0]
         found = near.nodes[:k].tolist()
         gaps = problem.system.rows[:, 1] @ y[:5] + problem.system.gap
@@ -194,7 +212,7 @@ def test_products_of_rows(rows, columns, length):
     rng = np.random.default_rng(rows)
     a, b = rng.normal(size=(rows, length)), rng.normal(size=(columns, length))
     out = np.full((rows, columns), np.nan)
-    stage_solver.products(a, b, out)
+    multiply(a, b, out)
     assert out == pytest.approx(a @ b.T, rel=1e-13, abs=1e-12)
 
 

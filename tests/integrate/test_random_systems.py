@@ -108,8 +108,9 @@ def test_steps_that_end_just_short_of_slip_do_not_shrink_to_nothing(systems):
     assert np.isfinite(found.monodromy).all()
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-8])
-@pytest.mark.parametrize("aside", [0, 3, 5, 7])
+@pytest.mark.parametrize(("rtol", "aside"), [
+    (1e-6, 0), (1e-6, 3), (1e-6, 5), (1e-6, 7), (1e-8, 0), (1e-8, 7),
+    pytest.param(1e-8, 3, marks=pytest.mark.slow), pytest.param(1e-8, 5, marks=pytest.mark.slow)])
 def test_steps_with_derivatives_go_on_where_sliding_elements_lift_off_in_space(
     systems, rtol, aside,
 ):
@@ -120,8 +121,10 @@ def test_steps_with_derivatives_go_on_where_sliding_elements_lift_off_in_space(
     """
     case = systems.random_case(107)
     start = (1.0 + 1e-13 * aside) * case.state
-    found = fc.sensitivity(case.system, 0.05, initial=start, rtol=rtol,
-                           outputs=np.linspace(0.0, 0.05, 11))
+    # Contacts begin and end some ten times until then.
+    end = 0.05 if rtol > 1e-7 else 0.02
+    found = fc.sensitivity(case.system, end, initial=start, rtol=rtol,
+                           outputs=np.linspace(0.0, end, 11))
     assert not found.note
     assert np.isfinite(found.monodromy).all()
 

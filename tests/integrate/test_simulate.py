@@ -276,7 +276,8 @@ def test_third_mode_vibrates_at_the_drive_while_the_contact_sticks():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("w", "repeats"), [(64.32, 1), (30.84, 2), (37.41, 4)])
+@pytest.mark.parametrize(("w", "repeats"), [
+    (64.32, 1), (30.84, 2), pytest.param(37.41, 4, marks=pytest.mark.slow)])
 def test_regimes_of_the_impact_oscillator(w, repeats):
     period = 2.0 * np.pi / w
     times = np.concatenate([[0.0], np.linspace(52.0, 60.0, 8 * 200 + 1) * period])

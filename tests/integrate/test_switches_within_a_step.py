@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from systems import mass_in_y
 
+from fecontact import Load
 from fecontact.core.compiled import kernel
 from fecontact.integrate.collocation.step_polynomials import first_switch
 from fecontact.integrate.collocation.workspace import Collocation, collocation_for
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.rodas5p.state import Problem
-from fecontact.laws import RoughSurface
+from fecontact.laws import Frictionless, LinearContact, RoughSurface
 
 STIFFNESS, HEIGHT = 1e6, 1e-5
 
@@ -46,3 +47,17 @@ def test_depth_passed_twice(damping, switch):
     if switch != -0.5:
         assert zero(damping, switch) == pytest.approx(0.0, abs=1e-12)
     assert found(1e-9, run.problem, c) == pytest.approx(0.5 * (switch + 1.0), abs=1e-12)
+
+
+def test_force_that_vanishes_and_returns_within_a_step():
+    """F = c u + d v vanishes by damping at a constant penetration, where v passes -c u / d."""
+    c, d, u, begin, width, beyond = 1e4, 100.0, 1e-3, 0.625, 0.05, 1e-3
+    system = mass_in_y(normal=LinearContact(c, d), friction=Frictionless(), load=Load(10.0))
+    run = driver.start(system, np.array([-u, 0.0]), np.linspace(0.0, 1.0, 3), rtol=1e-8,
+                       method="radau")
+    # By powers of x = 2 s - 1: y = -u and y' = c u / d + beyond (1 - ((x - middle) / width)^2).
+    middle = 2.0 * begin - 1.0 + width
+    step, bend = run.collocation, beyond / width**2
+    step.places[0, 0] = -u
+    step.rates[:3, 0] = c * u / d + beyond - bend * middle**2, 2.0 * bend * middle, -bend
+    assert found(1e-9, run.problem, step) == pytest.approx(begin, abs=1e-9)

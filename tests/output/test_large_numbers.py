@@ -67,7 +67,8 @@ def test_fields_are_linear_in_the_coordinates(run):
                                    atol=1e-9 * HUGE * np.abs(once).max())
 
 
-@pytest.mark.parametrize("size", [HUGE, 2.0**980])
+@pytest.mark.parametrize("size", [
+    pytest.param(HUGE, marks=pytest.mark.slow), 2.0**980])
 @pytest.mark.long
 def test_every_plot_and_file_is_made_or_refused_in_a_sentence(
     size, run, tmp_path, monkeypatch, capsys

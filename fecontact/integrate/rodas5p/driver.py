@@ -213,9 +213,10 @@ def _progress(system: ContactSystem, control: Control, times: Array, state: Arra
 
 def _moved_both_ways(system: ContactSystem, above: ContactSystem, below: ContactSystem) -> int:
     """Whether both systems differ from the system itself."""
-    return int(not any(all(np.array_equal(np.asarray(one), np.asarray(other)) for one, other
-                           in zip(system.arrays, moved.arrays, strict=True))
-                       for moved in (above, below)))
+    return int(not any(moved is system or all(
+        np.array_equal(np.asarray(one), np.asarray(other))
+        for one, other in zip(system.arrays, moved.arrays, strict=True))
+        for moved in (above, below)))
 
 
 def control_for(
