@@ -47,7 +47,7 @@ test-fast: $(READY) $(ALL) $(SYSTEM) ## run the tests that take seconds
 test: $(READY) $(ALL) $(SYSTEM) ## run all tests but the slow ones
 	@$(BIN)/python -m pytest -q -n auto
 
-test-slow: $(READY) $(ALL) $(SYSTEM) ## run documents and examples, and what takes a minute or more
+test-slow: $(READY) $(ALL) $(SYSTEM) ## run documents and examples, and what takes long
 	@$(BIN)/python -m pytest -q -n auto -m slow
 	@$(MAKE) --no-print-directory test-variant TESTS="$(ROUNDED)"
 

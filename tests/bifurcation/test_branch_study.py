@@ -224,6 +224,7 @@ harmonics = 15
     assert ranges[0] == pytest.approx(ranges[1], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_study_follows_tori(tmp_path):
     path = tmp_path / "waves.toml"
     path.write_text(on_waves() + """

@@ -161,6 +161,7 @@ def test_crossings_and_periods_are_those_of_the_plane():
     assert Axis("B", "phi_z").row(impacts_in_space()).shape == (6,)
 
 
+@pytest.mark.slow
 def test_basins_are_those_of_the_plane():
     """Inside of an unstable cycle sliding, outside stick-slip."""
     v, x = np.array([0.0, 9e-3]), np.array([1.372e-3, 1.6e-3, 3.0e-3])

@@ -55,6 +55,7 @@ def test_explosions_have_no_false_folds(slowness, intervals):
     assert f"Multipliers of {lost.sum()} orbits are lost in rounding" in orbits.message
 
 
+@pytest.mark.slow
 def test_location_costs_little_on_an_explosion():
     pairs = [[explosion(0.02, 80, locate)[1] for locate in (False, True)] for _ in range(3)]
     # Searches for special points that rounding feigns took some fifteen times as long.

@@ -71,6 +71,7 @@ def test_orbits_are_those_of_free_responses():
     assert {bool(point.values["stable"]) for point in held} == {True, False}
 
 
+@pytest.mark.slow
 def test_force_of_a_friction_damper():
     """One harmonic of a Jenkins element, against its describing function."""
     found = controlled_response(
@@ -147,6 +148,7 @@ def file(tmp_path, monkeypatch):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["options", "section"])
 def test_command(cli, file, how):
     """The force that holds a small amplitude of a block that sticks, from a study."""

@@ -126,6 +126,7 @@ def mode():
                           method=HarmonicBalance(1, 256))
 
 
+@pytest.mark.slow
 def test_modes_run_through_first_slip(mode):
     assert mode.branch.status.name == "BOUND"
     assert mode.amplitude[-1] == pytest.approx(4.0, rel=1e-6)

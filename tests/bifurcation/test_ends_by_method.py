@@ -73,6 +73,7 @@ def between():
     return field, equilibrium_branch(field, parameter="p", bounds=(0.7, 2.3)).of_kind("Hopf")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [Collocation(30), Shooting(1), Shooting(2), Shooting(4)])
 def test_orbits_of_two_masses_between_two_hopf_points(between, method):
     field, (first, last) = between

@@ -86,6 +86,7 @@ def test_time_stepping_is_differenced():
     assert found[np.argsort(found.imag)] == pytest.approx(known[np.argsort(known.imag)], abs=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nodes", "instead"), [
     (1, r"EventDriven\(\)"), (2, r"smoothing_slope and Auto\(\)")])
 def test_time_stepping_of_stick_slip_names_what_to_take(nodes, instead):

@@ -50,6 +50,7 @@ def test_levels_of_the_duffing_oscillator(response):
         assert p[1] == level
 
 
+@pytest.mark.slow
 def test_one_harmonic_meets_the_cubic_equation_of_its_amplitude():
     """[(1 - W^2) A + 3/4 .1 A^3]^2 + (.05 W A)^2 = P^2 along the whole branch, phase included."""
     found = frequency_response(duffing(), (0.6, 1.8), "W", method=HarmonicBalance(1))
@@ -65,6 +66,7 @@ def test_one_harmonic_meets_the_cubic_equation_of_its_amplitude():
     assert (np.diff(found.phase()) < 1e-6).all()
 
 
+@pytest.mark.slow
 def test_one_harmonic_of_a_jenkins_element_over_frequency_and_force():
     system = jenkins_system()
     method, coarse = HarmonicBalance(1, samples=256), ContinuationOptions(largest_step=0.2)

@@ -101,6 +101,7 @@ def test_duffing_response_is_that_of_harmonic_balance(method):
     assert found.phase()[[0, -1]] == pytest.approx(exact.phase()[[0, -1]], abs=1e-4)
 
 
+@pytest.mark.slow
 def test_jenkins_response_by_shooting_is_that_of_harmonic_balance():
     """Levels at which the element slides: amplitudes and third harmonics of the first points."""
     levels, bounds = {"drive.amplitude_x": [4.0, 5.0]}, (0.9 / TURN, 1.3 / TURN)

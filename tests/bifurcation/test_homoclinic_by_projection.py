@@ -339,6 +339,7 @@ def left_over(a, drive):
     return run.y[0, -1]
 
 
+@pytest.mark.slow
 def test_rotations_of_a_pendulum():
     """I = (4 / pi) a + O(a^3), up to where the saddle meets the equilibrium below, I = 1."""
     from scipy.integrate import solve_ivp

@@ -96,6 +96,7 @@ def stop_frequency(amplitude):
     return np.pi / motion(top)[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", [0.0, 0.05])
 def test_shooting_through_impacts_of_a_stop(loss, tmp_path):
     """The linear motion until it touches, then two arcs; the damping of the mass is xi."""

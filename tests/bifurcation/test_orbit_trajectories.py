@@ -139,6 +139,7 @@ def test_what_has_no_trajectory_says_so(block_branches, unilateral_points):
         point.trajectory(vector_field(still, {"a": 1.0}, 1))
 
 
+@pytest.mark.slow
 def test_nonlinear_mode_by_the_command(cli, tmp_path, monkeypatch):
     """Stuck: the linear frequency; sliding far: a constant friction force of S = 5.6 N."""
     monkeypatch.chdir(tmp_path)

@@ -52,6 +52,7 @@ def test_response_of_a_block_held_by_friction(cli, file):
     assert read_system(results / "block-response.h5").drive.stiffness_x == 5610.0
 
 
+@pytest.mark.slow
 def test_template_of_responses(cli, file):
     """The smallest level sticks throughout; larger ones slide, at lower frequencies."""
     code, said, _ = cli("init", "held.toml", "--shape", "response")
@@ -86,6 +87,7 @@ def test_command_line_overrides_the_section(cli, file):
     assert found.branches[0].parameter[[0, -1]] == pytest.approx([9.0, 10.0])
 
 
+@pytest.mark.slow
 def test_a_list_of_harmonics(cli, file):
     """The list is given by option, by the section, and for modes; the file holds the list."""
     for how in (["--harmonics", "0,1,3"], ["--set", "response.harmonics=[0,1,3]"]):
@@ -195,6 +197,7 @@ MESHED = STUDY.replace('shape = "block", contact_length = 0.08, element_size = 0
                        'file = "part.msh"')
 
 
+@pytest.mark.slow
 def test_results_are_of_the_files_that_the_study_named(cli, file):
     """Another mesh under the same name is not mixed with results of the first one."""
     results = file.parent / "results"
@@ -287,6 +290,7 @@ def test_settings_are_written_and_read_again():
     assert ResponseSettings(bounds=(8.0, 13.0), start=10.0).first == 10.0
 
 
+@pytest.mark.slow
 def test_orbits_of_the_file_are_drawn_and_reported(cli, file, monkeypatch):
     assert cli("response", file)[0] == 0
     stored = file.parent / "results" / "block-response.h5"

@@ -49,6 +49,7 @@ def last_period(system, period, count, rtol=1e-8):
     return run.states, np.abs(ends[-1] - ends[-2]).max() / np.abs(ends[-1]).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [
     JenkinsFriction(4e4, 0.3),
     IwanFriction(8e4, 0.3, elements=2)])

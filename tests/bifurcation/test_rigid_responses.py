@@ -99,6 +99,7 @@ def impacts(w, loss, restitution):
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_rigid_stop_from_impacts_over_the_fold_to_free_motion():
     """Stable impacts up to a fold, unstable ones back to where they graze, then none."""
     loss, restitution = 0.1, 0.8

@@ -147,6 +147,7 @@ def test_blocks_of_runs_side_by_side_are_as_all_of_them(tmp_path):
     same(whole, sliding(folder=tmp_path, workers=1))
 
 
+@pytest.mark.slow
 def test_a_folder_and_processes_change_nothing(tmp_path, pool):
     plain = two_motions(workers=1)
     assert len(plain.attractors) > 1

@@ -68,6 +68,7 @@ def test_it_is_the_distance_to_the_describing_function(w, samples):
     assert 0.5 * off < sampling_error(problem, u, fixed(u)) < 2.0 * off
 
 
+@pytest.mark.slow
 def test_along_a_branch_it_is_the_distance_at_right_angles():
     """From the curve of the describing function."""
     branch = frequency_response(

@@ -106,6 +106,7 @@ def over_speed():
         options=ContinuationOptions(step=0.02))
 
 
+@pytest.mark.slow
 def test_end_of_stick_slip_and_its_curve(tmp_path):
     speed = 0.97 * last_speed(0.1)
     system = belt(speed, 0.1)
@@ -134,6 +135,7 @@ def test_end_of_stick_slip_and_its_curve(tmp_path):
     assert curve.points[0].values["period"] > 0.0
 
 
+@pytest.mark.slow
 def test_crossing_switching_and_grazing_sliding(over_speed):
     _, branch = over_speed
     found = [(point.kind, point.persists) for point in branch.special]
@@ -241,6 +243,7 @@ def impact_orbit(w, amplitude, lift, e=0.8):
     return found
 
 
+@pytest.mark.slow
 def test_grazing_of_a_stop_and_the_orbits_with_impacts():
     system = impacting()
     field = contact_field(system, ["drive.amplitude_y", "drive.frequency_hz"])

@@ -9,6 +9,7 @@ from scripts_for_tests import ROOT
 from fecontact.bifurcation import contact_field, find_equilibrium
 
 
+@pytest.mark.slow
 def test_points_of_the_border_have_a_mode_without_damping(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     found = runpy.run_path(str(ROOT / "examples" / "squeal.py"))

@@ -199,6 +199,7 @@ def test_self_excited_vibration_under_a_drive_finds_its_frequency():
     assert point.values["stable"]
 
 
+@pytest.mark.slow
 def test_followed_saved_and_gone_on_with(tmp_path):
     system = oscillator()
     branch = torus_branch(contact_field(system, [MU]), steady(system), second=SECOND,

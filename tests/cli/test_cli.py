@@ -28,6 +28,7 @@ def files_below(folder):
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 def test_a_load_beyond_the_limits_of_the_model_is_warned_of(cli, study):
     """1 kN on 0.3e6 N/m: 3.3 mm, 640 times the roughness; at 100 N it is 65 times."""
     words = "warning: In this run contact node"
@@ -122,6 +123,7 @@ def test_results_go_to_the_folder_asked_for(cli, study, tmp_path):
     assert not (tmp_path / "results").exists()
 
 
+@pytest.mark.slow
 def test_a_run_that_is_up_to_date_is_drawn_without_a_note(cli, study, tmp_path):
     assert cli("run", study)[0] == 0
     study.write_text(TINY.replace("frames = 2", "frames = 1"))
@@ -129,6 +131,7 @@ def test_a_run_that_is_up_to_date_is_drawn_without_a_note(cli, study, tmp_path):
     assert (code, err) == (0, "")
 
 
+@pytest.mark.slow
 def test_steep_ground_is_noted(cli, study):
     steep = "--set", "ground.amplitude=1e-4", "--set", "ground.wavelength=1e-3"
     _, out, _ = cli("run", study, *steep)
@@ -199,6 +202,7 @@ def test_init_for_a_mesh_of_ones_own(cli, tmp_path, monkeypatch):
     assert force[0] == pytest.approx(500.0, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_init_for_a_sweep(cli, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, out, _ = cli("init", "--shape", "sweep")
@@ -473,6 +477,7 @@ def test_output_into_a_pipe_that_closes(study):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_doctor_finds_this_computer_well(cli):
     code, out, err = cli("doctor")
     assert (code, err) == (0, "")
@@ -518,6 +523,7 @@ def test_completion_names_every_command_to_the_shell(cli, shell):
         assert command in script
 
 
+@pytest.mark.slow
 def test_demo_makes_all_studies(cli, tmp_path, monkeypatch):
     from fecontact.cli import demo
 

@@ -35,7 +35,7 @@ def test_no_threads(threads):
         f"of 1 or more; set it so, or unset it.\n")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_run_in_ascii_with_an_unknown_backend(tmp_path):
     study = tmp_path / "tiny.toml"
     study.write_text(TINY)
@@ -46,7 +46,7 @@ def test_a_run_in_ascii_with_an_unknown_backend(tmp_path):
     assert "500 us" in done.stdout
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_results_are_whole_if_stdout_and_stderr_are_closed(tmp_path):
     """Warnings of a load beyond the limits of the model go nowhere."""
     study = tmp_path / "tiny.toml"

@@ -15,6 +15,7 @@ def place(tmp_path_factory):
     return tmp_path_factory.mktemp("solid")
 
 
+@pytest.mark.slow
 def test_all_commands_take_a_solid(cli, place, monkeypatch):
     monkeypatch.chdir(place)
     code, out, _ = cli("init", "pad.toml", "--shape", "solid")

@@ -63,6 +63,7 @@ def test_files_of_waves_say_what_draws_them(responded, capsys):
         assert "fecontact response --movie" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_mode_of_a_travelling_wave(tmp_path):
     """From the frequency with springs to that without contact, and most damping between."""
     assert execute(["modes", str(WHEEL), "--nonlinear", "1", "--amplitudes", "1e-8", "1e-3",

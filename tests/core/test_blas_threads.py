@@ -70,6 +70,7 @@ def test_blocks_of_several_threads_that_overlap() -> None:
     assert blas_threads() == {3}
 
 
+@pytest.mark.slow
 def test_many_short_blocks_at_once() -> None:
     seen: list[set[int]] = []
 

@@ -97,6 +97,7 @@ def test_damaged_code_is_compiled_again(tmp_path, stored):
     assert hits(*cases) == len(cases) * [["1", "1"]]
 
 
+@pytest.mark.slow
 def test_whole_code_is_found_and_damaged_code_stored_anew(tmp_path, stored):
     folder = Path(shutil.copytree(stored, tmp_path / "copy"))
     assert hits(folder) == ["1", "1"]

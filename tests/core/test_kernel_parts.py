@@ -304,7 +304,7 @@ def test_the_collector_of_garbage_is_as_before_after_compilation():
         gc.set_threshold(*before)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_law_keeps_its_functions_whatever_kernel_was_loaded_before():
     # The step loop holds functions of the same names as the law that changes contacts.
     script = """

@@ -54,11 +54,13 @@ def with_package(package, cache, **variables):
     return ready(PYTHONPATH=path, NUMBA_CACHE_DIR=cache, **variables)
 
 
+@pytest.mark.slow
 def test_kernels_of_the_package_are_not_compiled(package, tmp_path):
     assert with_package(package, tmp_path) == (1, 0, FAMILY)
     assert not list(tmp_path.rglob("*.nbc"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variables", [{"FECONTACT_NATIVE": "1"},
                                        stored_code.compiled_for(FAMILY)])
 def test_native_code_is_compiled_on_request(package, tmp_path, variables):

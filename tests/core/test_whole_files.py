@@ -258,6 +258,7 @@ print("\\n".join(said))
 """
 
 
+@pytest.mark.slow
 @linux
 def test_what_cannot_be_written_is_one_sentence_and_the_earlier_file_stays(tmp_path):
     """Files are limited to some bytes: writing fails at any place, as on a full disk."""
@@ -284,6 +285,7 @@ def small_disk(tmp_path):
     subprocess.run(["umount", str(place)], check=True)
 
 
+@pytest.mark.slow
 @linux
 def test_a_full_disk_keeps_the_earlier_run_and_its_checkpoint(small_disk, tmp_path):
     """The checkpoint is removed when the file of the run is whole, not before."""

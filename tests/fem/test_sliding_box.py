@@ -32,6 +32,7 @@ def test_waves_fit_into_the_box(name):
     assert wave.longitudinal or np.abs(divergence).max() < 1e-8 * size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("element", "cells", "errors", "rates"), [
     ("P1", (4, 8), (6.926e-3, 7.109e-4, 2.209e-2), (1.96, 1.99, 1.94)),
     ("Q1", (4, 8), (2.571e-3, 7.141e-4, 8.681e-3), (2.01, 2.00, 2.02)),

@@ -110,6 +110,7 @@ def test_errors_of_the_amplitude_count_by_the_slopes_of_the_model():
     assert 0.5 * (above - below) == pytest.approx(half, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_intervals_of_correlated_curves_cover_the_truth():
     inside = []
     for seed in range(60):

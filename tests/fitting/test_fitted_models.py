@@ -147,7 +147,7 @@ def test_amplitudes_beyond_a_run_go_on_linearly():
         np.repeat([w / (2.0 * np.pi), 0.012], 3), rel=1e-4)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_den_hartogs_friction_from_a_decay():
     """Exact decay by 4 F / k a cycle: half cycles about +-F / k, with noise of 1 %."""
     spring, force = 5e4, 1.0
@@ -190,6 +190,7 @@ def test_derivatives_of_a_history_are_exact():
     assert data.derivative(system, "friction.nothing") is None
 
 
+@pytest.mark.slow
 def test_lugre_from_a_noisy_history():
     truth = lugre()
     time = np.linspace(0.0, 0.12, 61)
@@ -209,6 +210,7 @@ def test_lugre_from_a_noisy_history():
     assert 30.0 < found.chi_square < 100.0
 
 
+@pytest.mark.slow
 def test_bouc_wen_from_a_ring_down():
     def model(coefficient=0.3, deflection=4e-4):
         return mass(damping=6.0, friction=BoucWenFriction(coefficient, deflection, 0.6, 1.2))

@@ -98,6 +98,7 @@ def test_landing_just_before_the_force_turns_to_press(part, rtol):
     assert times[2] - times[1] == pytest.approx(flight, rel=part + 1e-5, abs=3.0 * off)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [300, pytest.param(1500, marks=pytest.mark.slow)])
 def test_many_lift_offs_open_the_stop_once(count):
     """From rest or a little away from it, beyond the border of lift-off, at small tolerance."""

@@ -82,7 +82,7 @@ def distance(found, wanted, modes):
     return np.abs((found - wanted) / size).max() / np.abs(wanted / size).max()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("rtol", "within"), [(1e-7, 1e-4), (1e-8, 1e-5)])
 def test_a_beam_that_sticks_and_lets_go(rtol, within):
     system = example.beam()

@@ -308,6 +308,7 @@ def test_derivatives_where_the_normal_force_passes_zero():
         assert (np.abs(found.parameter_derivative - wanted[:, 4]) < 1e-6 * size).all()
 
 
+@pytest.mark.slow
 def test_derivatives_where_sliding_elements_lift_off_in_space():
     """Directions of slip turn ever faster as the normal force vanishes; forces do not."""
     system = bouncing(LinearContact(20.0, 0.0))

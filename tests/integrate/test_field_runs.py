@@ -98,6 +98,7 @@ def vanderpol(t, x, p, out):
     out[1] = p[0] * (1.0 - x[0] ** 2) * x[1] - x[0]
 
 
+@pytest.mark.slow
 def test_relaxation_oscillations_agree_with_radau():
     field = vector_field(vanderpol, {"mu": 200.0}, ["x", "v"], scales=[1.0, 100.0])
     times = np.linspace(0.0, 400.0, 41)

@@ -28,6 +28,7 @@ def test_limits_are_those_of_linear_vibrations(limits, load, periods):
     assert found == pytest.approx(amplitude, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_best_load_is_the_classical_one(limits):
     (free, high), (stuck, low) = limits
     loads = example.BEST * np.array([0.75, 1.0, 1.35])

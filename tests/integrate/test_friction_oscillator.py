@@ -112,6 +112,7 @@ def test_random_friction_breaks_away_at_the_coefficient_of_the_place():
         assert force == pytest.approx(14.0 * 0.778 * (1.0 + variation.height(place)), rel=0.015)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("modes", "method", "rtol", "tolerance"), [
     (2, "Radau", 1e-6, 1e-4), (2, "LSODA", 1e-8, 1e-4), (3, "LSODA", 1e-8, 1e-4)])
 def test_the_integrator_makes_no_difference(modes, method, rtol, tolerance):

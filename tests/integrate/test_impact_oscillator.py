@@ -102,6 +102,7 @@ def test_other_integrators_keep_the_orbits(frequency, periods, method):
     assert (np.abs(again.states[-1] - run.states[-1]) / scale).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_another_integrator_finds_chaos_too():
     system = driven(impact.two_mode_system(), 23.63)
     run = settled_regime(system)[1]
@@ -129,6 +130,7 @@ def growth_of_pairs(system, state, periods, pairs, distance=1e-6):
     return growths[periods // 2:].mean()
 
 
+@pytest.mark.slow
 def test_exponent_of_chaos_is_the_growth_between_neighbours():
     chaotic = driven(impact.two_mode_system(), 23.63)
     found, run = settled_regime(chaotic)

@@ -89,7 +89,7 @@ def test_order_on_a_smooth_problem():
     assert orders == pytest.approx(5.0, abs=0.15)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [
     ExponentialFriction(0.6, 0.4, 20.0, 1e4), LuGreFriction(0.6, 0.4, 0.01, 2.0, 1e5, 100.0)])
 def test_agrees_with_scipy(friction):

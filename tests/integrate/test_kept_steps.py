@@ -165,6 +165,7 @@ def test_files_give_back_what_was_kept(tmp_path):
     assert fc.read_case(bare).trajectory.kept is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", [Auto(), Scipy("Radau")])
 def test_energies_balance_between_the_outputs_too(solver):
     """With elastic Coulomb friction too, which stores what the integrator counts as lost."""

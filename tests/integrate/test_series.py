@@ -242,7 +242,7 @@ def test_many_random_systems_move_as_by_steps():
         assert_as_by_steps(seed)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_no_contact_is_missed():
     for seed in range(200):

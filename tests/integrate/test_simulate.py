@@ -292,7 +292,7 @@ def test_regimes_of_the_impact_oscillator(w, repeats):
 
 # Bodies ------------------------------------------------------------------------------------------
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_energy_balance_and_methods_agree_on_a_driven_beam():
     runs = {method: simulate(beam(**DRIVEN), 0.03, outputs=301, solver=Scipy(method))
             for method in ("Radau", "BDF", "LSODA")}

@@ -16,6 +16,7 @@ def finest(beam):
     return example.run(example.system(beam, 160), 601)
 
 
+@pytest.mark.slow
 def test_errors_fall_with_the_square_of_the_number_of_nodes(beam, finest):
     errors = np.array([example.error(example.run(example.system(beam, nodes), 601), finest)
                        for nodes in (20, 40, 80)])

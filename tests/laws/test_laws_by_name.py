@@ -146,6 +146,7 @@ def test_a_law_of_ones_own(tmp_path):
     assert type(case.trajectory.system.friction).__name__ == "LogarithmicFriction"
 
 
+@pytest.mark.slow
 def test_a_study_with_a_law_of_its_own_can_be_moved(tmp_path, capsys):
     (tmp_path / "here" / "laws").mkdir(parents=True)
     (tmp_path / "here" / "laws" / "own.py").write_text(MEMORY_LAW)

@@ -239,6 +239,7 @@ def test_what_is_no_number_is_not_hidden(law):
         assert np.isnan(out[:, 3]).any()
 
 
+@pytest.mark.slow
 def test_code_for_eight_numbers_is_stored_once(tmp_path):
     """A second process finds it."""
     for _ in range(2):

@@ -106,6 +106,7 @@ def test_another_mode_is_left_out():
     assert found.damping_ratio == pytest.approx(RATIO, rel=1e-2)
 
 
+@pytest.mark.slow
 def test_duffing():
     """Light damping: the frequency is that of the undamped oscillator, by an elliptic integral."""
     c, damping = 0.4, 0.006

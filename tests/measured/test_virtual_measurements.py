@@ -121,6 +121,7 @@ def test_resonance_of_a_sensor(hertz):
         measure(forced_run(40.0, 501)[0], sensor, Acquisition(500.0, order=0))
 
 
+@pytest.mark.slow
 def test_noise_has_its_density_and_its_seed():
     system = fc.ContactSystem(mass())
     run = fc.simulate(system, 40.0, initial=[0.0, 0.0], outputs=80001)

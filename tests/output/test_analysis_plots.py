@@ -122,6 +122,7 @@ def test_phases_do_not_leap_about_180_degrees(trajectory):
     np.testing.assert_allclose(phase, -180.0, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_every_kind_is_drawn_from_a_stored_run(trajectory, tmp_path, capsys, monkeypatch):
     """Without integrating again: the run keeps what pictures need."""
     system = trajectory.system.with_(drive=Drive(stiffness_x=1e5, amplitude_x=1e-5,

@@ -68,6 +68,7 @@ def test_stress_of_a_clamped_beam_under_pressure():
     assert forces.largest_strain == pytest.approx(1e-3, rel=0.5)
 
 
+@pytest.mark.slow
 def test_files_and_pages_show_it(tmp_path):
     basis = two_modes(damping=0.05)
     write_basis(tmp_path / "basis.h5", basis)

@@ -144,6 +144,7 @@ large_deflections = { largest_displacement = 2e-3 }
 """
 
 
+@pytest.mark.slow
 def test_study(tmp_path):
     """The study has the basis that Python makes, with the same forces; sweeps run it."""
     study = Study.from_toml(STUDY)
@@ -233,6 +234,7 @@ def bolted(spring):
                        attachments=(PointSpring((("hub", (1.0, 0.0)),), STUCK),) if spring else ())
 
 
+@pytest.mark.slow
 def test_preload_of_a_bolted_panel():
     """Pulled, or pushed below buckling, under pressure, with friction that sticks at its end.
 

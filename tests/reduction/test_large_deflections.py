@@ -246,6 +246,7 @@ def test_statics_of_the_reduced_and_the_whole_body():
     assert rest.stable
 
 
+@pytest.mark.slow
 def test_modes_are_chosen_by_accuracy():
     """The third mode of a clamped beam follows the first one; antisymmetric modes do not."""
     def made(count, accuracy):
@@ -263,6 +264,7 @@ def test_modes_are_chosen_by_accuracy():
         made(2, 0.01)
 
 
+@pytest.mark.slow
 def test_errors_under_loads_of_another_shape():
     """A force in the middle of a clamped beam, which is not the inertia of its first mode.
 
@@ -393,7 +395,7 @@ def test_two_wells_of_a_shallow_arch():
     assert basis.large_deflections[0].force_error < 0.1
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_clamped_plate_under_pressure():
     """Levy (NACA TN 847, 1942): p a^4 / (E h^4) = 63.4 and 184 give 0.695 and 1.323 h.
 

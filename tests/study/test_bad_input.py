@@ -576,6 +576,7 @@ def test_command_lines(line, refused):
     assert word.lower() in refused(*shlex.split(tokens)).lower()
 
 
+@pytest.mark.slow
 def test_an_index_that_cannot_be_written_is_no_success(tmp_path, capsys):
     """All cases went well, but their table has no place: a folder is in the way."""
     (tmp_path / "sweep.toml").write_text(SWEEP)
@@ -607,6 +608,7 @@ def test_names_of_movies_that_mean_something_to_the_encoder(name, place, tmp_pat
     assert b"ftyp" in (tmp_path / name).read_bytes()[:12]
 
 
+@pytest.mark.slow
 def test_in_a_process_of_its_own(place):
     """Errors of the command: the largest picture, a name too long, bytes that are no text."""
     for tokens in (["render", "run.vtkhdf", "--size", "100000", "100000"],

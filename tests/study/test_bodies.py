@@ -268,7 +268,7 @@ def test_a_sweep_over_friction_makes_one_basis(study, tmp_path):
     assert not again.failed
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_commands_name_bodies_and_interfaces(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert execute(["init", "a.toml", "--shape", "pad"]) == 0

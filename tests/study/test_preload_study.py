@@ -202,6 +202,7 @@ except Refused as told:
 """
 
 
+@pytest.mark.slow
 def test_kernels_are_there_before_workers_of_a_sweep_start(file):
     """Otherwise each of them would compile them."""
     done = subprocess.run([sys.executable, "-c", SWEPT, str(file)], capture_output=True, text=True,

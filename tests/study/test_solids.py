@@ -464,7 +464,7 @@ def test_summaries_of_one_point_see_all_directions():
         summarise(fc.Study.from_toml(PLANE).run(), functions_for(["amplitude_z@0"]))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_sweeps_of_solids_have_the_numbers_of_single_runs(tmp_path):
     from fecontact.sweeps.summaries import functions_for, summarise
 

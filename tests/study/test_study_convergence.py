@@ -133,6 +133,7 @@ def test_few_modes_and_what_is_refused(study, found):
             bodies_convergence(meshes, modes, **options)
 
 
+@pytest.mark.slow
 def test_the_command_prints_and_draws_it(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert execute(["init", "a.toml", "--shape", "pad"]) == 0

@@ -120,6 +120,7 @@ def test_an_interrupted_sweep_goes_on(tmp_path, monkeypatch):
     assert (other.amplifications != plain.amplifications).all()
 
 
+@pytest.mark.slow
 def test_workers_find_the_same():
     basis = wheel_of(1)
     one, two = (mistuning_sweep(basis, "s.blade", 0.01, 2, (1500.0, 2100.0), TIP, samples=30,

@@ -41,6 +41,7 @@ def counts(tmp_path, monkeypatch):
     return read
 
 
+@pytest.mark.slow
 def test_processes_give_the_numbers_of_single_runs_and_load_nothing_heavy(study, tmp_path):
     names = ("amplitude_x", "stick_fraction", "friction_power", "mean_normal_force")
     table = sweep(study, AXES, summaries=[*names, "own.py:heavy", "own.py:threads",
@@ -62,6 +63,7 @@ def test_processes_give_the_numbers_of_single_runs_and_load_nothing_heavy(study,
     assert all((again.values[name] == table.values[name]).all() for name in table.values)
 
 
+@pytest.mark.slow
 def test_any_executor_gives_the_same_files(study, tmp_path):
     folders = {}
     with ThreadPoolExecutor(2) as threads:

@@ -149,6 +149,7 @@ amplitude = 1.0, frequency_hz = 8.0 } }] }""".replace(",\n", ", "))
     assert "has changed since the sweep in keys that --set does not change back" in err
 
 
+@pytest.mark.slow
 def test_drawn_samples_show_statistics_and_sensitivities(cli, tmp_path):
     axes = """
 [sweep]
@@ -376,6 +377,7 @@ def test_names_of_files_are_safe_and_different():
         strict=True))
 
 
+@pytest.mark.slow
 def test_a_script_without_main_guard_is_told(tmp_path):
     """Worker processes import the script; unguarded it would start sweeps of its own."""
     write_study(tmp_path)

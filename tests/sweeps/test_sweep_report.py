@@ -52,6 +52,7 @@ def test_texts_stay_texts_and_the_name_is_that_of_a_page(tmp_path):
         report_sweep(a_table(), tmp_path / "sweep.csv")
 
 
+@pytest.mark.slow
 def test_the_command_writes_it(tmp_path):
     study = tmp_path / "s.toml"
     study.write_text("""

@@ -208,6 +208,7 @@ def sliding_block(friction, loads, steps=None):
     return spring, deflection_path(bodies, loads, interfaces=[interface], steps=steps)["block"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [ConstantFriction(0.3), JenkinsFriction(1e10, 0.3)])
 def test_a_block_slides_over_several_elements_and_back(friction):
     """Pressed with N, pulled with P, let go: at (P - mu N) / k, then at mu N / k."""

@@ -44,6 +44,7 @@ def test_stuck_block_stands_on_springs(block, ratio):
     assert not modes.grows.any()
 
 
+@pytest.mark.slow
 def test_rigid_sticking_holds_both_tangents(block):
     """Modes agree with those of the mesh, its patches held along x and y by penalties, by scipy."""
     body, basis, system = block

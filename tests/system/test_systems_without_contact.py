@@ -95,6 +95,7 @@ def test_response_is_the_resonance_of_one_mode(dimension):
     assert not response.branches[0].special
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [Collocation(), Shooting(segments=1)])
 def test_steps_grow_with_a_resonance_by_any_method(method):
     """From 0.012 to 4.7 at the peak: scales that stay would make it a way of some hundred steps."""

@@ -297,7 +297,8 @@ class ContinuationOptions:
     step, smallest_step, largest_step : float
         First step, and limits of the steps. On straight parts of branches of equilibria the largest
         step is the largest change of the parameter, in widths of the diagram; along a mode without
-        losses steps are up to four times as long where the frequency hardly changes.
+        losses, of polynomial springs, steps are up to four times as long where the frequency
+        hardly changes.
     points : int
         Number of regular points after which the branch ends. To both sides they count together; if
         they do not suffice, each gets half of them, or what the other one leaves.

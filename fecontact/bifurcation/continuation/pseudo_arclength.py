@@ -33,9 +33,8 @@ _CORNER_STEP = 1e-3
 _HALVINGS = 2
 # Factor between lengths tried beyond close corners.
 _FARTHER = 8.0
-# Newton steps of one that converges at once, and the factor by which a step above the largest one
-# may be longer than what its end allows.
-_AT_ONCE, _TOO_LONG = 2, 2.0
+# Newton steps of one that converges at once.
+_AT_ONCE = 2
 # Overshoot of a bound by at most this factor: beyond it the motion may not exist.
 _OVERSHOOT = 1.2
 # Relative distance from a bound at which a start lies on it.
@@ -265,7 +264,7 @@ def _step(
         return None
     there = finished(problem, *found, row, options)
     short = step < _CORNER_STEP * options.step
-    if not _believable(problem, here, there, step, options):
+    if not _believable(problem, here, there, options):
         if not short:
             return None
         # A corner; past one that is sharper than a right angle the tangent leads back.
@@ -300,15 +299,13 @@ def _to_bounds(here: Solution, options: ContinuationOptions) -> float:
 
 
 def _believable(
-    problem: Problem, here: Solution, there: Solution, step: float, options: ContinuationOptions
+    problem: Problem, here: Solution, there: Solution, options: ContinuationOptions
 ) -> bool:
-    """Whether tangent and chord turn by no more than the largest turn, and the length is right."""
+    """Whether tangent and chord turn by no more than the largest turn."""
     row = problem.weights() * here.tangent
-    chord, along = there.u - here.u, float(row @ there.tangent)
-    if min(along, float(row @ chord) / norm(problem, chord)) < np.cos(options.largest_turn):
-        return False
-    return step <= options.largest_step or step <= _TOO_LONG * problem.longest_step(
-        there.tangent, _angle(along), options)
+    chord = there.u - here.u
+    return min(float(row @ there.tangent), float(row @ chord) / norm(problem, chord)) >= np.cos(
+        options.largest_turn)
 
 
 def _angle(cosine: float) -> float:

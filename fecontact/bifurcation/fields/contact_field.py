@@ -13,8 +13,9 @@ from fecontact.bifurcation.fields.corners import AffineArrays
 from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
 from fecontact.core.checks import as_texts, require_kind
 from fecontact.core.types import Array
+from fecontact.laws.normal.bilateral import BilateralPolynomial
 from fecontact.system import jacobian as kernels
-from fecontact.system.contact_system import ContactSystem
+from fecontact.system.contact_system import ContactSystem, needs_friction
 from fecontact.system.elastic_sliders import without_elements
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.forcing_period import common_period, drive_sets_period
@@ -59,6 +60,14 @@ class ContactField(VectorField):
             moved = moved - {"ground_motion_parameters", "second_motion_parameters", "sliding",
                              "sliding_across"}
         return bool(moved)
+
+    @cached_property
+    def kinked(self) -> bool:
+        """Whether contact forces may have kinks: all but polynomial springs without friction."""
+        system = self.system()
+        return needs_friction(system.basis) or not all(
+            isinstance(law, BilateralPolynomial)
+            for nodes, _, law in system.law_groups("normal") if nodes.stop > nodes.start)
 
     def system(self, values: Array | None = None) -> ContactSystem:
         """The contact system for parameter values (k,); the base values by default.

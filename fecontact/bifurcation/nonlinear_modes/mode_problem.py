@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.problem import ContinuationOptions
+from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.observed import observed_values
 from fecontact.bifurcation.harmonic.problem import HarmonicLinearisation, HarmonicProblem
@@ -26,8 +27,8 @@ _GROWS = 1e-6
 _REVERSIBLE = 1e-6
 # Scale of the period, relative to it, and ratio of the two from which it is renewed.
 PERIOD_SCALE, _FOLLOWED = 0.2, 1.3
-# Change of period and xi in a step without losses, in their scales, up to which it may be longer
-# than the largest one, and how many times as long.
+# Change of period and xi in a step, in their scales, up to which it may be longer than the largest
+# one, and how many times as long.
 _RESTS, _LONGER = 1e-4, 4.0
 
 
@@ -66,8 +67,6 @@ class ModeLinearisation(HarmonicLinearisation):
 class AlongMode(OrbitUnknowns):
     """Branches of orbits along a mode, whose multipliers and turns of xi say nothing of it."""
 
-    conservative: bool
-
     def lost(self, values: Mapping[str, Any]) -> bool:
         """False: no special point of a mode follows from multipliers."""
         return False
@@ -79,19 +78,6 @@ class AlongMode(OrbitUnknowns):
     def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
         """Turns of xi are no folds of the mode."""
         return {"fold"}
-
-    def longest_step(self, tangent: Array, turn: float, options: ContinuationOptions) -> float:
-        """Longer than the largest step where a mode without losses keeps its period.
-
-        Internal resonances lie where it changes. Of a damping ratio small changes count too.
-        """
-        if not self.conservative:
-            return options.largest_step
-        weights: Array = self.weights()[-2:]  # type: ignore[attr-defined]
-        rate = float(np.sqrt(weights @ tangent[-2:] ** 2))
-        if rate * _LONGER * options.largest_step <= _RESTS:
-            return _LONGER * options.largest_step
-        return max(options.largest_step, _RESTS / rate)
 
     def _grown(self, u: Array) -> Array:
         """Scales enlarged with the motion; those of period and xi follow the frequency."""
@@ -141,6 +127,20 @@ class ModeProblem(AlongMode, HarmonicProblem):
     def rounding(self) -> float:
         """Relative size of Newton steps below which growing steps are rounding."""
         return _ROUNDING_OF_MEANS if self.layout.memory else super().rounding
+
+    def longest_step(self, tangent: Array, turn: float, options: ContinuationOptions) -> float:
+        """Longer than the largest step where a smooth mode without losses keeps its period.
+
+        Internal resonances lie where it changes. Kinks come without notice, and of a damping ratio
+        small changes count too.
+        """
+        smooth = isinstance(self.field, ContactField) and not self.field.kinked
+        if not (smooth and self.conservative):
+            return options.largest_step
+        rate = float(np.sqrt(self.weights()[-2:] @ tangent[-2:] ** 2))
+        if rate * _LONGER * options.largest_step <= _RESTS:
+            return _LONGER * options.largest_step
+        return max(options.largest_step, _RESTS / rate)
 
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
         """The predictor; that of a motion x(-t) = x(t) without losses is one too.

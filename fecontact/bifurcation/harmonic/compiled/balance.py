@@ -18,8 +18,6 @@ from fecontact.bifurcation.harmonic.compiled.evaluation import (
 from fecontact.bifurcation.harmonic.compiled.loads import AffineSystem, forces_at_rest
 from fecontact.bifurcation.harmonic.elements import element_forces
 from fecontact.core.types import Array
-from fecontact.laws.normal.bilateral import BilateralPolynomial
-from fecontact.system.contact_system import needs_friction
 from fecontact.system.elastic_sliders import without_elements
 from fecontact.system.nodes import SystemArrays
 
@@ -180,14 +178,11 @@ class CompiledBalance:
 
     @cached_property
     def kinked(self) -> bool:
-        """Whether contact forces may have kinks: all but polynomial springs without friction.
+        """See :attr:`ContactField.kinked`.
 
         Newton's method then need not converge as quickly as its last steps did.
         """
-        system = self.contact_field.system()
-        return needs_friction(system.basis) or not all(
-            isinstance(law, BilateralPolynomial)
-            for nodes, _, law in system.law_groups("normal") if nodes.stop > nodes.start)
+        return self.contact_field.kinked
 
 
 def _line(places: Array, values: Array) -> tuple[Array, Array]:
