@@ -121,7 +121,7 @@ def test_steps_with_derivatives_go_on_where_sliding_elements_lift_off_in_space(
     """
     case = systems.random_case(107)
     start = (1.0 + 1e-13 * aside) * case.state
-    # Contacts begin and end some ten times until then.
+    # Runs at the tighter tolerance are long.
     end = 0.05 if rtol > 1e-7 else 0.02
     found = fc.sensitivity(case.system, end, initial=start, rtol=rtol,
                            outputs=np.linspace(0.0, end, 11))

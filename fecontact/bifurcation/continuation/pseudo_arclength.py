@@ -308,11 +308,6 @@ def _believable(
         options.largest_turn)
 
 
-def _angle(cosine: float) -> float:
-    """Angle [rad] between unit vectors; rounding may take their product above one."""
-    return float(np.arccos(min(1.0, cosine)))
-
-
 def _next_step(
     problem: Problem, here: Solution, there: Solution, step: float, options: ContinuationOptions
 ) -> float:
@@ -321,7 +316,7 @@ def _next_step(
     Where Newton's method converges at once, the problem may allow steps above the largest one.
     """
     factor = {1: 2.0, 2: 2.0, 3: 1.5, 4: 1.1}.get(there.iterations, 0.7)
-    turn = _angle(float(problem.weights() * here.tangent @ there.tangent))
+    turn = float(np.arccos(min(1.0, float(problem.weights() * here.tangent @ there.tangent))))
     if turn > 0.0:
         factor = min(factor, max(0.5, 0.5 * options.largest_turn / turn))
     longest = options.largest_step
