@@ -11,6 +11,7 @@ import sys
 import time
 
 import numpy as np
+from usage import explain
 
 from fecontact import (
     Beam,
@@ -92,4 +93,5 @@ def main(quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main("--quick" in sys.argv)

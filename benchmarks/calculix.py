@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import eigsh
+from usage import explain
 
 import fecontact as fc
 from fecontact.fem import SolidBlock
@@ -206,4 +207,5 @@ def main(quick: bool, public: list[Path]) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main("--quick" in sys.argv, [Path(word) for word in sys.argv[1:] if word != "--quick"])

@@ -13,6 +13,7 @@ import tempfile
 from pathlib import Path
 
 from first_minute import ONE_MASS, size
+from usage import explain
 
 
 def compile_by(name: str, *arguments: str) -> None:
@@ -36,4 +37,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main()

@@ -7,6 +7,7 @@ import sys
 import timeit
 
 import numpy as np
+from usage import explain
 
 from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
 from fecontact.laws import ExponentialFriction, RoughSurface
@@ -72,4 +73,5 @@ def main(quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main("--quick" in sys.argv)

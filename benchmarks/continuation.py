@@ -18,6 +18,7 @@ from functools import partial
 
 import numpy as np
 from continuation_peer import Auto, auto
+from usage import explain
 
 from fecontact import ContactSystem, Ground, basis_from_matrices
 from fecontact.bifurcation import (
@@ -175,5 +176,6 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main(*(int(given) for given in sys.argv[1:] if given != "--quick"),
          quick="--quick" in sys.argv)

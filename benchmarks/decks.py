@@ -14,6 +14,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from usage import explain
 
 READ = """
 import resource, sys, time
@@ -104,5 +105,6 @@ def main(sizes: list[int], quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main([int(word) for word in sys.argv[1:] if not word.startswith("--")],
          "--quick" in sys.argv)

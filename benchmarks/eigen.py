@@ -20,6 +20,7 @@ import time
 import numpy as np
 from scipy.sparse.linalg import eigsh
 from skfem import MeshTet
+from usage import explain
 
 from fecontact import ElasticBody, Material, Mesh
 from fecontact.fem import Tie
@@ -150,7 +151,9 @@ if __name__ == "__main__":
     given = [word for word in sys.argv[1:] if word != "--quick"]
     if given[:1] == ["--one"]:
         solved(given[1], given[2], int(given[3]))
-    elif given[:1] == ["--solids"]:
+        raise SystemExit(0)
+    explain(__doc__)
+    if given[:1] == ["--solids"]:
         chosen(given[1:], "--quick" in sys.argv)
     else:
         main(*(int(word) for word in given), quick="--quick" in sys.argv)

@@ -23,6 +23,7 @@ from integrator_peers import DISPLACEMENT, VELOCITY, _frozen, _pointer
 from integrator_problems import Problem, diagram, friction_oscillator
 from numba import carray, cfunc, njit
 from numpy.typing import NDArray
+from usage import explain
 
 from fecontact import ContactSystem
 from fecontact.integrate import strobe
@@ -139,6 +140,7 @@ def main(count: int = 0, periods: int = 0, quick: bool = False, name: str = "") 
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     words = [word for word in sys.argv[1:] if word != "--quick"]
     problem = ""
     if "--problem" in words:

@@ -12,6 +12,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from usage import explain
+
 ROOT = Path(__file__).resolve().parents[1]
 PYTHON = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, (
     str(ROOT), os.environ.get("PYTHONPATH", ""))))}
@@ -149,4 +151,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main()

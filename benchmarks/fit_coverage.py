@@ -26,6 +26,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.interpolate import CubicSpline
+from usage import explain
 
 import fecontact as fc
 from fecontact.bifurcation import ContinuationOptions
@@ -397,4 +398,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main()

@@ -25,6 +25,7 @@ import numpy as np
 from integrator_peers import PEERS
 from integrator_problems import PROBLEMS, Problem, shortened
 from numpy.typing import NDArray
+from usage import explain
 
 from fecontact.integrate.rodas5p import driver
 
@@ -151,4 +152,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main()

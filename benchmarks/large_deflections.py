@@ -19,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.sparse.linalg import splu
+from usage import explain
 
 import fecontact as fc
 from fecontact.bifurcation import HarmonicBalance, nonlinear_mode
@@ -194,5 +195,6 @@ def main(columns: int = 60, quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     numbers = [int(word) for word in sys.argv[1:] if word.isdigit()]
     main(*numbers, quick="--quick" in sys.argv)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from usage import explain
 
 from fecontact import ContactSystem, ModalBasis
 from fecontact.laws import ConstantFriction, FrictionLaw, LinearContact, NormalLaw, law_names
@@ -98,4 +99,5 @@ def main(quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main("--quick" in sys.argv)

@@ -13,6 +13,7 @@ import time
 from itertools import pairwise
 
 import numpy as np
+from usage import explain
 
 from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
 from fecontact.integrate.rodas5p import driver
@@ -86,6 +87,7 @@ def main(quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     if os.environ.get("OPENBLAS_NUM_THREADS") != "1":
         # Read when numpy is loaded.
         os.execve(sys.executable, [sys.executable, *sys.argv],

@@ -29,6 +29,7 @@ import numpy as np
 from integrator import time_at
 from integrator_problems import Problem, friction_oscillator, shortened
 from numpy.typing import NDArray
+from usage import explain
 
 from fecontact.integrate import EventDriven, SetValued, TimeStepping
 from fecontact.integrate.nonsmooth import driver as set_valued
@@ -155,4 +156,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main()

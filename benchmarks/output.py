@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from usage import explain
 
 from fecontact import (
     Beam,
@@ -86,4 +87,5 @@ def main(quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main("--quick" in sys.argv)

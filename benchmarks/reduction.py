@@ -14,6 +14,7 @@ import time
 import numpy as np
 import scipy.sparse as sp
 from eigen import block, rectangle
+from usage import explain
 
 from fecontact import ElasticBody, Material, Mesh
 from fecontact.fem.contact_face import contact_nodes
@@ -95,6 +96,7 @@ def solid(unknowns: int = 150_000, nodes: int = 400, *modes: int) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     words = sys.argv[1:]
     quick = "--quick" in words
     numbers = [int(given) for given in words if not given.startswith("--")]

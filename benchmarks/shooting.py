@@ -21,6 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "validation" / "case
 
 import beam_stick_slip as example
 import integrator_problems as problems
+from usage import explain
 
 from fecontact import ContactSystem, sensitivity
 from fecontact.core.types import Array
@@ -106,5 +107,6 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main(*(int(given) for given in sys.argv[1:] if given != "--quick"),
          quick="--quick" in sys.argv)

@@ -10,6 +10,7 @@ import sys
 import time
 
 import numpy as np
+from usage import explain
 
 from fecontact import (
     Beam,
@@ -71,4 +72,5 @@ def main(nodes: list[int], quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main([int(word) for word in sys.argv[1:] if word != "--quick"], "--quick" in sys.argv)

@@ -13,6 +13,7 @@ import tempfile
 import time
 
 import numpy as np
+from usage import explain
 
 from fecontact import Study, simulate, sweep
 from fecontact.study import Span, SweepSettings
@@ -90,6 +91,7 @@ def main(cases: int = 10_000, quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with one_thread_each():
         main(*(int(given) for given in sys.argv[1:] if given != "--quick"),

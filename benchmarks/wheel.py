@@ -17,6 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "validation" / "cases"))
 
 import platform_damper as example
+from usage import explain
 
 import fecontact as fc
 from fecontact.bifurcation import (
@@ -95,4 +96,5 @@ def main(quick: bool = False) -> None:
 
 
 if __name__ == "__main__":
+    explain(__doc__)
     main("--quick" in sys.argv)

@@ -60,7 +60,8 @@ BENCHMARKS = {
 }
 # first_minute builds wheels and installs them, which takes half an hour.
 HELPERS = {"beside", "continuation_peer", "first_minute", "integrator", "integrator_peers",
-           "integrator_problems", "kept_runs", "nonsmooth_peer"}
+           "integrator_problems", "kept_runs", "nonsmooth_peer", "usage"}
+
 
 # Two checkouts in turn: here one and the same, in which no row has another name.
 def test_two_checkouts_in_turn():
@@ -98,6 +99,19 @@ def test_make_bench_runs_every_benchmark():
     runs = re.search(r"^BENCHMARKS := (.*)$", written, re.MULTILINE)
     assert runs is not None
     assert {run.partition("+")[0] for run in runs[1].split()} == set(BENCHMARKS) | {"integrator"}
+
+
+@pytest.mark.parametrize("name", ["integrator", *BENCHMARKS])
+def test_help_and_options_that_there_are_not(name):
+    """Neither measures anything."""
+    script = [sys.executable, f"benchmarks/{name}.py"]
+    told = subprocess.run([*script, "--help"], cwd=ROOT, capture_output=True, text=True)
+    assert (told.returncode, told.stderr) == (0, "")
+    assert f"benchmarks/{name}.py" in told.stdout
+    refused = subprocess.run([*script, "--qick"], cwd=ROOT, capture_output=True, text=True)
+    assert refused.returncode != 0
+    assert "--qick" in refused.stderr
+    assert "Traceback" not in refused.stderr
 
 
 @pytest.mark.parametrize("name", BENCHMARKS)

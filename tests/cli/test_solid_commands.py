@@ -10,21 +10,23 @@ SHORT = ("--set", "simulation.t_end=2e-3", "--set", "simulation.outputs=21",
          "--set", "output.frames=2")
 
 
-@pytest.fixture(scope="module")
-def place(tmp_path_factory):
-    return tmp_path_factory.mktemp("solid")
+@pytest.fixture
+def place(tmp_path):
+    """A folder with the study of a solid."""
+    (tmp_path / "pad.toml").write_text(template("solid"))
+    return tmp_path
 
 
 @pytest.mark.slow
-def test_all_commands_take_a_solid(cli, place, monkeypatch):
-    monkeypatch.chdir(place)
+def test_all_commands_take_a_solid(cli, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     code, out, _ = cli("init", "pad.toml", "--shape", "solid")
     assert (code, "next: fecontact run pad.toml" in out) == (0, True)
     assert Study.read("pad.toml") == Study.from_toml(template("solid"))
     code, out, _ = cli("mesh", "pad.toml")
     assert code == 0
     assert "60 faces" in out
-    assert (place / "results" / "pad.msh").exists()
+    assert (tmp_path / "results" / "pad.msh").exists()
     code, out, err = cli("modes", "pad.toml", "--complex")
     assert code == 0, err
     assert "steady sliding" in out
@@ -38,7 +40,7 @@ def test_all_commands_take_a_solid(cli, place, monkeypatch):
         assert (getattr(stored, name) == getattr(again, name)).all(), name
     run = "results/pad.vtkhdf"
     # The plots of the run.
-    assert {path.name for path in (place / "results").glob("pad-*.png")} == {
+    assert {path.name for path in (tmp_path / "results").glob("pad-*.png")} == {
         f"pad-{kind}.png" for kind in ("modes", "history", "phase", "contact_map", "energies")}
     assert cli("plot", run, "phase", "--component", "z")[0] == 0
     assert cli("plot", run, "history", "--point", "0.1,0.06,0.02")[0] == 0
@@ -54,11 +56,13 @@ def test_all_commands_take_a_solid(cli, place, monkeypatch):
     assert cli("export", run, "--format", "csv")[0] == 0
     code, out, err = cli("report", run)
     assert code == 0, err
-    assert (place / "results" / "pad.html").stat().st_size < 400_000
+    assert (tmp_path / "results" / "pad.html").stat().st_size < 400_000
 
 
 def test_a_solid_is_rendered_from_above_and_below(cli, place, monkeypatch):
     monkeypatch.chdir(place)
+    code, _, err = cli("run", "pad.toml", *SHORT)
+    assert code == 0, err
     pictures = []
     for view in ("above", "below"):
         code, _, err = cli("render", "results/pad.vtkhdf", "--frames", "1", "--view", view,
