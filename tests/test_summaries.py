@@ -95,6 +95,8 @@ def stability_map():
 
 SHOWN = {
     "Trajectory": (lambda: run(times=41), ("finished", "20 ms", "41", "RoughSurface", "9000 Hz")),
+    "Energies": (lambda: run(times=41).energies, ("stored: ", " at last; work: ", "lost: ",
+                                                  "imbalance: ")),
     "ContactSystem": (lambda: run(times=11).system, (
         "RoughSurface", "ExponentialFriction", "20 mm/s", "contact nodes: 5", "9000 Hz")),
     "ContactEquilibrium": (lambda: fc.equilibrium(

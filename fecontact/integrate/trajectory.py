@@ -67,8 +67,8 @@ def output_part(t: Array, t_start: float | None, t_end: float | None) -> slice:
 
 
 @read_only_arrays
-@dataclass(frozen=True, eq=False)
-class Energies:
+@dataclass(frozen=True, eq=False, repr=False)
+class Energies(Summarised):
     """Energies, work put in and energy lost, each (N,) [J]; work and losses count from the start.
 
     The change of ``stored`` since the first output is that of ``work - lost``, up to the
@@ -116,6 +116,14 @@ class Energies:
         """All energies, works and losses by name, each (N,) [J]."""
         return {one.name: getattr(self, one.name) for one in fields(self)
                 if one.name != "rounding"}
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Stored energy at both ends, work and losses of the whole time, error of the balance."""
+        first, last = (quantity(float(self.stored[k]), "J") for k in (0, -1))
+        return [("stored", f"{first} at first, {last} at last"),
+                ("work", quantity(float(self.work[-1]), "J")),
+                ("lost", quantity(float(self.lost[-1]), "J")),
+                ("imbalance", f"{self.imbalance:.2g}")]
 
     @property
     def stored(self) -> Array:

@@ -19,6 +19,7 @@ from fecontact.core.types import Array
 from fecontact.fem.chords import chords
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.finite_strain import LARGE_STRAIN
+from fecontact.fem.mesh import Mesh
 from fecontact.laws.base import FrictionLaw, NormalLaw
 from fecontact.laws.excitation import AXES
 from fecontact.laws.friction.stribeck import ConstantFriction
@@ -231,13 +232,18 @@ def _bodies(bodies: Mapping[str, ElasticBody]) -> Iterator[str]:
                    f"{size:.3g} m; check its unit, or take plane = \"strain\".")
 
 
-def implausible_body(who: str, body: ElasticBody) -> Iterator[str]:
-    """Messages about the size and the materials of a body, which they call ``who``."""
+def implausible_size(who: str, mesh: Mesh) -> Iterator[str]:
+    """Message about the extent of a mesh, of a body that it calls ``who``."""
     low, high = SIZES
-    size = float(np.ptp(body.mesh.nodes, axis=0).max())
+    size = float(np.ptp(mesh.nodes, axis=0).max())
     if not low <= size <= high:
         yield (f"{who} has an extent of {size:.3g} m, not from {low:g} to {high:g} m; check "
                f"the unit of lengths, and give a mesh in mm the scale 1e-3.")
+
+
+def implausible_body(who: str, body: ElasticBody) -> Iterator[str]:
+    """Messages about the size and the materials of a body, which they call ``who``."""
+    yield from implausible_size(who, body.mesh)
     for key, value, (least, most), unit in (
             check for material in body.materials for check in (
                 *(("youngs_modulus", one, MODULI, "Pa") for one in material.youngs_moduli),

@@ -129,7 +129,8 @@ def test_mode_goes_through_its_internal_resonance(resonant):
     size = np.maximum.accumulate(np.linalg.norm(X[1:], axis=1))
     frequency = mode.frequency_hz
     rests = np.abs(np.diff(frequency)) < 1e-4 * frequency[1:]
-    assert rests.any()
+    # There it takes longer steps.
+    assert (change > 0.15 * size)[rests].any()
     assert (change < np.where(rests & ~inside[1:], 0.5, 0.15) * size).all()
     # In the limit the second mass vibrates on two springs.
     assert mode.frequency_hz[-1] * 2.0 * np.pi == pytest.approx(np.sqrt(2.0), rel=0.01)

@@ -194,6 +194,9 @@ def test_init_for_a_mesh_of_ones_own(cli, tmp_path, monkeypatch):
     code, out, _ = cli("mesh", "study.toml")
     assert code == 0
     assert re.search("boundary contact +20 edges", out)
+    code, _, err = cli("mesh", "study.toml", "--set", "geometry.scale=1000", "-o", "of-metres")
+    assert code == 0
+    assert "the body has an extent of 200 m" in err
     short = ["--set", "simulation.t_end=1e-3", "--set", "simulation.outputs=21",
              "--set", "basis.contact_nodes=5", "--set", "output.frames=2"]
     assert cli("run", "study.toml", *short)[0] == 0

@@ -93,6 +93,7 @@ def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
     from fecontact.cli.tables import mesh_table, table
     from fecontact.core.files.atomic_write import name_parts, output_folder
     from fecontact.fem.mesh_files import write_mesh
+    from fecontact.system.model_limits import implausible_size, warn_of_limits
 
     described = read_study(study, set_)
     with output_folder(output or described.results) as folder:
@@ -104,6 +105,8 @@ def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) ->
                 echo(f"\n{name}:")
             body = described.bodies[name].body if name else described.body
             show(mesh_table(made, body.degree))
+            warn_of_limits(implausible_size(f"body '{name}'" if name else "the body", made),
+                           "In this study")
             target = folder / f"{described.name}{'-' * bool(name)}{part}.msh"
             source = getattr(geometry, "file", None)
             if source is not None and target.exists() and (
