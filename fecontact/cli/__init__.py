@@ -1,5 +1,22 @@
 """The command line ``fecontact``: commands are plain functions, listed in ``app.COMMANDS``."""
 
-from fecontact.cli.entry import execute, main
+import sys
+from collections.abc import Sequence
 
-__all__ = ["execute", "main"]
+
+def main() -> None:
+    """Run the command line and exit Python with its exit code."""
+    try:
+        from fecontact.cli.entry import main as run
+    except KeyboardInterrupt:
+        # Ctrl-C while modules are loaded.
+        print("error: interrupted.", file=sys.stderr)
+        sys.exit(130)
+    run()
+
+
+def execute(tokens: Sequence[str]) -> int:
+    """Run one command line; see :func:`fecontact.cli.entry.execute`."""
+    from fecontact.cli.entry import execute as run
+
+    return run(list(tokens))

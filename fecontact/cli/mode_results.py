@@ -131,10 +131,10 @@ def write_mode_results(
 def mode_csv(mode: "NonlinearMode") -> str:
     """All points of a nonlinear mode as CSV, in SI units."""
     energy, stable = mode.energy, mode.stable
+    columns = (mode.amplitude, mode.frequency_hz, mode.damping_ratio, mode.loss)
     return csv_text([_COLUMNS, *([
         point.kind or "",
-        *(repr(float(column[place])) for column in (
-            mode.amplitude, mode.frequency_hz, mode.damping_ratio, mode.loss)),
+        *(repr(float(column[place])) for column in columns),
         "" if energy is None else repr(float(energy[place])),
         "" if stable is None else int(stable[place]),
         repr(float(point.values["truncation_error"]))]
@@ -150,9 +150,10 @@ def mode_table(mode: "NonlinearMode") -> Any:
     last = len(mode) - 1
     chosen = {round(last * part / (_SHOWN - 1)) for part in range(_SHOWN)}
     chosen |= {place for place, point in enumerate(mode.branch.points) if point.kind is not None}
+    amplitude, frequency, ratio = mode.amplitude, mode.frequency_hz, mode.damping_ratio
     return table(
         "", f"amplitude of {mode.observed}", "frequency [Hz]", "damping ratio",
-        rows=((mode.branch.points[place].kind or "",
-               quantity(float(mode.amplitude[place]), unit, 5), f"{mode.frequency_hz[place]:.6g}",
-               "none" if mode.conservative else f"{mode.damping_ratio[place]:.4g}")
+        rows=((mode.branch.points[place].kind or "", quantity(float(amplitude[place]), unit, 5),
+               f"{frequency[place]:.6g}",
+               "none" if mode.conservative else f"{ratio[place]:.4g}")
               for place in sorted(chosen)))

@@ -1,7 +1,8 @@
 """Studies: TOML files that describe a model from its geometry to the run and its plots."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -440,7 +441,9 @@ class Study(Summarised, StudyModels):
         it once the run is written. ``keep_steps`` takes the place of that of the study.
         """
         self.require_no_sector("`fecontact response` computes its waves")
-        settings, t_end, system = self.simulation, self.t_end, self.system()
+        settings, t_end = self.simulation, self.t_end
+        with self.warning_of_bodies():
+            system = self.system()
         solver = settings.chosen_solver()
         if isinstance(solver, CompiledSolver):
             solver = replace(solver, checkpoint=checkpoint, keep_checkpoint=True)
@@ -448,7 +451,6 @@ class Study(Summarised, StudyModels):
             # Check names before the run: an error after a long run would come too late.
             for point in self.output.points:
                 system.basis.point_index(point)
-        self.warn_of_bodies()
         warn_of_limits(implausible_faces(PlannedBodies(self.made_bodies(), self.contact_faces,
                                                        system)), "In this study")
         initial = self.initial()
@@ -461,9 +463,16 @@ class Study(Summarised, StudyModels):
                             events=(ContactEvents(settings.stop)
                                     if settings.events or settings.stop else None))
 
-    def warn_of_bodies(self) -> None:
-        """Warn of implausible size, materials and thickness of the bodies made so far."""
-        warn_of_limits(implausible_bodies(self.made_bodies()), "In this study")
+    @contextmanager
+    def warning_of_bodies(self) -> Iterator[None]:
+        """Warn of implausible size, materials and thickness of the bodies that are made meanwhile.
+
+        Also before an error, such as one of modes, whose cause they may be.
+        """
+        try:
+            yield
+        finally:
+            warn_of_limits(implausible_bodies(self.made_bodies()), "In this study")
 
     def measure(self, run: Trajectory | None = None) -> Measurement:
         """Measure a run of the study, by default a new one, by the sensors of ``[measurement]``.

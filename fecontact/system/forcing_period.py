@@ -16,6 +16,7 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import in_time
 from fecontact.system.fields.vector_field import VectorField
 
+DRIVE_FREQUENCY = "drive.frequency_hz"
 _REPEATING = (Harmonic, Harmonics)
 
 
@@ -40,10 +41,35 @@ def drive_sets_period(system: ContactSystem) -> bool:
     AnalysisError
         As :func:`common_period`.
     """
-    names = [name for name, _ in source_periods(system)]
-    own = [f"drive.motion_{axis}" for axis in "xyz"
-           if getattr(system.drive, f"motion_{axis}") is None]
-    return type(system.drive) is Drive and bool(names) and set(names) <= set(own)
+    names = {name for name, _ in source_periods(system)}
+    return type(system.drive) is Drive and bool(names) and names <= _set_by_frequency(system)
+
+
+def _set_by_frequency(system: ContactSystem) -> set[str]:
+    """Names of the motions of the drive that have its frequency."""
+    return {f"drive.motion_{axis}" for axis in "xyz"
+            if getattr(system.drive, f"motion_{axis}") is None}
+
+
+def require_effect(system: ContactSystem, name: str) -> None:
+    """Refuse the frequency of the drive as a parameter where only something else excites a system.
+
+    Raises
+    ------
+    InputError
+        If ``name`` is that frequency and the drive moves nothing with it.
+    AnalysisError
+        As :func:`common_period`.
+    """
+    names = [source for source, _ in source_periods(system)] if name == DRIVE_FREQUENCY else []
+    if names and not _set_by_frequency(system) & set(names):
+        other = names[0]
+        parameter = ("ground.speed" if other.startswith("ground.") else
+                     f"{other}.signal.frequency_hz" if other.startswith("load.forces.") else
+                     f"{other}.frequency_hz")
+        raise InputError(f"parameter = '{name}' changes nothing: the drive has no spring or no "
+                         f"amplitude, and {other} excites the system; take another one, such as "
+                         f"'{parameter}'.")
 
 
 def source_periods(system: ContactSystem) -> list[tuple[str, float]]:

@@ -12,6 +12,8 @@ from fecontact import (
     ContactSystem,
     Drive,
     ElasticBody,
+    Load,
+    PointLoad,
     generate,
     io,
     modal_basis,
@@ -23,11 +25,12 @@ from fecontact.bifurcation import (
     ContinuationOptions,
     HarmonicBalance,
     contact_field,
+    controlled_response,
     frequency_response,
     orbit_branch,
 )
 from fecontact.core.errors import AnalysisError, InputError
-from fecontact.laws import JenkinsFriction, LinearContact, PrescribedForce
+from fecontact.laws import Harmonic, JenkinsFriction, LinearContact, PrescribedForce
 from fecontact.system.model_limits import unresisted_motion
 
 
@@ -157,6 +160,18 @@ def test_system_without_excitation_is_refused():
     with pytest.raises((InputError, AnalysisError), match=r"excite|period"):
         frequency_response(system, (10.0, 11.0), observe=("B", "y"))
     assert contact_field(impact_oscillator(), ["drive.frequency_hz"]).dimension == 4
+
+
+@pytest.mark.parametrize("changes", [{"drive.amplitude_y": 0.0}, {"drive.stiffness_y": 0.0}])
+def test_frequency_of_a_drive_that_moves_nothing_is_refused(changes):
+    pushed = Load(forces=(PointLoad("B", "y", signal=Harmonic(1.0, 12.0)),))
+    system = impact_oscillator().with_({"load": pushed, **changes})
+    force = "load.forces.0.signal.frequency_hz"
+    with pytest.raises(InputError, match=force.replace(".", r"\.")):
+        frequency_response(system, (10.0, 11.0), observe=("B", "y"))
+    with pytest.raises(InputError, match=force.replace(".", r"\.")):
+        controlled_response(system, (10.0, 11.0), 1e-5, "load.forces.0.signal.amplitude",
+                            observe=("B", "y"))
 
 
 def test_a_rigid_motion_that_nothing_resists_is_named(monkeypatch):

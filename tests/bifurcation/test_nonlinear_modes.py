@@ -12,6 +12,7 @@ from systems import TURN, two_mass_field, two_mass_system
 import fecontact as fc
 from fecontact import io, plot
 from fecontact.bifurcation import (
+    Branch,
     BranchStatus,
     ContinuationOptions,
     HarmonicBalance,
@@ -27,6 +28,7 @@ from fecontact.bifurcation.nonlinear_modes.linear_start import (
     with_mass_damping,
 )
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import returned_noted
+from fecontact.cli.mode_results import mode_csv
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.laws import FourParameterIwanFriction, Harmonic, JenkinsFriction, PrescribedForce
 from fecontact.reduction import PolynomialSpring, point_masses
@@ -138,6 +140,18 @@ def test_mode_goes_through_its_internal_resonance(resonant):
     assert mode.stable[0]
     assert not mode.stable[-1]
     assert any(point.kind == "branch point" for point in mode.branch.special)
+
+
+def test_a_file_of_points_takes_each_column_once(resonant, monkeypatch):
+    """Otherwise its time grows with the square of the number of points."""
+    _, mode = resonant
+    taken = []
+    column = Branch.column
+    monkeypatch.setattr(Branch, "column", lambda branch, name: (
+        taken.append(name), column(branch, name))[1])
+    lines = mode_csv(mode).splitlines()
+    assert len(lines) == len(mode) + 1
+    assert len(taken) < 20 < len(mode)
 
 
 def test_energies_at_the_ends_of_the_resonance(resonant):

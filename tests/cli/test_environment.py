@@ -72,3 +72,24 @@ def test_descriptors_stay_open_for_children():
     done = subprocess.run(["sh", "-c", shell, "sh", sys.executable, "-c", code],
                           capture_output=True, text=True, check=False)
     assert done.stdout == "True 0"
+
+
+def test_ctrl_c_while_modules_are_loaded_is_one_sentence():
+    code = """
+import sys
+from importlib.abc import MetaPathFinder
+
+import fecontact.cli
+
+
+class Interrupted(MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == "fecontact.cli.entry":
+            raise KeyboardInterrupt
+
+
+sys.meta_path.insert(0, Interrupted())
+fecontact.cli.main()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "error: interrupted.\n")

@@ -34,6 +34,7 @@ from fecontact import (
 )
 from fecontact.cli.templates import TEMPLATES, template
 from fecontact.core.dotted_parameters import flattened
+from fecontact.core.errors import ModelWarning
 from fecontact.fem.shapes import Beam, Block, Pendulum
 from fecontact.integrate import SetValued, TimeStepping
 from fecontact.integrate.solvers import SOLVERS
@@ -574,11 +575,18 @@ def test_implausible_values_are_warned_of_before_a_run(tiny, changes, message):
     assert not implausible(tiny)
 
 
+def test_implausible_values_are_warned_of_before_an_error_of_the_basis(tiny):
+    light = tiny.with_(**{"body.density": 2.5e-9, "basis.contact": "nowhere"})
+    with pytest.warns(ModelWarning, match=r"density = 2\.5e-09 kg/m3 of the body is not from"), (
+            pytest.raises(FecontactError, match="nowhere")):
+        light.run()
+
+
 def implausible(study):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        system = study.system()
-        study.warn_of_bodies()
+        with study.warning_of_bodies():
+            system = study.system()
     bodies = PlannedBodies(study.made_bodies(), study.contact_faces, system)
     return (*(str(one.message) for one in caught), *implausible_faces(bodies),
             *implausible_values(Planned(system, study.t_end, np.zeros(system.size))))

@@ -18,7 +18,7 @@ from fecontact.system import jacobian as kernels
 from fecontact.system.contact_system import ContactSystem, needs_friction
 from fecontact.system.elastic_sliders import without_elements
 from fecontact.system.fields.vector_field import VectorField
-from fecontact.system.forcing_period import common_period, drive_sets_period
+from fecontact.system.forcing_period import DRIVE_FREQUENCY, common_period, drive_sets_period
 from fecontact.system.nodes import SystemArrays
 from fecontact.system.parameter_labels import parameter_label
 
@@ -155,8 +155,8 @@ class ContactField(VectorField):
         AnalysisError
             If what is given in time is not periodic.
         """
-        name = "drive.frequency_hz"
-        if name in self._family.own or list(self.parameters)[index] != name:
+        if DRIVE_FREQUENCY in self._family.own or (
+                list(self.parameters)[index] != DRIVE_FREQUENCY):
             return False
         return drive_sets_period(self.system() if len(values) == 1 else self.system(values))
 

@@ -54,12 +54,12 @@ from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.initial_state import initial_state
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
+from fecontact.system.forcing_period import DRIVE_FREQUENCY, require_effect
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 
 # Options of branches, unless others are given.
 RESPONSES = ContinuationOptions(points=2000, largest_step=0.03)
-_FREQUENCY = "drive.frequency_hz"
 
 
 @read_only_arrays
@@ -246,8 +246,8 @@ def frequency_response(
     Raises
     ------
     InputError, AnalysisError
-        For a parameter or point that does not exist, no excitation with a period, or a level at
-        which no orbit is found to start from.
+        For a parameter or point that does not exist, the frequency of a drive that moves nothing,
+        no excitation with a period, or a level at which no orbit is found to start from.
     """
     require_kind("frequency_response", (ContactSystem, VectorField), system=system)
     require_kind("frequency_response", (str, NoneType), parameter=parameter)
@@ -258,7 +258,10 @@ def frequency_response(
     chosen = options_of(options or RESPONSES, bounds)
     level_name, values = levels_of(levels)
     if isinstance(system, ContactSystem):
-        name = parameter or _FREQUENCY
+        name = parameter or DRIVE_FREQUENCY
+        # Levels may be those of the drive, which is at rest without them.
+        if not (level_name or "").startswith("drive."):
+            require_effect(system, name)
         ranges = {name: (float(chosen.bounds[0]), float(chosen.bounds[1]))}
         if level_name:
             ranges[level_name] = (float(values.min()), float(values.max()))

@@ -38,6 +38,7 @@ from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
+from fecontact.system.forcing_period import DRIVE_FREQUENCY, require_effect
 from fecontact.system.quasistatic.history import LoadHistory
 from fecontact.system.quasistatic.rest_state import RestState
 
@@ -98,10 +99,12 @@ def controlled_response(
         raise InputError(f"controlled_response: amplitudes = {amplitudes!r} must be one or several "
                          f"numbers above zero.")
     chosen = options_of(options or RESPONSES, bounds)
-    name = parameter or "drive.frequency_hz"
+    name = parameter or DRIVE_FREQUENCY
     if name == force:
         raise InputError(f"controlled_response: parameter and force are both {force!r}; take "
                          f"another parameter.")
+    if isinstance(system, ContactSystem) and not force.startswith("drive."):
+        require_effect(system, name)
     field = system if isinstance(system, VectorField) else contact_field(system, [force, name])
     row, observed = observed_row(field, observe)
     values = field.values

@@ -124,6 +124,8 @@ def response(
             echo(f"note: {note}")
         echo_written(*files)
     if found.interrupted:
+        echo("note: The response was interrupted: the last branch may be incomplete, and levels "
+             "after it are missing; go on with --resume.")
         return INTERRUPTED
     stalled = [f"{level:g}" for level, branch in zip(found.response.levels,
                                                      found.response.branches, strict=True)

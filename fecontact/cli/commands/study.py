@@ -176,11 +176,10 @@ def modes(
     with output_folder(output or described.results) as folder:
         if described.symmetry is not None and nonlinear is not None:
             return follow_mode(described, nonlinear, amplitudes, folder, resume)
-        with waiting("Computing modes"):
+        with described.warning_of_bodies(), waiting("Computing modes"):
             basis = described.reduced.basis
             bases = described.modal_bases() if described.bodies else {"": basis}
             interfaces = interfaces_of(described)
-        described.warn_of_bodies()
         for (name, one), part in zip(bases.items(), name_parts(bases), strict=True):
             if name:
                 echo(f"\n{name}:")

@@ -33,8 +33,8 @@ def buckling(
     if described.bodies:
         raise InputError(f"{described.title}: buckling is that of a single body; describe it in "
                          f"[geometry] and [body].")
-    body, places = described.elastic_body(), described.basis.load_points
-    described.warn_of_bodies()
+    with described.warning_of_bodies():
+        body, places = described.elastic_body(), described.basis.load_points
     with output_folder(output or described.results) as folder:
         with waiting("Computing load factors"), located(f"{described.title}:"):
             found = buckling_loads(body, described.load, count, points=places)
@@ -85,9 +85,8 @@ def campbell(
         raise InputError(f"--points {points} and --speeds {speeds[0]:g} {speeds[1]:g} must be at "
                          f"least two speeds, the lower one first.")
     with output_folder(output or described.results) as folder:
-        with waiting("Computing modes"):
+        with described.warning_of_bodies(), waiting("Computing modes"):
             diagram = diagram_of(described.modal_basis(), np.linspace(*speeds, points), count=count)
-        described.warn_of_bodies()
         echo(str(diagram))
         if orders:
             show(table("order", "critical speeds [rad/s]", left=2, rows=(
