@@ -264,7 +264,7 @@ def stored_run(
         from fecontact.system.model_limits import warn_of_limits
 
         warn_of_limits(exceeded, "In this run")
-    current = study is None or _same_values(study, case.study, trust)
+    current = study is None or _same_run(study, case.study, trust)
     if current:
         warn_of_changed_files(path)
     if study is not None:
@@ -300,10 +300,16 @@ def stored_or_computed_run(
     known = trust or law_files(study.tables())
     if found is not None:
         case = read_case(path, trust=known)
-        if _same_values(study, case.study, trust) and not _changed_since(study, case.study):
+        if _same_run(study, case.study, trust) and not _changed_since(study, case.study):
             return StoredRun(path, case.trajectory, study.render, True, case.study, case.versions)
     _ = study.t_end
     return StoredRun(path, study.run(True), study.render, True, study.to_toml())
+
+
+def _same_run(study: "Study", stored: str | None, trust: bool) -> bool:
+    """Whether a stored study has the values of a study that affect its run in time."""
+    preload = [] if study.simulation.initial == "preload" else ["preload"]
+    return _same_values(study, stored, trust, "branch", "response", "wear", *preload)
 
 
 def _same_values(
@@ -325,9 +331,9 @@ def _same_values(
     kept = [*NOT_OF_THE_RUN, *sections]
     if masses_of_sensors(study.measurement) == masses_of_sensors(earlier.measurement):
         kept.append("measurement")
-    return study == replace(earlier, **{name: getattr(study, name) for name in kept},
-                            response=replace(earlier.response, **{
-                                name: getattr(study.response, name) for name in free}))
+    response = replace(earlier.response, **{name: getattr(study.response, name) for name in free})
+    return study == replace(earlier, **{"response": response}
+                            | {name: getattr(study, name) for name in kept})
 
 
 def _changed_since(study: "Study", stored: str | None) -> list[str]:

@@ -71,6 +71,16 @@ def test_set_is_for_studies_alone(cli, study):
         assert (code, "name the study instead" in err) == (1, True), command
 
 
+def test_sections_of_other_analyses_leave_a_run_current(cli, study):
+    """Responses, branches and wear do not affect a run; a preload does where the run starts."""
+    assert cli("run", study)[0] == 0
+    for section in ("[response]\nbounds = [5.0, 20.0]", "[branch]\nbounds = [0.1, 0.2]",
+                    "[wear]\ncoefficient = 1e-12", "[preload]\nload_scale = [0.0, 1.0]"):
+        study.write_text(f"{TINY}\n{section}\n")
+        code, _, err = cli("plot", study, "phase")
+        assert (code, err) == (0, ""), section
+
+
 def test_runs_of_files_that_have_changed_since(cli, study, tmp_path, opened):
     """Data of a law, read by the run itself and by its study, which is run again for a report."""
     data, run = tmp_path / "ground.csv", tmp_path / "results" / "tiny.vtkhdf"
