@@ -143,6 +143,15 @@ def test_picture_has_stable_and_unstable_parts_of_each_level(response, tmp_path)
     assert (tmp_path / "response.png").stat().st_size > 10_000
 
 
+def test_picture_of_a_phase_that_changes_little_has_ticks(response):
+    """Far below the resonance, where no multiples of 45 degrees lie within the axis."""
+    level = replace(response.branches[0], points=response.branches[0].points[:3])
+    lower = plot.plot_response(replace(response, branches=(level,), levels=(0.02,))).axes[1]
+    low, high = lower.get_ylim()
+    assert high - low < 45.0
+    assert ((lower.get_yticks() >= low) & (lower.get_yticks() <= high)).sum() > 1
+
+
 @pytest.mark.parametrize(("changes", "told"), [
     ({"levels": {"P": [1.0], "W": [1.0]}}, "levels has 2 names"),
     ({"levels": {"Q": [1.0]}}, "Q"),

@@ -58,11 +58,13 @@ def plot_response(
     with new_figure(9.0, 6.4, path) as figure:
         _, lower = draw_stacked(figure, response_diagrams(
             response, logarithmic=logarithmic, y_label=y_label, usable_hz=usable_hz), (2.2, 1.0))
-        lower.set_yticks(_degrees(lower.get_ylim()))
+        if len(ticks := _degrees(lower.get_ylim())) > 1:
+            lower.set_yticks(ticks)
     return figure
 
 
 def _degrees(limits: tuple[float, float]) -> Array:
+    """Multiples of 45 or 90 degrees within the limits of an axis."""
     step = 45.0 if limits[1] - limits[0] < 300.0 else 90.0
     return np.arange(np.ceil(limits[0] / step), np.floor(limits[1] / step) + 1.0) * step
 
