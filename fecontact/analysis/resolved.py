@@ -21,6 +21,7 @@ _ERROR, _TOLD_ERROR = 1.0 / 400.0, 1.0 / 50.0
 # Ranges of displacements and velocities below these fractions of the largest one are noise, as are
 # changes of forces below this fraction of the largest.
 _SMALL, _SMALL_RATE, _SMALL_FORCE = 1e-5, 1e-4, 1e-6
+_ROUNDING = 1e-11  # of the largest displacement, below which all motion of a run is rounding
 _TOLD = 2e-3  # fraction of the time
 _NODES = 8  # contact nodes monitored besides the named points
 
@@ -90,7 +91,7 @@ def _resolved(run: Trajectory) -> Resolved:
 def _coarse(run: Trajectory, error: float) -> Flags:
     """Flags (N - 1,) of the intervals in which straight lines have a larger error."""
     moved, rates = _motion(run)
-    sizes, rate_sizes = _ranges(moved, rates)
+    sizes, rate_sizes = _ranges(moved, rates, float(np.diff(run.time).max()))
     normal, friction = run.normal_force, run.friction_forces
     forces = np.column_stack([normal.sum(axis=1), friction.sum(axis=1)])
     large = np.abs(forces).max(axis=0)
@@ -138,9 +139,16 @@ def _motion(run: Trajectory) -> tuple[Array, Array]:
     return run.modal_coordinates @ rows.T, run.modal_velocities @ rows.T
 
 
-def _ranges(moved: Array, rates: Array) -> tuple[Array, Array]:
-    """Ranges (k,) that scale displacements and velocities."""
+def _ranges(moved: Array, rates: Array, spacing: float) -> tuple[Array, Array]:
+    """Ranges (k,) that scale displacements and velocities; infinite for a run at rest.
+
+    At rest, displacements change by rounding only, also by the velocities over the ``spacing`` of
+    outputs.
+    """
     ranges, speeds = np.ptp(moved, axis=0), np.ptp(rates, axis=0)
+    change = max(ranges.max(initial=0.0), spacing * np.abs(rates).max(initial=0.0))
+    if change <= _ROUNDING * np.abs(moved).max(initial=0.0):
+        return np.full_like(ranges, np.inf), np.full_like(speeds, np.inf)
     return (np.maximum(ranges, _SMALL * ranges.max(initial=0.0)),
             np.maximum(speeds, _SMALL_RATE * speeds.max(initial=0.0)))
 

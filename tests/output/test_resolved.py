@@ -163,6 +163,16 @@ def test_pictures_say_where_they_are_too_coarse(tmp_path):
     assert "too long to keep more" in resolved(sparse).note
 
 
+def test_rounding_of_a_run_at_rest_is_no_motion():
+    """Velocities of 1e-17 m/s about a static displacement of 1e-3 m have no peaks to cut."""
+    by_hand = made_by_hand(times=11)
+    noise = np.random.default_rng(0).standard_normal((11, by_hand.basis.modes))
+    rest = replace(by_hand, modal_coordinates=1e-3 * (1.0 + 1e-16 * noise),
+                   modal_velocities=1e-17 * noise)
+    assert not resolved(rest).note
+    assert resolved(replace(rest, modal_velocities=1e-3 * noise)).note
+
+
 def test_thinned_lines_keep_single_peaks_at_uneven_times():
     t = np.sort(np.random.default_rng(0).uniform(0.0, 1.0, 60_000)) ** 3
     y = np.sin(7.0 * t)
