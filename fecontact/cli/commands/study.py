@@ -81,7 +81,8 @@ def import_(
     for sentence in found.notes:
         note(f"note: {sentence}")
     if output is None:
-        echo(f"next: fecontact import {file} -o study.toml")
+        option = "" if scale == 1.0 else f" --scale {scale:g}"
+        echo(f"next: fecontact import {file}{option} -o study.toml")
         return
     write_text(output, found.toml(output.parent))
     echo(f"{output} is written; next: fecontact mesh {output}")
