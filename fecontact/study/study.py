@@ -233,7 +233,11 @@ class Study(Summarised, StudyModels):
             hint = nearest(path.stem, others).replace("'?", ".toml'?")
             raise InputError(f"{path} does not exist{hint}; fecontact init writes a study to start "
                              f"from.") from None
-        except (OSError, UnicodeDecodeError):
+        except UnicodeDecodeError as error:
+            line = error.object.count(b"\n", 0, error.start) + 1
+            raise InputError(f"{path} cannot be read as a study: line {line} is not in UTF-8; save "
+                             f"the file as text in this encoding.") from None
+        except OSError:
             raise InputError(f"{path} cannot be read as a study; give a text file in "
                              f"TOML.") from None
         return cls.from_toml(text, path)
