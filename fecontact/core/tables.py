@@ -152,7 +152,7 @@ def _from_table(cls: type[T], table: Mapping[str, Any], where: str, law: str = "
     entries = {entry.name: entry for entry in fields(cls)}  # type: ignore[arg-type]
     values: dict[str, Any] = {}
     for key, value in table.items():
-        require_known(key, entries, where)
+        require_known(key, [*entries, "law"] if law else entries, where)
         values[key] = convert(value, hints[key], where, key)
     missing = [name for name, entry in entries.items() if name not in values
                and entry.default is MISSING and entry.default_factory is MISSING]
