@@ -249,8 +249,8 @@ def implausible_body(who: str, body: ElasticBody) -> Iterator[str]:
                 *(("youngs_modulus", one, MODULI, "Pa") for one in material.youngs_moduli),
                 ("density", material.density, DENSITIES, "kg/m3"))):
         if not least <= value <= most:
-            yield (f"{key} = {value:.3g} {unit} of {who} is not from {least:g} to {most:g} "
-                   f"{unit}; check its unit.")
+            yield (f"{who} has {key} = {value:.3g} {unit}, not from {least:g} to {most:g} {unit}; "
+                   f"check its unit.")
 
 
 def _chords(planned: PlannedBodies) -> Iterator[str]:
