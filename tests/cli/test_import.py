@@ -171,10 +171,20 @@ def test_a_single_body_and_units(cli, place):
     assert code == 0
     assert "has an extent of 100 m" in err
     assert "give a mesh in mm the scale 1e-3" in " ".join(err.split())
+    _, out, _ = cli("import", "part.msh", "--scale", "1e-3")
+    assert "next: fecontact import part.msh --scale 0.001 -o study.toml" in out
     assert cli("import", "part.msh", "--scale", "1e-3", "-o", "study.toml")[0] == 0
     study = Study.read("study.toml")
     assert study.mesh().extent == pytest.approx(np.hypot(0.1, 0.04))
     assert cli("run", "study.toml", "--set", "simulation.t_end=1e-5")[0] == 0
+
+
+def test_notes_name_keys_as_they_are_written(place):
+    """A deck in t/mm3 read in m: the density looks wrong."""
+    (place / "light.inp").write_text(part("A", block_mesh((1, 1, 1), (0.1, 0.04, 0.02)))
+                                     + MATERIAL.replace("7850.", "7.85e-9"))
+    assert "The body has density = 7.85e-09 kg/m3, not from 1 to 25000 kg/m3; check its unit." in (
+        imported("light.inp").notes)
 
 
 @pytest.mark.parametrize(("name", "message"), [
