@@ -282,8 +282,11 @@ def output_folder(folder: Path) -> Iterator[Path]:
             pass
     except OSError as error:
         _remove_empty(made)
-        raise InputError(f"The folder {folder} cannot be written "
-                         f"({(error.strerror or str(error)).lower()}); choose another "
+        reason = (error.strerror or str(error)).lower()
+        if isinstance(error, FileExistsError | NotADirectoryError):
+            file = next((path for path in (folder, *folder.parents) if path.is_file()), folder)
+            reason = f"{file} is a file, not a folder"
+        raise InputError(f"The folder {folder} cannot be written ({reason}); choose another "
                          f"one.") from None
     try:
         yield folder
