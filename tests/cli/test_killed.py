@@ -17,7 +17,7 @@ from tiny_study import TINY
 
 from fecontact import read_case, sweep
 from fecontact.cli import execute
-from fecontact.integrate.rodas5p import driver
+from fecontact.integrate import step_runs
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.io import read_table
 
@@ -51,7 +51,7 @@ def start(work):
     try:
         # Checkpoints after every piece of a run, and short pieces.
         Checkpoint.keep = Checkpoint.write
-        driver.finish.__defaults__ = (None, 0.02, None)
+        step_runs._SECONDS = 0.02
         code = work() or 0
     except BaseException:
         traceback.print_exc()
