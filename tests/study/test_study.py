@@ -581,7 +581,7 @@ def test_implausible_values_are_warned_of_before_a_run(tiny, changes, message):
 
 def test_implausible_values_are_warned_of_before_an_error_of_the_basis(tiny):
     light = tiny.with_(**{"body.density": 2.5e-9, "basis.contact": "nowhere"})
-    with pytest.warns(ModelWarning, match=r"density = 2\.5e-09 kg/m3 of the body is not from"), (
+    with pytest.warns(ModelWarning, match=r"density = 2\.5e-09 kg/m3, not from"), (
             pytest.raises(FecontactError, match="nowhere")):
         light.run()
 
