@@ -8,6 +8,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
+from fecontact.laws.signals.harmonic import Constant
 from fecontact.reduction.assembly.contact_faces import node_name
 from fecontact.reduction.modal_basis import ModalBasis
 
@@ -40,7 +41,8 @@ class History(NamedTuple):
 
 
 def history(
-    trajectory: Trajectory, quantity: str = "displacement", point: Point = "B", component: str = "x"
+    trajectory: Trajectory, quantity: str = "displacement", point: Point | None = None,
+    component: str = "x",
 ) -> History:
     """A quantity of a run at one point over time.
 
@@ -53,8 +55,9 @@ def history(
         'penetration', 'penetration_rate', 'slip_velocity', 'line_load', 'pressure' or
         'friction_work' of a contact node; 'total_normal_force', 'total_friction_force' or
         'total_friction_work' of the whole face.
-    point : str, int, (x, y) or (x, y, z)
-        See :meth:`Trajectory.displacement`.
+    point : str, int, (x, y) or (x, y, z), optional
+        See :meth:`Trajectory.displacement`; by default the first that moves of B, the middle
+        contact node, C and the other named points.
     component : 'x', 'y' or 'phi', of solids also 'z', 'phi_x', 'phi_y', 'phi_z'
         Component of motions of points: tangential, normal, or rotation. Contact nodes
         of several bodies move relative to the other side, along their tangents and normals.
@@ -68,6 +71,7 @@ def history(
     require_kind("history", Trajectory, trajectory=trajectory)
     unit = quantity_unit(quantity, component)
     title, basis = quantity.replace("_", " "), trajectory.basis
+    point = usual_point(basis) if point is None else point
     if quantity in _TOTALS:
         return History(getattr(trajectory, _TOTALS[quantity]).sum(axis=1), unit, title)
     if quantity in _OF_NODES:
@@ -104,9 +108,28 @@ def quantity_unit(quantity: str, component: str = "x") -> str:
     return unit.replace("m", "rad") if turns else unit
 
 
+def usual_point(basis: ModalBasis) -> str | int:
+    """Default point: the first that moves of B, the middle contact node, C, other named points."""
+    middle = [basis.contact_nodes // 2] if basis.contact_nodes else []
+    points: tuple[str | int, ...] = ("B", *middle, "C", *basis.extra)
+    return next((one for one in points if is_displaced(one, basis)), "B")
+
+
+def is_displaced(point: str | int, basis: ModalBasis) -> bool:
+    """Return True if some mode displaces a point; rotations do not count."""
+    return bool(basis.T[basis.point_index(point), : basis.dimension].any())
+
+
 def usual_component(system: "ContactSystem") -> str:
-    """Component in which a system moves most: the one that alone is driven, else x."""
+    """Component in which a system moves most: the one that alone is driven or excited, else x.
+
+    Varying forces count where nothing is driven.
+    """
     drive = system.drive
+    if not any(drive.moves):
+        along = {force.component for force in system.load.forces
+                 if not isinstance(force.signal, Constant)}
+        return next((axis for axis in "yz" if along == {axis}), "x")
     if drive.stiffness_z > 0.0 and not (drive.stiffness_x or drive.stiffness_y):
         return "z"
     return "y" if drive.stiffness_y > 0.0 and drive.stiffness_x == 0.0 else "x"

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fecontact.analysis.histories import point_name
+from fecontact.analysis.histories import point_name, usual_point
 from fecontact.analysis.periodicity import Steadiness, drive_period, steadiness
 from fecontact.analysis.sampling import alias_message
 from fecontact.analysis.spectra import FEWEST_PERIODS
-from fecontact.analysis.summaries import RUN_SUMMARIES, Point, usual_point
+from fecontact.analysis.summaries import RUN_SUMMARIES, Point
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.units import quantity

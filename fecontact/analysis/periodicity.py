@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from fecontact.analysis.histories import Point
+from fecontact.analysis.histories import Point, usual_point
 from fecontact.analysis.resolved import resolved
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_positive
@@ -192,7 +192,7 @@ def section_states(
     begin = _start(trajectory, t_start)
     basis, m = trajectory.basis, trajectory.basis.modes
     if point is None:
-        points: list[str | int] = ["B", *range(basis.contact_nodes)]
+        points: list[str | int] = [usual_point(basis), *range(basis.contact_nodes)]
         axes = basis.components[: basis.dimension]
         rates = trajectory.modal_velocities[trajectory.time >= begin]
         ranges = {(one, axis): float(np.ptp(rates.dot(basis.point_row(one, axis))))

@@ -105,7 +105,7 @@ def coarse_frames_message(trajectory: Trajectory, shown: Array) -> str:
 
 
 def evenly_sampled_history(
-    trajectory: Trajectory, quantity_name: str, point: Point, component: str
+    trajectory: Trajectory, quantity_name: str, point: Point | None, component: str
 ) -> Sampled:
     """A quantity of a run at even times that resolve it, from the motion between the outputs.
 

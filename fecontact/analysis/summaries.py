@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.analysis.histories import usual_point
 from fecontact.analysis.sampling import warn_of_aliases
 from fecontact.core.docstrings import summary
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.assembly.contact_faces import contact_faces
-from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system.columns import POWERS
 from fecontact.system.contact_quantities import ContactState
 
@@ -34,13 +34,6 @@ class Summary:
     def text(self) -> str:
         """Description for display."""
         return summary(self.function)
-
-
-def usual_point(basis: ModalBasis) -> str | int:
-    """Default point: B; the middle contact node if no mode moves B, and C without contact."""
-    if basis.T[0].any():
-        return "B"
-    return basis.contact_nodes // 2 if basis.contact_nodes else "C"
 
 
 def duration(trajectory: Trajectory) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from fecontact.analysis.summaries import usual_point
+from fecontact.analysis.histories import usual_point
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, titled
 from fecontact.bifurcation.equilibria.branches import equilibrium_branch

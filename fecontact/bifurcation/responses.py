@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecontact.analysis.histories import usual_component
-from fecontact.analysis.summaries import usual_point
+from fecontact.analysis.histories import usual_component, usual_point
 from fecontact.bifurcation.continuation.problem import BranchStatus, titled
 from fecontact.bifurcation.harmonic.engine_order import EngineOrder
 from fecontact.bifurcation.harmonic.response import FrequencyResponse, frequency_response

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fecontact.analysis.summaries import usual_point
+from fecontact.analysis.histories import usual_point
 from fecontact.cli.run_files import StoredRun, warn_of_changed_files
 from fecontact.core.checks import whole_number
 from fecontact.core.errors import FecontactError, InputError, choices
@@ -81,7 +81,20 @@ def stored_orbit_or_run(
         place = ("" if branch.parameter_name.endswith(("frequency_hz", "xi"))
                  else f"{branch.parameter_name} = {point.parameter:.5g}, ")
         settings = replace(settings, title=f"{_called(name, branch)}{place}{1.0 / period:.5g} Hz")
-    return StoredRun(file, run, settings, True, model.study, model.versions)
+    return StoredRun(file, run, settings, True, model.study, model.versions,
+                     _observed(branch, model))
+
+
+def _observed(branch: "Branch", model: "StoredModel") -> tuple[str | int, Any]:
+    """Point and component that are observed along a branch."""
+    if "observed" in branch.attributes:
+        seen, _, component = str(branch.attributes["observed"]).rpartition(" ")
+        number = whole_number(seen)
+        return seen if number is None else number, component
+    settings = tomllib.loads(model.study or "").get("branch", {})
+    point = settings.get("point")
+    return (usual_point(model.system.basis) if point is None else point,
+            settings.get("component", "x"))
 
 
 def _require_no_wave(file: Path, named: "dict[str, Branch]") -> None:
@@ -190,23 +203,17 @@ def write_orbit_page(file: Path, target: Path, trust: bool) -> Path:
     _require_no_wave(file, named)
     first = next(iter(named.values()))
     title = file.stem.removesuffix("-branch").removesuffix("-response")
+    observe = _observed(first, model)
     if "observed" in first.attributes:
-        seen, _, component = str(first.attributes["observed"]).rpartition(" ")
-        number = whole_number(seen)
-        place = seen if number is None else number
         write: Any = report_response if "level" in first.attributes else report_modes
         shown: Any = (response_of(named) if "level" in first.attributes
                       else [mode_of(one) for one in named.values()])
-        return Path(write(shown, model.system, target, title=title, observe=(place, component),
+        return Path(write(shown, model.system, target, title=title, observe=observe,
                           study=with_given_keys(model.study)))
     settings = tomllib.loads(model.study or "").get("branch", {})
-    basis, point = model.system.basis, settings.get("point")
-    if point is None:
-        point = usual_point(basis)
     return report_branches(named, field_of(first, model), target, title=title,
                            study=with_given_keys(model.study),
-                           observe=(point, settings.get("component", "x")),
-                           y=f"observed_{settings.get('show', 'maximum')}")
+                           observe=observe, y=f"observed_{settings.get('show', 'maximum')}")
 
 
 def plotted(file: Path, kind: str, target: Path) -> Path:

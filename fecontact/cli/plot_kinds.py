@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecontact.analysis.histories import Point, component_of
+from fecontact.analysis.histories import Point, component_of, usual_point
 from fecontact.cli.orbit_files import DIAGRAMS, OrbitChoice, holds_branches
 from fecontact.core.checks import whole_number
 from fecontact.core.errors import AnalysisError, InputError, choices, nearest, require_positive
@@ -56,9 +56,9 @@ class PlotRequest:
             require_positive("plot", period=self.period)
 
     @property
-    def point(self) -> Point:
-        """The first point, or B."""
-        return self.points[0] if self.points else "B"
+    def point(self) -> Point | None:
+        """The first point, None for the default of a plot."""
+        return self.points[0] if self.points else None
 
     def shown_component(self, run: Trajectory) -> str:
         """The component; that in which the system moves most where none is chosen."""
@@ -73,12 +73,13 @@ def _receptance(run: Trajectory, c: PlotRequest, path: Path | None) -> "Figure":
     whole, usable = 1.2 * float(basis.frequencies_hz[-1] or 100.0), usable_hz(basis)
     end = c.highest_hz or (whole if c.beyond else min(whole, usable))
     f = np.linspace(end / 2000.0, end, 2000)
-    if not isinstance(c.point, str | int):
+    point = usual_point(basis) if c.point is None else c.point
+    if not isinstance(point, str | int):
         raise InputError(f"The receptance is one of named points and contact nodes, not of "
-                         f"{c.point!r}.")
+                         f"{point!r}.")
     from fecontact.analysis.receptance import Place, receptance
 
-    place: list[Place] = [(c.point, c.shown_component(run))]
+    place: list[Place] = [(point, c.shown_component(run))]
     found = [receptance(run.system, f, place)]
     labels = ["apart from the ground"]
     # Without steady sliding, as on waves, there is no equilibrium for the linearisation.

@@ -106,8 +106,7 @@ def write_results_of_run(
 
 def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Path]:
     """Plot histories, phase plane, contact and energies of a run into a folder; the files."""
-    from fecontact.analysis.histories import component_of
-    from fecontact.analysis.summaries import usual_point
+    from fecontact.analysis.histories import component_of, usual_point
     from fecontact.output.plots import run as plots
     from fecontact.output.plots.contact_map import plot_contact_map
 
@@ -172,6 +171,8 @@ class StoredRun:
         The study that described the run, as TOML text.
     versions : mapping
         Versions of the programs that computed it.
+    observed : (point, component) or None
+        Point and component that are observed along the branch of an orbit.
     """
 
     path: Path
@@ -180,6 +181,7 @@ class StoredRun:
     current: bool = True
     study: str | None = None
     versions: Mapping[str, str] = field(default_factory=dict)
+    observed: tuple[str | int, Any] | None = None
 
 
 def has_run(file: Path, changes: Iterable[str] | None = None) -> Path:

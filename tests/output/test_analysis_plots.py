@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from synthetic import basis, run
 
-from fecontact import Drive, InputError, simulate, write_case
-from fecontact.analysis import receptance
+from fecontact import Drive, InputError, Load, PointLoad, simulate, write_case
+from fecontact.analysis import history, receptance
+from fecontact.analysis.histories import usual_component, usual_point
 from fecontact.cli import execute, plot_kinds
 from fecontact.integrate import Rodas5P
 from fecontact.integrate.rodas5p import driver
+from fecontact.laws import Harmonic
 from fecontact.output.plots import analysis
 
 
@@ -168,3 +170,35 @@ def test_points_of_a_command_line():
     assert plot_kinds.point_of("0.1,0.02") == (0.1, 0.02)
     with pytest.raises(InputError, match="place x,y in m"):
         plot_kinds.point_of("1,b")
+
+
+def test_the_default_point_is_one_that_is_displaced(trajectory):
+    body = trajectory.basis
+    T = body.T.copy()
+    assert usual_point(body) == "B"
+    T[0, :2], T[0, 2] = 0.0, 1.0  # rotations of a clamped point need not be zero
+    fixed = replace(body, T=T)
+    assert usual_point(fixed) == 2
+    clamped = replace(trajectory, system=replace(trajectory.system, basis=fixed))
+    assert not clamped.displacement("B")[:, :2].any()
+    assert history(clamped).title == "displacement x of contact node 2"
+    assert plot_kinds.redraw(clamped, "phase").axes[0].get_title() == "contact node 2"
+    T[4] = 0.0
+    assert usual_point(replace(body, T=T)) == "C"
+
+
+def test_a_force_alone_gives_the_default_component(trajectory):
+    force = PointLoad("C", "y", signal=Harmonic(2.0, frequency_hz=150.0))
+    system = trajectory.system
+    assert usual_component(replace(system, load=Load(forces=[force]))) == "y"
+    assert usual_component(replace(system, load=Load(forces=[PointLoad("C", "y", signal=2.0)]))) == (
+        "x")
+
+
+def test_a_spectrum_of_zeros_is_drawn_over_a_linear_axis(trajectory):
+    still = replace(trajectory, modal_velocities=np.zeros_like(trajectory.modal_velocities))
+    for density in (False, True):
+        panel = analysis.plot_spectrum(still, density=density).axes[0]
+        panel.figure.canvas.draw()
+        assert panel.get_yscale() == "linear"
+        assert not panel.lines[0].get_ydata().any()

@@ -18,7 +18,8 @@ def compare(
         "Files written by fecontact run, their folders or studies; or files of branches."))],
     point: Annotated[list[str] | None, Parameter(
         negative=(), show_default=False,
-        help="Name of a point or number of a contact node; B by default. May be repeated.")] = None,
+        help="Name of a point or number of a contact node; by default B, or "
+        "another point that moves. May be repeated.")] = None,
     component: Annotated[str | None, Parameter(
         help="Direction of the motion, x, y or z; by default that of the drive.")] = None,
     quantity: Annotated[str, Parameter(

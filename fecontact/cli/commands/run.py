@@ -178,7 +178,8 @@ def plot(
     set_: Changes = None,
     point: Annotated[list[str] | None, Parameter(
         negative=(), show_default=False,
-        help="Name of a point, number of a contact node, or place x,y or x,y,z; B by default. "
+        help="Name of a point, number of a contact node, or place x,y or x,y,z; by default B, or "
+        "the first that moves of the contact, C and other points; of an orbit the observed point. "
         "A history takes several.")] = None,
     component: Annotated[Literal["x", "y", "z", "phi", "phi_x", "phi_y", "phi_z"] | None, Parameter(
         help="Component of the motion: x, y or phi of plane bodies, x, y, z, phi_x, phi_y or phi_z "
@@ -224,8 +225,10 @@ def plot(
             echo_written(plotted(file, kind, target))
         return
     stored = stored_orbit_or_run(file, trust, set_, chosen)
-    choice = PlotRequest(quantity, tuple(point_of(text) for text in point or ()), component,
-                         highest_hz, period, all_)
+    points = tuple(point_of(text) for text in point or ())
+    if stored.observed is not None:
+        points, component = points or stored.observed[:1], component or stored.observed[1]
+    choice = PlotRequest(quantity, points, component, highest_hz, period, all_)
     target = output or stored.path.with_name(f"{stored.path.stem}-{kind}.png")
     with output_folder(target.parent), waiting("Drawing"), styled(style or {}):
         redraw(stored.trajectory, kind, choice, t_start=t_start, t_end=t_end, path=target)

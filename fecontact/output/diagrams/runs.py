@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fecontact.analysis.histories import Point, is_relative, point_name
-from fecontact.analysis.summaries import usual_point
+from fecontact.analysis.histories import Point, is_displaced, is_relative, point_name, usual_point
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.output.diagrams.colours import COLOURS, ENERGY_COLOURS, distinct_colours
@@ -169,11 +168,11 @@ def ground_speed(run: Trajectory, axis: int) -> float:
 
 
 def usual_points(run: Trajectory) -> tuple[Point, ...]:
-    """Point B, unless it is fixed, and the middle contact node of each face; C without any."""
+    """Point B if it moves and the middle contact node of each face, or the default point."""
     basis = run.basis
     middles = [(face.nodes.start + face.nodes.stop) // 2 for face in contact_faces(basis)
                if face.nodes.stop > face.nodes.start]
-    found = (*(("B",) if basis.T[0].any() else ()), *middles[:_MOST_MIDDLES])
+    found = (*(("B",) if is_displaced("B", basis) else ()), *middles[:_MOST_MIDDLES])
     return found or (usual_point(basis),)
 
 

@@ -20,17 +20,18 @@ def spectrum_diagram(
 ) -> Diagram:
     """Spectra over a common range of frequencies; the ordinates are logarithmic.
 
-    The range ends at ``highest_hz``, or by default where all values have become small.
+    The range ends at ``highest_hz``, or by default where all values have become small. Spectra of
+    zeros alone have a linear ordinate.
     """
     end = highest_hz or max(end_of_content(one.frequency_hz, one.values) for one in spectra)
     top = max(float(one.values.max()) for one in spectra)
-    floor = max(top * 10.0 ** -(DECADES + 1.0), _SMALLEST)
+    floor = max(top * 10.0 ** -(DECADES + 1.0), _SMALLEST) if top > 0.0 else 0.0
     curves = []
     for one, name, colour in zip(spectra, names, colours, strict=True):
         frequency, values = _spectrum_line(one.frequency_hz, one.values, end)
         curves.append(Curve(name, colour, frequency, np.maximum(values, floor), 1.0))
-    return Diagram("frequency [Hz]", y_label, tuple(curves), title=title, logarithmic="y",
-                   x_limits=(0.0, end),
+    return Diagram("frequency [Hz]", y_label, tuple(curves), title=title,
+                   logarithmic="y" if top > 0.0 else "", x_limits=(0.0, end),
                    y_limits=(top * 10.0**-DECADES, 4.0 * top) if top > 0.0 else (None, None))
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.analysis.histories import Point, history, point_name
+from fecontact.analysis.histories import Point, history, point_name, usual_point
 from fecontact.analysis.periodicity import Strobe, section_states, strobed_states
 from fecontact.analysis.resolved import resolved
 from fecontact.analysis.sampling import evenly_sampled_history
@@ -48,7 +48,7 @@ _ROUND_OFF = 1e-9  # of the largest response, below which others are not drawn
 def plot_spectrum(
     trajectory: Trajectory,
     quantity: str = "velocity",
-    point: Point = "B",
+    point: Point | None = None,
     component: str = "x",
     *,
     density: bool = False,
@@ -120,7 +120,7 @@ def plot_spectrum(
 def plot_spectrogram(
     trajectory: Trajectory,
     quantity: str = "velocity",
-    point: Point = "B",
+    point: Point | None = None,
     component: str = "x",
     *,
     piece: float | None = None,
@@ -169,7 +169,7 @@ def plot_spectrogram(
 
 def plot_poincare(
     trajectory: Trajectory,
-    point: Point = "B",
+    point: Point | None = None,
     component: str = "x",
     *,
     period: float | None = None,
@@ -185,8 +185,8 @@ def plot_poincare(
     ----------
     trajectory, path
         See :func:`plot_spectrum`.
-    point : str, int or (x, y)
-        See :meth:`Trajectory.displacement`.
+    point : str, int or (x, y), optional
+        See :func:`fecontact.analysis.history`.
     component : "x" or "y", of solids "z" too
         Direction of the motion.
     period, phase
@@ -202,6 +202,7 @@ def plot_poincare(
     require_kind("plot_poincare", Trajectory, trajectory=trajectory)
     row = direction_row(trajectory, component)
     start = float(trajectory.time[0])
+    point = usual_point(trajectory.basis) if point is None else point
     if period is None and not trajectory.system.drive.fundamental_hz > 0.0:
         found = section_states(trajectory, point, component, t_start=start)
     else:

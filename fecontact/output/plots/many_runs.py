@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from fecontact.analysis.comparison import require_runs
-from fecontact.analysis.histories import Point, component_of, history
+from fecontact.analysis.histories import Point, component_of, history, usual_point
 from fecontact.analysis.spectra import amplitude_spectrum
-from fecontact.analysis.summaries import usual_point
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import ArrayLike

@@ -5,7 +5,7 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fecontact.analysis.histories import Point
+from fecontact.analysis.histories import Point, usual_point
 from fecontact.analysis.resolved import resolved
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices
@@ -98,7 +98,7 @@ def direction_row(trajectory: Trajectory, component: str) -> int:
 
 
 def plot_phase(
-    trajectory: Trajectory, point: Point = "B", component: str = "x", *,
+    trajectory: Trajectory, point: Point | None = None, component: str = "x", *,
     path: str | Path | None = None,
 ) -> "Figure":
     """Plot the velocity of a point over its displacement, and the speed of the ground.
@@ -107,8 +107,8 @@ def plot_phase(
     ----------
     trajectory : Trajectory
         The run.
-    point : str, int or (x, y)
-        See :meth:`Trajectory.displacement`.
+    point : str, int or (x, y), optional
+        See :func:`fecontact.analysis.history`.
     component : "x" or "y", of solids "z" too
         Direction of the motion.
     path : str or Path, optional
@@ -122,6 +122,7 @@ def plot_phase(
     """
     require_kind("plot_phase", Trajectory, trajectory=trajectory)
     row = direction_row(trajectory, component)
+    point = usual_point(trajectory.basis) if point is None else point
     drawn = resolved(trajectory)
     with new_figure(6.4, 5.2, path) as figure:
         add_note(figure, drawn)

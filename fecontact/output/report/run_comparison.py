@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.analysis.comparison import compare_runs
-from fecontact.analysis.histories import Point, component_of, history
-from fecontact.analysis.summaries import usual_point
+from fecontact.analysis.histories import Point, component_of, history, usual_point
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.diagrams.colours import distinct_colours
 from fecontact.output.diagrams.diagram import Curve, Diagram
