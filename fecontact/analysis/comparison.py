@@ -5,11 +5,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from fecontact.analysis.histories import usual_point
 from fecontact.analysis.key_numbers import KeyNumbers, key_numbers
 from fecontact.analysis.summaries import Point
 from fecontact.core.checks import require_kind
 from fecontact.core.dotted_parameters import flattened
 from fecontact.core.errors import InputError
+from fecontact.core.tables import located
 from fecontact.core.units import quantity
 from fecontact.integrate.trajectory import Trajectory
 
@@ -77,7 +79,10 @@ def compare_runs(
     ----------
     runs : mapping of name to Trajectory
         The runs; the first is the reference.
-    points, t_start
+    points : sequence of str or int
+        Named points and contact nodes; by default the first that moves in all runs of B, the middle
+        contact node, C and the other named points.
+    t_start
         See :func:`fecontact.analysis.key_numbers`.
     studies : sequence of str or None
         Study of each run as TOML text, as :attr:`fecontact.io.Case.study` holds it.
@@ -88,11 +93,34 @@ def compare_runs(
         For fewer than two runs, a point that a run does not have, or another number of studies.
     """
     require_runs("compare_runs", runs)
+    chosen = compared_points(runs, points)
     if studies and len(studies) != len(runs):
         raise InputError(f"compare_runs: {len(studies)} studies do not match {len(runs)} runs; "
                          f"give one for each, or none.")
     return Comparison(tuple(runs), differing_parameters(studies), tuple(
-        key_numbers(run, points, t_start=t_start) for run in runs.values()))
+        key_numbers(run, chosen, t_start=t_start) for run in runs.values()))
+
+
+def compared_points(
+    runs: Mapping[str, Trajectory], points: Sequence[Point] = ()
+) -> tuple[Point, ...]:
+    """Points of a comparison: the given ones, or one that moves in all runs if there is any.
+
+    Raises
+    ------
+    InputError
+        For a point that a run does not have.
+    """
+    require_kind("compare_runs", Sequence, points=points)
+    chosen = tuple(points) or (usual_point(*(run.basis for run in runs.values())),)
+    for name, run in runs.items():
+        where = f"{name}:" if points else (
+            f"{name} lacks the default point of {next(iter(runs))}; name a point of all runs, on "
+            f"the command line by --point:")
+        with located(where):
+            for point in chosen:
+                run.basis.point_index(point)
+    return chosen
 
 
 def require_runs(what: str, runs: Mapping[str, Trajectory]) -> None:

@@ -108,15 +108,22 @@ def quantity_unit(quantity: str, component: str = "x") -> str:
     return unit.replace("m", "rad") if turns else unit
 
 
-def usual_point(basis: ModalBasis) -> str | int:
-    """Default point: the first that moves of B, the middle contact node, C, other named points."""
+def usual_point(basis: ModalBasis, *others: ModalBasis) -> str | int:
+    """Default point: the first that moves of B, the middle contact node, C, other named points.
+
+    It moves in all bases if there is such a point.
+    """
     middle = [basis.contact_nodes // 2] if basis.contact_nodes else []
     points: tuple[str | int, ...] = ("B", *middle, "C", *basis.extra)
-    return next((one for one in points if is_displaced(one, basis)), "B")
+    moving = [one for one in points if is_displaced(one, basis)]
+    return next((one for one in moving if all(is_displaced(one, other) for other in others)),
+                moving[0] if moving else "B")
 
 
 def is_displaced(point: str | int, basis: ModalBasis) -> bool:
-    """Return True if some mode displaces a point; rotations do not count."""
+    """Return True if a basis has a point that some mode displaces; rotations do not count."""
+    if point not in ("B", "C", *range(basis.contact_nodes), *basis.extra):
+        return False
     return bool(basis.T[basis.point_index(point), : basis.dimension].any())
 
 

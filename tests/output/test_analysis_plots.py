@@ -188,11 +188,9 @@ def test_the_default_point_is_one_that_is_displaced(trajectory):
 
 
 def test_a_force_alone_gives_the_default_component(trajectory):
-    force = PointLoad("C", "y", signal=Harmonic(2.0, frequency_hz=150.0))
-    system = trajectory.system
-    assert usual_component(replace(system, load=Load(forces=[force]))) == "y"
-    assert usual_component(replace(system, load=Load(forces=[PointLoad("C", "y", signal=2.0)]))) == (
-        "x")
+    for signal, expected in ((Harmonic(2.0, frequency_hz=150.0), "y"), (2.0, "x")):
+        load = Load(forces=[PointLoad("C", "y", signal=signal)])
+        assert usual_component(replace(trajectory.system, load=load)) == expected
 
 
 def test_a_spectrum_of_zeros_is_drawn_over_a_linear_axis(trajectory):

@@ -1,5 +1,7 @@
 """Runs over each other: motions that are known in closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.image import imread
@@ -25,8 +27,8 @@ STUDIES = ("[ground]\nspeed = 0.1\n[output]\nframes = 3\n",
            "[friction]\nlaw = 'constant'\nfriction_coefficient = 0.55\n")
 
 
-def vibration(amplitude, hertz, outputs=1001):
-    shapes = basis()
+def vibration(amplitude, hertz, outputs=1001, contact_nodes=5):
+    shapes = basis(contact_nodes=contact_nodes)
     system = ContactSystem(shapes, normal=LinearContact(stiffness=1e6),
                            friction=ConstantFriction(0.3, smoothing_slope=200.0))
     t = np.linspace(0.0, 1.0, outputs)
@@ -84,6 +86,37 @@ def test_what_cannot_be_compared(runs):
         compare_runs({"slow": runs["slow"]})
     with pytest.raises(InputError, match="1 studies do not match 2 runs"):
         compare_runs(runs, studies=[None])
+    with pytest.raises(InputError, match="slow: Contact node 9 does not exist; there are 5"):
+        compare_runs(runs, [9])
+
+
+def clamped(run, *points):
+    """The run of a body whose first points do not move."""
+    T = run.basis.T.copy()
+    T[list(points)] = 0.0
+    return replace(run, system=replace(run.system, basis=replace(run.basis, T=T)))
+
+
+def test_different_bodies_are_compared_at_a_point_that_moves_in_both(runs, tmp_path):
+    two = {"whole": runs["slow"], "clamped": clamped(runs["fast"], 0, 4)}
+    assert "amplitude_x@C" in compare_runs(two).numbers[0].values
+    assert plot_runs(two).axes[0].get_ylabel().startswith("velocity x of C")
+    page = Shown(report_runs(two, tmp_path / "two.html"))
+    assert page.header["spectra"][0]["title"] == "velocity x of C"
+
+
+def test_bodies_without_a_common_point_are_refused_before_anything_is_written(
+        runs, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    few = vibration(1e-3, 20.0, contact_nodes=2)
+    fc.write_case("many.vtkhdf", clamped(runs["slow"], 0, 1), frames=2)
+    fc.write_case("few.vtkhdf", clamped(few, 0, 1), frames=2)
+    assert execute(["compare", "many.vtkhdf", "few.vtkhdf"]) == 1
+    said = capsys.readouterr()
+    assert "few lacks the default point of many; name a point of all runs, on the command line " \
+        "by --point: Contact node 2 does not exist; there are 2" in said.err
+    assert said.out == ""
+    assert execute(["compare", "many.vtkhdf", "few.vtkhdf", "--point", "0"]) == 0
 
 
 def test_the_command(runs, tmp_path, monkeypatch, capsys):

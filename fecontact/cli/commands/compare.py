@@ -66,14 +66,14 @@ def compare(
                    if isinstance(place := point_of(text), str | int))
     studies = [one.study for one in stored]
     found = compare_runs(runs, points, studies=studies)
-    _show_parameters(found.names, found.parameter_rows())
-    show(table("", *found.names, rows=found.number_rows()))
     with output_folder(page.parent), waiting("Writing"):
         picture = page.with_suffix(".png")
         plot_runs(runs, quantity, points[0] if points else None, component,
                   highest_hz=highest_hz, path=picture)
         report_runs(runs, page, points=points, component=component, studies=studies)
-        echo_written(page, picture)
+    _show_parameters(found.names, found.parameter_rows())
+    show(table("", *found.names, rows=found.number_rows()))
+    echo_written(page, picture)
 
 
 def _beside(file: Path) -> Path:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from fecontact.analysis.comparison import require_runs
-from fecontact.analysis.histories import Point, component_of, history, usual_point
+from fecontact.analysis.comparison import compared_points, require_runs
+from fecontact.analysis.histories import Point, component_of, history
 from fecontact.analysis.spectra import amplitude_spectrum
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError
@@ -60,7 +60,7 @@ def plot_runs(
     """
     require_runs("plot_runs", runs)
     first = next(iter(runs.values()))
-    point = usual_point(first.system.basis) if point is None else point
+    point = compared_points(runs)[0] if point is None else point
     component = component_of(first) if component is None else component
     found = [history(run, quantity, point, component) for run in runs.values()]
     spectra = [amplitude_spectrum(run.time, one.values, resample=True)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.analysis.comparison import compare_runs
-from fecontact.analysis.histories import Point, component_of, history, usual_point
+from fecontact.analysis.comparison import compare_runs, compared_points
+from fecontact.analysis.histories import Point, component_of, history
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.diagrams.colours import distinct_colours
 from fecontact.output.diagrams.diagram import Curve, Diagram
@@ -59,7 +59,7 @@ def report_runs(
     found = compare_runs(runs, points, studies=studies)
     first = next(iter(runs.values()))
     component = component_of(first) if component is None else component
-    chosen: Sequence[Point] = tuple(points) or (usual_point(first.system.basis),)
+    chosen: Sequence[Point] = compared_points(runs, points)
     payload, colours = Payload(), distinct_colours(len(runs))
     begin = max(float(run.time[0]) for run in runs.values())
     end = min(float(run.time[-1]) for run in runs.values())
