@@ -420,6 +420,8 @@ def test_an_interrupted_run_is_resumed(cli, study, monkeypatch, tmp_path):
     code, out, _ = cli("run", study, *longer)
     assert code == 130
     assert "interrupted" in out
+    assert (f"next: fecontact run {study} --set simulation.t_end=0.05 --set simulation.outputs=101 "
+            f"--resume") in " ".join(out.split())
     part = read_case("results/tiny.vtkhdf").trajectory
     assert 0.0 < part.time[-1] < 0.05
     monkeypatch.undo()
@@ -430,6 +432,10 @@ def test_an_interrupted_run_is_resumed(cli, study, monkeypatch, tmp_path):
     assert (code, err) == (1, f"error: {checkpoint} holds an interrupted run; go on with --resume, "
                               f"start again with --overwrite, or choose another folder with -o.\n")
     assert cli("run", study, "--resume", "--overwrite")[0] == 1
+    code, _, err = cli("run", study, "--resume")
+    assert code == 1
+    assert "another run" in err
+    assert "repeat the values of that run, remove the file or name another one" in err
     assert checkpoint.read_bytes() == kept
     assert cli("run", study, *longer, "--resume")[0] == 0
     resumed = read_case("results/tiny.vtkhdf").trajectory

@@ -1,6 +1,7 @@
 """Commands that work on a study: ``init``, ``import``, ``mesh``, ``modes``, ``run``, ``wear``."""
 
 import os
+import shlex
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -334,6 +335,11 @@ def run(
         for note in notes(trajectory):
             echo(f"note: {note}")
         echo_written(*files)
+    if ended == "INTERRUPTED":
+        changes = [part for change in set_ or () for part in ("--set", change)]
+        place = [] if output is None else ["-o", str(output)]
+        again = shlex.join(["fecontact", "run", str(study), *changes, *place, "--resume"])
+        echo(f"next: {again}")
     if ended not in ("FINISHED", "EVENT", "INTERRUPTED"):
         return fail("the run did not reach its end; what was computed is written.", 1)
     return INTERRUPTED if ended == "INTERRUPTED" else 0

@@ -60,8 +60,8 @@ class Checkpoint:
             mark = str(stored["mark"])
         if mark != self.mark:
             raise InputError(f"{self.path} is the checkpoint of another run (other system, "
-                             f"start, output times or tolerance); remove it or name "
-                             f"another file.")
+                             f"start, output times or tolerance); repeat the values of "
+                             f"that run, remove the file or name another one.")
         with reading(self.path, "not a checkpoint of fecontact"):
             self._take(stored)
 
