@@ -216,7 +216,8 @@ def test_points_come_one_by_one():
 
 
 def test_no_solution_near_the_start():
-    with pytest.raises(InputError, match="no solution near the start at the parameter 3"):
+    with pytest.raises(InputError, match="at the parameter 3; give a 'start' that is closer to "
+                                         "one, for orbits also more harmonics"):
         continue_branch(CIRCLE, np.array([0.1, 3.0]), ContinuationOptions())
     with pytest.raises(InputError, match=r"start lies at 1, outside the bounds .* 2 to 3"):
         continue_branch(CUBIC, np.array([0.1, 1.0]), ContinuationOptions(bounds=(2.0, 3.0)))

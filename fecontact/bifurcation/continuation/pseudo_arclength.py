@@ -242,7 +242,8 @@ def start_of(
                       3 * options.iterations)
     if found is None:
         raise InputError(f"There is no solution near the start at the parameter {u[-1]:.6g}; give "
-                         f"a start that is closer to one.")
+                         f"a 'start' that is closer to one, for orbits also more harmonics, a "
+                         f"smaller smoothing_slope, or the method 'shooting'.")
     return finished(problem, *found, row, options)
 
 
