@@ -256,8 +256,8 @@ def test_a_level_that_fails_leaves_the_others(monkeypatch):
 @pytest.mark.parametrize(("arguments", "message"), [
     (["--bounds", "2", "1"], "[response]: bounds = [2.0, 1.0] must be two values"),
     (["--bounds", "0", "1"], "bounds = [0.0, 1.0] must be frequencies above zero [Hz]"),
-    (["load.normal"], "[response] lacks the key 'bounds', the least and largest value of "
-                      "load.normal; give it, or --bounds LOW HIGH"),
+    (["load.normal"], "block.toml: [response]: the bounds are those of drive.frequency_hz; give those "
+                      "of load.normal by --bounds LOW HIGH"),
     (["drive.stifness_x", "--bounds", "1", "2"], "did you mean 'drive.stiffness_x'"),
     (["--levels", "load.normal"], "must have the form KEY=VALUE,VALUE"),
     (["--levels", "drive.frequency_hz=1"], "take another parameter for the levels"),

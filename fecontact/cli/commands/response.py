@@ -143,7 +143,11 @@ def _wanted(
     """The section [response] with the options of the command line, None for those not given."""
     changes = {name: value for name, value in {"parameter": parameter, **options}.items()
                if value is not None}
-    if bounds is not None or (parameter is not None and parameter != given.parameter):
+    other = parameter is not None and parameter != given.parameter
+    if other and bounds is None and given.bounds is not None:
+        raise InputError(f"the bounds are those of {given.parameter}; give those of "
+                         f"{parameter} by --bounds LOW HIGH.")
+    if bounds is not None or other:
         changes |= {"bounds": bounds, "start": None}
     if "amplitudes" in changes:
         changes.setdefault("levels", {})
