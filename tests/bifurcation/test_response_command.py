@@ -11,6 +11,7 @@ from systems import TURN
 from fecontact import Study
 from fecontact.bifurcation import BranchStatus, ResponseSettings
 from fecontact.bifurcation.responses import follow_responses
+from fecontact.cli.orbit_files import OrbitChoice, stored_orbit_or_run
 from fecontact.cli.response_results import keep_response
 from fecontact.core.errors import InputError
 from fecontact.io import read_mode, read_response, read_system
@@ -256,8 +257,8 @@ def test_a_level_that_fails_leaves_the_others(monkeypatch):
 @pytest.mark.parametrize(("arguments", "message"), [
     (["--bounds", "2", "1"], "[response]: bounds = [2.0, 1.0] must be two values"),
     (["--bounds", "0", "1"], "bounds = [0.0, 1.0] must be frequencies above zero [Hz]"),
-    (["load.normal"], "block.toml: [response]: the bounds are those of drive.frequency_hz; give those "
-                      "of load.normal by --bounds LOW HIGH"),
+    (["load.normal"], "block.toml: [response]: the bounds are those of drive.frequency_hz; give "
+                      "those of load.normal by --bounds LOW HIGH"),
     (["drive.stifness_x", "--bounds", "1", "2"], "did you mean 'drive.stiffness_x'"),
     (["--levels", "load.normal"], "must have the form KEY=VALUE,VALUE"),
     (["--levels", "drive.frequency_hz=1"], "take another parameter for the levels"),
@@ -292,12 +293,15 @@ def test_settings_are_written_and_read_again():
 
 @pytest.mark.slow
 def test_orbits_of_the_file_are_drawn_and_reported(cli, file, monkeypatch):
-    assert cli("response", file)[0] == 0
+    seen = ("--set", "response.point=C", "--set", "response.component=x")
+    assert cli("response", file, *seen)[0] == 0
     stored = file.parent / "results" / "block-response.h5"
     for kind in ("phase", "energies", "response"):
         place = () if kind == "response" else ("--branch", 1, "--at", 9.8)
         assert cli("plot", stored, kind, *place)[0] == 0
         assert stored.with_name(f"block-response-{kind}.png").stat().st_size > 10_000
+    run = stored_orbit_or_run(stored, False, None, OrbitChoice("1", 9.8))
+    assert run.observed == ("C", "x")
     assert cli("report", stored, "-o", "page.html")[0] == 0
     shown = []
     monkeypatch.setattr("webbrowser.open", lambda url: shown.append(url) or True)
