@@ -303,6 +303,17 @@ def _ground(planned: Planned) -> Iterator[str]:
         yield f"ground.speed = {speed:.3g} m/s is above {SPEED:g} m/s; check its unit."
 
 
+def _damping(planned: Planned) -> Iterator[str]:
+    """Damping ratios, which may be percent; those of Rayleigh damping may be large for some."""
+    basis = planned.system.basis
+    vibrating = basis.angular_frequencies > 0.0
+    if planned.extents and vibrating.any():
+        ratios = np.diag(basis.damping)[vibrating] / (2.0 * basis.angular_frequencies[vibrating])
+        if (least := float(ratios.min())) > 1.01:
+            yield (f"no mode vibrates, as all damping ratios are {least:.3g} or more; give 0.03 "
+                   f"for 3 %.")
+
+
 def _duration(planned: Planned) -> Iterator[str]:
     """Duration in periods of the fastest mode and of the fastest excitation."""
     system, duration = planned.system, planned.duration
@@ -507,6 +518,6 @@ def _named(along: Array, turn: float) -> str:
 
 
 CHECKS_BEFORE: tuple[Callable[[Planned], Iterator[str]], ...] = (
-    _friction, _roughness, _ground, _duration, _unheld, _gap)
+    _friction, _roughness, _ground, _damping, _duration, _unheld, _gap)
 CHECKS_AFTER: tuple[Callable[[ContactSystem, Array, Array], str | None], ...] = (
     _too_far, _turned, _too_deep, _beyond_fit)

@@ -567,6 +567,7 @@ def test_a_decimal_comma_is_recognised(tiny):
     ({"body.thickness": 20.0}, "thickness = 20 m of the body is more than its extent of 0.1 m"),
     ({"friction.static_coefficient": 40.0}, "static_coefficient = 40 of .* is above 2"),
     ({"normal.roughness_height": 5.2e-3}, "roughness_height = 0.0052 m is more than a hundredth"),
+    ({"basis.damping": 3.0}, "no mode vibrates, as all damping ratios are 3 or more"),
     ({"ground.speed": 1000.0}, r"ground\.speed = 1e\+03 m/s is above 100 m/s"),
     ({"gap": 50.0}, "no contact can close: the smallest gap is 50 m"),
     ({"gap": 50.0, "simulation.t_end": 2.0}, "smallest gap of 50 m is more than 100 times"),
