@@ -84,8 +84,7 @@ def test_points_of_codimension_two_include_jumps_and_their_forms_say_that_they_d
     y = np.sin(2.0 * t)
     states = np.stack([np.cos(2.0 * t), y, K * np.abs(y - AT) ** 3], axis=1)
     branch = orbit_branch(field, PeriodicMotion(t, states, period=np.pi), "lam",
-                          method=Collocation(intervals=30, state_tolerance=None),
-                          bounds=BOX["lam"], scales=np.ones(3))
+                          method=Collocation(intervals=30), bounds=BOX["lam"], scales=np.ones(3))
     curve = codim2_curve(field, branch.of_kind("Neimark-Sacker")[0], "k", bounds=BOX)
     point, = curve.of_kind("Chenciner")
     # Where the cubic coefficient vanishes; without the share of the jumps it does so nowhere here.

@@ -11,6 +11,7 @@ at the kink, where r is the shift of the time of passage. The jump of f_xx v in 
 gives r.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -177,8 +178,9 @@ class JacobianKinks:
         along, across = float(np.abs(K @ v).max()), float(np.abs(K @ rate).max())
         step = min(_STEP / largest, 0.25 * _BESIDE * width * across / max(along, 1e-300))
         step = max(step, _LEAST_STEP / largest)
-        (r, error), (other, _) = (
-            self._ratio(passage, sides, moves, h) for h in (step, 0.5 * step))
+        found = [self._ratio(passage, sides, moves, part * step) for part in (1.0, 0.5, 0.25)]
+        # At one of them the differences of a Jacobian may reach across the kink.
+        (r, error), (other, _) = min(pairwise(found), key=lambda two: abs(two[0][0] - two[1][0]))
         return r, passage.error + error + abs(r - other) / max(abs(r), abs(other), 1e-300)
 
     def _ratio(
