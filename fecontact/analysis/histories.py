@@ -8,7 +8,6 @@ from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
-from fecontact.laws.signals.harmonic import Constant
 from fecontact.reduction.assembly.contact_faces import node_name
 from fecontact.reduction.modal_basis import ModalBasis
 
@@ -134,6 +133,9 @@ def usual_component(system: "ContactSystem") -> str:
     """
     drive = system.drive
     if not any(drive.moves):
+        # A system has loaded the compiler already, which stored runs do without.
+        from fecontact.laws.signals.harmonic import Constant
+
         along = {force.component for force in system.load.forces
                  if not isinstance(force.signal, Constant)}
         return next((axis for axis in "yz" if along == {axis}), "x")
