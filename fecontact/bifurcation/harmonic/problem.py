@@ -215,7 +215,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
     @property
     def kinked(self) -> bool:
         """See :attr:`Problem.kinked`; vector fields that are no contact systems count as smooth."""
-        return self.compiled is not None and self.compiled.kinked
+        return self.compiled is not None and self.compiled.contact_field.kinked
 
     def linearise(self, u: Array) -> HarmonicLinearisation:
         """Residual and linearisation at u, each computed on demand."""

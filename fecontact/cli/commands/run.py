@@ -227,7 +227,10 @@ def plot(
     stored = stored_orbit_or_run(file, trust, set_, chosen)
     points = tuple(point_of(text) for text in point or ())
     if stored.observed is not None:
-        points, component = points or stored.observed[:1], component or stored.observed[1]
+        place, along = stored.observed
+        # Rotations are no direction of a phase diagram or a Poincare section.
+        points = points or (place,)
+        component = component or (None if along.startswith("phi") else along)
     choice = PlotRequest(quantity, points, component, highest_hz, period, all_)
     target = output or stored.path.with_name(f"{stored.path.stem}-{kind}.png")
     with output_folder(target.parent), waiting("Drawing"), styled(style or {}):

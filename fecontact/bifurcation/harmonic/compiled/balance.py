@@ -1,7 +1,6 @@
 """Equations of harmonic balance of contact systems in compiled code."""
 
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -105,7 +104,7 @@ class CompiledBalance:
         layout, series = problem.layout, problem.series
         m, L = layout.displacements, 2 * problem.harmonics + 1
         numbers = np.zeros(arrays.TIMED + 1)
-        numbers[arrays.KINKS] = self.kinked
+        numbers[arrays.KINKS] = self.contact_field.kinked
         if problem.turn is not None:
             numbers[arrays.TURN] = problem.periods * problem.turn
         else:
@@ -175,14 +174,6 @@ class CompiledBalance:
         """Whether contact forces are those of plane bodies on ground of constant speed."""
         return (near.arrays.rows.shape[1] == 2
                 and self.contact_field.system().prescribed_motion.constant)
-
-    @cached_property
-    def kinked(self) -> bool:
-        """See :attr:`ContactField.kinked`.
-
-        Newton's method then need not converge as quickly as its last steps did.
-        """
-        return self.contact_field.kinked
 
 
 def _line(places: Array, values: Array) -> tuple[Array, Array]:
