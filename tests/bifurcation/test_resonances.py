@@ -47,6 +47,21 @@ def describing(X):
             4.0 / np.pi * (1.0 - np.minimum(2.0 / X, 1.0)))
 
 
+def test_resonances_do_not_depend_on_the_points_of_the_mode():
+    """Interpolated between these few points the largest amplitudes would be 2e-3 apart."""
+    system, method = jenkins_system(), HarmonicBalance(3, 256)
+    modes = [nonlinear_mode(system, (1.0, 12.0), method=method, options=options)
+             for options in (ContinuationOptions(step=0.3, largest_step=0.5), FINE)]
+    assert 5 * len(modes[0]) < len(modes[1])
+    few, many = (mode_response(mode, system, levels={"drive.amplitude_x": [0.6, 1.0]})
+                 for mode in modes)
+    for level in range(2):
+        one, other = few.peak(level), many.peak(level)
+        assert one.amplitude == pytest.approx(other.amplitude, rel=1e-5)
+        assert one.frequency_hz == pytest.approx(other.frequency_hz, rel=1e-7)
+        assert one.damping_ratio == pytest.approx(other.damping_ratio, rel=1e-5)
+
+
 def test_response_of_a_mode_that_sticks_is_linear():
     """F / (1.5 - w^2 + .02 i w), phase included."""
     system = jenkins_system(amplitude=0.02)

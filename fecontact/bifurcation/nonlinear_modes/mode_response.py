@@ -1,17 +1,20 @@
 """Resonances and forced responses from a single nonlinear mode."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.harmonic.forced_starts import rest_state
 from fecontact.bifurcation.harmonic.response import levels_of
 from fecontact.bifurcation.nonlinear_modes.given_force import given_force, require_excitation
-from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode
+from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode, with_point
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError
+from fecontact.core.errors import FecontactError, InputError
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
@@ -20,6 +23,9 @@ from fecontact.system.contact_system import ContactSystem
 
 # Places between two points of a mode at which the response is evaluated.
 _BETWEEN = 8
+# Relative distance of amplitudes within which a resonance needs a point of the mode, and how often
+# such points are added.
+_NEAR, _ROUNDS = 1e-3, 4
 
 
 @dataclass(frozen=True)
@@ -108,7 +114,7 @@ def mode_response(
     mode: NonlinearMode, system: ContactSystem, *,
     levels: Mapping[str, ArrayLike] | None = None, frequency: str = "drive.frequency_hz",
 ) -> ModeResponse:
-    r"""Resonance and forced response of a system from one of its nonlinear modes, at no cost.
+    r"""Resonance and forced response of a system from one of its nonlinear modes, at little cost.
 
     With the harmonics :math:`X_k` of the mode at each amplitude, its frequency :math:`\Omega_0` and
     :math:`\xi`, modal damping C and the first harmonic P of the excitation, the response of the
@@ -118,8 +124,9 @@ def mode_response(
         + i \sum_k k^2 X_k^H ((\Omega - \Omega_0) C + \Omega_0 \xi) X_k\right| = |X_1^H P|,
 
     exact for one linear mode, and for one harmonic of one coordinate. At the resonance,
-    :math:`\Omega = \Omega_0`, the work of the force balances the losses of all harmonics. Other
-    modes must be far.
+    :math:`\Omega = \Omega_0`, the work of the force balances the losses of all harmonics; there the
+    mode is solved for, as far as it can be, and between its points interpolated. Other modes must
+    be far.
 
     Parameters
     ----------
@@ -154,10 +161,30 @@ def mode_response(
     found, curves = [], []
     for value in values:
         given = field.values if level_name is None else field.values_with(**{level_name: value})
-        along = _Along.of(mode, field, given, field.index(frequency))
-        found.append(along.resonances())
+        along = _refined(mode, system, partial(
+            _Along.of, field=field, values=given, free=field.index(frequency)))
+        found.append(tuple(along.resonances().values()))
         curves.append(along.curve())
     return ModeResponse(mode, level_name, values, tuple(found), tuple(curves))
+
+
+def _refined(
+    mode: NonlinearMode, system: ContactSystem, along_of: Callable[[NonlinearMode], "_Along"]
+) -> "_Along":
+    """What is known along a mode, with points of it near all resonances."""
+    for _ in range(_ROUNDS):
+        along, amplitudes = along_of(mode), mode.amplitude
+        far = [(place, one.amplitude) for place, one in along.resonances().items()
+               if np.abs(amplitudes / one.amplitude - 1.0).min() > _NEAR]
+        known = len(mode)
+        # From the last one on, so that numbers of points before stay.
+        for place, amplitude in far[::-1]:
+            # Where it cannot be found the interpolation stands.
+            with suppress(FecontactError):
+                mode = with_point(mode, system, place, amplitude)
+        if len(mode) == known:
+            break
+    return along_of(mode)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,11 +194,13 @@ class _Along:
     Rows of ``known`` (9, N): frequency, damping ratio, logarithm of the amplitude a; X_1^H X_1 and
     the sums of the equation with C and with xi (see :func:`mode_response`), all over a^2; X_1^H P
     over a by magnitude and phase; phase of the observed displacement. Of a linear mode they are
-    constant except for a.
+    constant except for a. ``points`` (N,) are their numbers on the mode; one that repeats is left
+    out.
     """
 
     chord: Array
     known: Array
+    points: NDArray[np.intp]
 
     @classmethod
     def of(cls, mode: NonlinearMode, field: ContactField, values: Array, free: int) -> "_Along":
@@ -198,7 +227,7 @@ class _Along:
         steps = np.diff(np.array([known[2], 5.0 * np.log(w), 10.0 * known[1]]), axis=1)
         kept = np.append(True, np.linalg.norm(steps, axis=0) > 1e-12)
         chord = np.append(0.0, np.cumsum(np.linalg.norm(steps, axis=0)))
-        return cls(chord[kept], known[:, kept])
+        return cls(chord[kept], known[:, kept], np.flatnonzero(kept))
 
     def at(self, s: Array) -> Array:
         """Quantities (9, k) at places s (k,), by monotone cubics: as the rows, but not over a."""
@@ -212,28 +241,30 @@ class _Along:
         lost, work = known[5:7]
         return np.asarray(work / np.where(lost > 0.0, lost, np.finfo(float).tiny) - 1.0)
 
-    def _places(self) -> list[float]:
-        """Places s of the resonances."""
+    def _places(self) -> dict[int, float]:
+        """Places s of the resonances, by the number of the point of the mode that is before it."""
         from scipy.optimize import brentq
 
         def off(s: float) -> float:
             return float(np.tanh(self.balance(self.at(np.array([s])))[0]))
 
         known = self.balance(_whole(self.known))
-        return [float(brentq(off, self.chord[k], self.chord[k + 1], xtol=1e-14))
-                for k in np.flatnonzero(known[:-1] * known[1:] < 0.0)]
+        return {int(self.points[k + 1]) - 1:
+                float(brentq(off, self.chord[k], self.chord[k + 1], xtol=1e-14))
+                for k in np.flatnonzero(known[:-1] * known[1:] < 0.0)}
 
-    def resonances(self) -> tuple[Resonance, ...]:
-        """All of them, in their order."""
-        found = self.at(np.array(self._places()))
-        return tuple(Resonance(float(a), float(w / (2.0 * np.pi)), float(ratio))
-                     for w, ratio, a in found[:3].T)
+    def resonances(self) -> dict[int, Resonance]:
+        """All of them in their order, by the number of the point of the mode that is before it."""
+        places = self._places()
+        found = self.at(np.array([*places.values()]))
+        return {before: Resonance(float(a), float(w / (2.0 * np.pi)), float(ratio))
+                for before, (w, ratio, a) in zip(places, found[:3].T, strict=True)}
 
     def curve(self) -> Array:
         """Frequency, amplitude and phase (3, K) along the responses."""
         between = np.linspace(0.0, 1.0, _BETWEEN, endpoint=False)
         fine = (self.chord[:-1, None] + np.diff(self.chord)[:, None] * between).reshape(-1)
-        places = np.array(self._places())
+        places = np.array([*self._places().values()])
         s = np.unique(np.concatenate([fine, self.chord[-1:], places]))
         known = self.at(s)
         responding = self.balance(known) > 0.0

@@ -471,6 +471,16 @@ def _solved(
     return replace(mode, branch=replace(mode.branch, points=(last,)))
 
 
+def with_point(
+    mode: NonlinearMode, system: ContactSystem, place: int, amplitude: float
+) -> NonlinearMode:
+    """The mode with one more point, behind that of number ``place`` and before the next."""
+    points = mode.branch.points
+    between = _solved(mode, system, place, amplitude, None).branch.points
+    return replace(mode, branch=replace(
+        mode.branch, points=(*points[: place + 1], *between, *points[place + 1 :])))
+
+
 def mode_of(branch: Branch) -> NonlinearMode:
     """A nonlinear mode from its branch, such as that of a file.
 

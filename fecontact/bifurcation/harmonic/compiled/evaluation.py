@@ -174,7 +174,7 @@ def _add_friction(e):
 
 
 @helper
-def _friction_at(u, T, derivatives, e):
+def _friction_of_elements(u, T, derivatives, e):
     """Find and add the friction of elements; 0 if they do not repeat."""
     e.numbers[TIMED] = _follow(u, T, derivatives, e, e.workspace.friction[0], e.workspace.z)
     _add_friction(e)
@@ -190,7 +190,7 @@ def evaluate_plain(u: Vector, derivatives: bool, e: Equations) -> float:
     T = take_parameter(u[len(u) - 1], e)
     take_motion(u, T, e)
     memoryless_forces(derivatives, T / len(e.tau), e)
-    if len(e.elements) > 0 and _friction_at(u, T, derivatives, e) == 0.0:
+    if len(e.elements) > 0 and _friction_of_elements(u, T, derivatives, e) == 0.0:
         return 0.0
     balance(u, T, 1.0, e, e.workspace.residual)
     return T
@@ -222,7 +222,7 @@ def evaluate_sampled(u: Vector, derivatives: bool, e: Equations) -> float:
         batch_rates(workspace.t, workspace.x, e.contact, workspace.f)
     add_kinks(workspace.t, workspace.x, e.contact, e.onsets, T / len(e.tau), derivatives,
               SampledRates(workspace.f, workspace.J, workspace.widths))
-    if len(e.elements) > 0 and _friction_at(u, T, derivatives, e) == 0.0:
+    if len(e.elements) > 0 and _friction_of_elements(u, T, derivatives, e) == 0.0:
         return 0.0
     take_pushes(workspace.f, e)
     balance(u, T, 1.0, e, workspace.residual)
