@@ -145,7 +145,8 @@ def key_numbers(
         rubbing = bool(trajectory.friction_forces.any())
         for face in faces or [""]:
             for name in _FORCES if rubbing else _NORMAL:
-                title = name.replace("_", " ") + f" of {face}" * bool(face)
+                way = f" in -{'t' if face else 'x'}" * (name == "mean_friction_force")
+                title = name.replace("_", " ") + way + f" of {face}" * bool(face)
                 take(name + f"@{face}" * bool(face), title, **({"face": face} if face else {}))
         if rubbing:
             take("friction_power", "mean friction power")

@@ -31,6 +31,8 @@ class ModeConvergence:
         nodes of the full finite-element body, on each mesh [m/N].
     modes : (K,) array
         Numbers of modes, on the given mesh.
+    residual_vectors : (K,) array
+        Numbers of residual vectors that complete them.
     missing : (K, d) array
         Largest fraction of a contact node's compliance along each axis that is missing with these
         numbers of modes.
@@ -40,6 +42,7 @@ class ModeConvergence:
     frequencies_hz: Array
     compliance: Array
     modes: Integers
+    residual_vectors: Integers
     missing: Array
 
     def __str__(self) -> str:
@@ -54,9 +57,16 @@ class ModeConvergence:
         if shown:
             lines.append(f"On the given mesh these frequencies are off by up to "
                          f"{change[0].max():.1e}, against the finest.")
-        lines += ["", " ".join([f"{'modes':>9s}", *(f"{f'missing {axis}':>11s}" for axis in axes)])]
-        lines += [" ".join([f"{modes:9d}", *(f"{one:11.2%}" for one in missing)])
-                  for modes, missing in zip(self.modes, self.missing, strict=True)]
+        completed = bool(self.residual_vectors.any())
+        lines += ["", " ".join([f"{'modes':>9s}", *(["residual vectors"] * completed),
+                                *(f"{f'missing {axis}':>11s}" for axis in axes)])]
+        lines += [" ".join([f"{modes:9d}", *([f"{vectors:16d}"] * completed),
+                            *(f"{one:11.2%}" for one in missing)])
+                  for modes, vectors, missing in zip(
+                      self.modes, self.residual_vectors, self.missing, strict=True)]
+        if completed:
+            lines.append("Residual vectors complete each basis up to its tolerance; what is "
+                         "missing below that does not tell whether modes are enough.")
         return "\n".join(lines)
 
 
@@ -114,8 +124,14 @@ def mode_convergence(
         frequencies_hz=np.array([basis.frequencies_hz[first : first + some] for basis in meshes]),
         compliance=np.array([_compliance(basis).mean(axis=0) for basis in meshes]),
         modes=np.array(counts),
+        residual_vectors=np.array([_residual_vectors(basis) for basis in bases]),
         missing=np.array([BasisReport(basis).contact_error.max(axis=0) for basis in bases]),
     )
+
+
+def _residual_vectors(basis: ModalBasis) -> int:
+    assert basis.quality is not None, "bases of bodies carry their quality"
+    return basis.modes - basis.quality.vibration_modes
 
 
 def _compliance(basis: ModalBasis) -> Array:

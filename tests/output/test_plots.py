@@ -46,7 +46,7 @@ def test_history_shows_each_point_in_suitable_units():
     figure = plot_history(trajectory, ["B", 0, (0.2, 0.02)])
     assert labels(figure) == [
         "displacement x [µm]", "velocity x [mm/s]", "displacement y [µm]", "velocity y [mm/s]",
-        "total normal force [N]", "total friction force in -x [mN]"]
+        "total normal force [N]", "total friction on the body, +x [mN]"]
     assert [axis.get_xlabel() for axis in figure.axes] == ["", "", "", "", "time [ms]", "time [ms]"]
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
     assert legend == ["B", "contact node 0", "(0.2, 0.02) m"]

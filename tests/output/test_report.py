@@ -144,9 +144,9 @@ def test_curves_are_those_of_the_run(tmp_path):
               for line in (0, 1)]
     for column, point in enumerate(("C", 2)):
         close(values[column], trajectory.velocity(point)[:, 1], 2e-4)
-    number, chart = charts["total friction force in -x"]
+    number, chart = charts["total friction on the body, +x"]
     close(chart["factor"] * shown.array("charts", number, "lines", 0, "y"),
-          trajectory.friction_force.sum(axis=1))
+          -trajectory.friction_force.sum(axis=1))
     energies = {chart["title"]: (number, chart) for number, chart in enumerate(
         shown.header["energies"])}
     number, chart = energies["stored energy"]

@@ -176,7 +176,7 @@ def test_faces_of_two_solids_are_painted_on_both_sides(browser, pair, tmp_path):
     owner = shown.array("contact", "faces", 0, "plan", "owner").astype(int)
     assert np.bincount(owner, areas) == pytest.approx(face["sizes"], rel=1e-3)
     titles = [chart["title"] for chart in shown.header["charts"]]
-    assert "total friction force along t2" in titles
+    assert "total friction on the body, +t2" in titles
     with Opened(browser, path) as opened:
         opened.page.wait_for_selector("html[data-whole]", state="attached")
         opened.page.get_by_label("see-through").check()

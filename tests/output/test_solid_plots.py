@@ -186,7 +186,7 @@ def test_every_other_plot_takes_solids(run, two, tmp_path):
     found = ModeConvergence(
         unknowns=np.array([100, 200]), frequencies_hz=np.array([[100.0], [99.0]]),
         compliance=np.array([[1.0, 2.0, 3.0], [1.1, 2.1, 3.1]]), modes=np.array([5, 10]),
-        missing=np.array([[0.1, 0.2, 0.3], [0.01, 0.02, 0.03]]))
+        residual_vectors=np.array([0, 0]), missing=np.array([[0.1, 0.2, 0.3], [0.01, 0.02, 0.03]]))
     labels = [text.get_text() for axes in plot_convergence(found).axes
               for text in axes.get_legend().get_texts()]
     assert {"contact compliance in z", "in z"} <= set(labels)

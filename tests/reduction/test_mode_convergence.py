@@ -9,6 +9,21 @@ from fecontact.plot import plot_convergence
 from fecontact.reduction import BasisReport, mode_convergence
 
 
+def test_residual_vectors_are_counted_beside_the_modes():
+    """They leave less than the tolerance missing with any number of modes, and the table says so."""
+    body = ElasticBody(rectangle(0.2, 0.02, 10, 2), thickness=0.01)
+    result = mode_convergence(body, lambda part, count: modal_basis(
+        part, count, contact="bottom", contact_nodes=5, reduction="residual", tolerance=0.1), 8,
+        levels=2)
+    own = modal_basis(body, 8, contact="bottom", contact_nodes=5, reduction="residual",
+                      tolerance=0.1)
+    assert result.residual_vectors[1] == own.modes - 8 > 0
+    assert (result.missing <= 0.1).all()
+    text = str(result)
+    assert f"{8:9d} {own.modes - 8:16d}" in text
+    assert "does not tell whether modes are enough" in text
+
+
 @pytest.mark.parametrize("triangles", [False, True])
 def test_refined_mesh_covers_the_same_body(triangles):
     mesh = rectangle(0.2, 0.02, 5, 2, triangles=triangles, points={"C": (0.1, 0.02)},
@@ -49,6 +64,8 @@ def test_study_of_a_beam():
     text = str(result)
     assert f"{result.frequencies_hz[0, 0]:.6g}" in text
     assert f"{result.missing[1, 0]:.2%}" in text
+    assert not result.residual_vectors.any()
+    assert "esidual" not in text
     axes = plot_convergence(result).axes
     assert axes[0].get_xlabel() == "unknowns of the mesh"
     assert axes[1].get_ylabel() == "missing contact compliance, worst node [%]"

@@ -63,12 +63,12 @@ def force_diagrams(run: Trajectory) -> list[Diagram]:
             for face, colour in zip(faces, colours, strict=True)))
 
     normal = of_faces("total normal force", run.normal_force)
-    friction = run.friction_forces
+    along = -run.friction_forces
     if basis.dimension == 2:
-        return [normal, of_faces(f"total friction force in -{'x' if single else 't'}",
-                                 friction[:, :, 0])]
-    on_body = -np.einsum("fnk,nkd->fnd", friction, basis.tangents)
-    totals = [on_body[:, face.nodes].sum(axis=1) for face in faces]
+        return [normal, of_faces(f"total friction on the body, +{'x' if single else 't'}",
+                                 along[:, :, 0])]
+    totals = [np.einsum("fnk,nkd->fd", along[:, face.nodes], basis.tangents[face.nodes])
+              for face in faces]
     if single:
         size = np.linalg.norm(totals[0], axis=1)
         return [normal, _over_time(run, "total friction on the body [N]", (
@@ -77,8 +77,8 @@ def force_diagrams(run: Trajectory) -> list[Diagram]:
     sizes = _over_time(run, "size of total friction [N]", tuple(
         Curve(face.name, colour, run.time, np.linalg.norm(total, axis=1))
         for face, colour, total in zip(faces, colours, totals, strict=True)))
-    ways = ("t", "t2") if several_bodies(basis) else ("-x", "-y")
-    return [normal, sizes, *(of_faces(f"total friction force along {way}", friction[:, :, k])
+    ways = ("t", "t2") if several_bodies(basis) else ("x", "y")
+    return [normal, sizes, *(of_faces(f"total friction on the body, +{way}", along[:, :, k])
                              for k, way in enumerate(ways))]
 
 
