@@ -64,7 +64,7 @@ def follow_mode(
         assert mode is not None
         with waiting("Writing"):
             files = write_mode_results(study, mode, observe, folder, page=wave is None)
-    echo(f"\nnonlinear mode {number}: {mode.branch.end}")
+    echo(f"\nnonlinear mode {number}, which begins at {mode.frequency_hz[0]:.6g} Hz: {_end(mode)}")
     if mode.branch.message:
         echo(f"note: {mode.branch.message}")
     show(mode_table(mode))
@@ -128,6 +128,18 @@ def write_mode_results(
     return files
 
 
+def _end(mode: "NonlinearMode") -> str:
+    """How the mode ended, by its amplitude."""
+    from fecontact.core.units import quantity
+
+    return mode.branch.end_at(f"the amplitude {quantity(float(mode.amplitude[-1]), _unit(mode), 5)}"
+                              f" of {mode.observed}")
+
+
+def _unit(mode: "NonlinearMode") -> str:
+    return "rad" if mode.observed.rpartition(" ")[2].startswith("phi") else "m"
+
+
 def mode_csv(mode: "NonlinearMode") -> str:
     """All points of a nonlinear mode as CSV, in SI units."""
     energy, stable = mode.energy, mode.stable
@@ -146,8 +158,7 @@ def mode_table(mode: "NonlinearMode") -> Any:
     from fecontact.cli.tables import table
     from fecontact.core.units import quantity
 
-    unit = "rad" if mode.observed.rpartition(" ")[2].startswith("phi") else "m"
-    last = len(mode) - 1
+    unit, last = _unit(mode), len(mode) - 1
     chosen = {round(last * part / (_SHOWN - 1)) for part in range(_SHOWN)}
     chosen |= {place for place, point in enumerate(mode.branch.points) if point.kind is not None}
     amplitude, frequency, ratio = mode.amplitude, mode.frequency_hz, mode.damping_ratio

@@ -2,6 +2,7 @@
 
 import os
 import random
+import re
 import signal
 import time
 
@@ -50,7 +51,7 @@ def block_frequency(described, amplitude):
 def test_mode_of_a_block_is_that_of_its_element(cli, file):
     code, said, _ = cli("modes", file, *ARGUMENTS, "--set", "response.harmonics=1")
     assert code == 0
-    assert "nonlinear mode 1: The branch reached a bound" in said
+    assert re.search(r"nonlinear mode 1, which begins at \S+ Hz: The branch reached a bound", said)
     results = file.parent / "results"
     mode = read_mode(results / "block-mode-1.h5")
     assert mode.amplitude[[0, -1]] == pytest.approx(AMPLITUDES, rel=1e-6)
@@ -59,6 +60,14 @@ def test_mode_of_a_block_is_that_of_its_element(cli, file):
     assert np.ptp(mode.frequency_hz) > 0.4 * mode.frequency_hz[0]
     for ending in ("csv", "png", "html"):
         assert (results / f"block-mode-1.{ending}").stat().st_size > 1000
+
+
+def test_a_mode_of_few_points_tells_the_amplitude_that_it_reached(cli, file):
+    code, said, _ = cli("modes", file, *ARGUMENTS, "--set", "response.points=6")
+    assert code == 0
+    reached = float(read_mode(file.parent / "results" / "block-mode-1.h5").amplitude[-1])
+    assert f"ends at the amplitude {1e6 * reached:.5g} µm of B x: raise points" in " ".join(
+        said.split())
 
 
 class _Interrupts:

@@ -103,12 +103,16 @@ class Branch(Summarised):
     @property
     def end(self) -> str:
         """How the forward end was reached, in a sentence; where points ran out, how far it got."""
+        return self.end_at(f"{self.parameter_name} = {self.points[-1].parameter:.6g}"
+                           if self.points else "")
+
+    def end_at(self, place: str) -> str:
+        """The sentence of :attr:`end`, for another description of the last point."""
         regular = sum(point.kind is None for point in self.points)
         if self.status is not BranchStatus.POINTS or not regular:
             return self.status.value
-        return (f"The branch has as many points as were asked for and ends at "
-                f"{self.parameter_name} = {self.points[-1].parameter:.6g}: raise points = "
-                f"{regular} to go on, or largest_step to go farther with each.")
+        return (f"The branch has as many points as were asked for and ends at {place}: raise "
+                f"points = {regular} to go on, or largest_step to go farther with each.")
 
     def _accuracy(self) -> list[tuple[str, str]]:
         """Error of the states and intervals of orbits by collocation."""

@@ -140,7 +140,7 @@ def modes(
         "Number of a mode to draw as a movie; with --complex, of a complex mode."))] = None,
     nonlinear: Annotated[int | None, Parameter(help=(
         "Number of a nonlinear mode to follow over its amplitude; 1 is the lowest that "
-        "oscillates."))] = None,
+        "oscillates about rest, where contacts may be closed as in no mode of the table."))] = None,
     amplitudes: Annotated[tuple[float, float] | None, Parameter(help=(
         "Smallest and largest amplitude of a nonlinear mode [m]."))] = None,
     resume: Annotated[bool, Parameter(negative=(), help=(
