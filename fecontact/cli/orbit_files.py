@@ -77,12 +77,25 @@ def stored_orbit_or_run(
     point, run = _motion(file, branch, model, choice)
     settings = _settings(model)
     if settings.title is None:
-        period = float(point.values["period"])
-        place = ("" if branch.parameter_name.endswith(("frequency_hz", "xi"))
-                 else f"{branch.parameter_name} = {point.parameter:.5g}, ")
-        settings = replace(settings, title=f"{_called(name, branch)}{place}{1.0 / period:.5g} Hz")
+        settings = replace(settings, title=_title(name, branch, point))
     return StoredRun(file, run, settings, True, model.study, model.versions,
                      _observed(branch, model))
+
+
+def _title(name: str, branch: "Branch", point: "BranchPoint") -> str:
+    """Branch or level of an orbit, its parameter, and its frequency, with units."""
+    from fecontact.output.diagrams.labels import branch_label, with_value
+    from fecontact.system.parameter_labels import parameter_label
+
+    known, parts = branch.attributes, []
+    if "level" not in known:
+        parts.append(name)
+    elif level_name := str(known["level_name"]):
+        label = str(known.get("level_label") or parameter_label(level_name))
+        parts.append(with_value(label, float(known["level"])))
+    if not branch.parameter_name.endswith(("frequency_hz", "xi")):
+        parts.append(with_value(branch_label(branch), point.parameter))
+    return ", ".join([*parts, f"{1.0 / float(point.values['period']):.5g} Hz"])
 
 
 def _observed(branch: "Branch", model: "StoredModel") -> tuple[str | int, Any]:

@@ -10,7 +10,7 @@ from fecontact.reduction import BasisReport, mode_convergence
 
 
 def test_residual_vectors_are_counted_beside_the_modes():
-    """They leave less than the tolerance missing with any number of modes, and the table says so."""
+    """They leave less than the tolerance missing with any modes, and the table says so."""
     body = ElasticBody(rectangle(0.2, 0.02, 10, 2), thickness=0.01)
     result = mode_convergence(body, lambda part, count: modal_basis(
         part, count, contact="bottom", contact_nodes=5, reduction="residual", tolerance=0.1), 8,

@@ -30,6 +30,14 @@ def name_and_unit(label: str) -> tuple[str, str]:
     return (name, unit.removesuffix("]")) if bracket else (label, "")
 
 
+def with_value(label: str, value: float) -> str:
+    """A label with a value in a unit that suits it: ``force at B x = 3 N``."""
+    name, unit = name_and_unit(label)
+    factor, symbol = (suitable_unit(abs(value), unit) if has_prefixes(unit) and unit != "Hz"
+                      else (1.0, unit))
+    return f"{name} = {value / factor:.5g} {symbol}".rstrip()
+
+
 def branch_label(branch: "Branch", name: str | int = "parameter") -> str:
     """Axis label of the parameter, of a stored value or of a state of a branch, with its unit.
 
