@@ -23,6 +23,7 @@ from fecontact.plot import (
     plot_wear,
 )
 from fecontact.reduction import ModeConvergence
+from fecontact.system.columns import POWERS
 
 
 @pytest.fixture(scope="module")
@@ -190,6 +191,19 @@ def test_every_other_plot_takes_solids(run, two, tmp_path):
     labels = [text.get_text() for axes in plot_convergence(found).axes
               for text in axes.get_legend().get_texts()]
     assert {"contact compliance in z", "in z"} <= set(labels)
+
+
+def test_contact_maps_show_phases_of_the_last_period():
+    """Quarters of twelve whole periods would all be the same phase."""
+    one = system(solid())
+    t = np.linspace(0.0, 12.0, 481)
+    q = np.zeros((len(t), one.basis.modes))
+    rate = np.zeros_like(q)
+    q[:, 2] = 1e-6 * np.sin(2.0 * np.pi * t)
+    rate[:, 2] = 2e-6 * np.pi * np.cos(2.0 * np.pi * t)
+    run = fc.Trajectory(one, t, q, rate, np.zeros((len(t), len(POWERS))))
+    titles = [axes.get_title() for axes in plot_contact_map(run).axes if axes.get_title()]
+    assert titles == ["t = 11.25 s", "t = 11.5 s", "t = 11.75 s", "t = 12 s"]
 
 
 def test_shear_over_a_face_of_a_solid(tmp_path):

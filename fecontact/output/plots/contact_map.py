@@ -54,7 +54,8 @@ def plot_contact_map(
     trajectory : Trajectory
         The run.
     times : sequence of float, optional
-        Times of the maps of solids, up to eight [s]; four by default.
+        Times of the maps of solids, up to eight [s]; by default four, over the last period of a
+        motion that has become periodic, else over the run.
     wear : EnergyWear or ArchardWear, optional
         Law of wear: for solids, adds maps of the depth worn since the start of the run.
     path : str or Path, optional

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.analysis.periodicity import steadiness
 from fecontact.analysis.resolved import resolved
 from fecontact.core.errors import InputError, shown
 from fecontact.core.types import Array
@@ -77,7 +78,9 @@ def contact_maps(
             rows.append(_Row("worn depth", plan, depth[:, nodes], WEAR_MAP, float(depth.max()),
                              "m"))
     unit, symbol = suitable_unit(float(np.abs(run.time).max()), "s")
-    titles = [f"t = {run.time[k] / unit:.4g} {symbol}" for k in which]
+    closest = float(np.diff(run.time[which]).min()) if len(which) > 1 else np.inf
+    digits = max(4, int(np.ceil(np.log10(max(float(np.abs(run.time).max()) / closest, 1.0)))) + 2)
+    titles = [f"t = {run.time[k] / unit:.{digits}g} {symbol}" for k in which]
     height = _map_height(plans, len(which))
     whole = min(_CURVE + sum(height[id(row.plan)] for row in rows) + 0.5, 1.6 * _LARGEST)
     with new_figure(_WIDTH, whole, path) as figure:
@@ -119,12 +122,18 @@ def shear_maps(history: LoadHistory, row: int, path: str | Path | None) -> "Figu
 
 
 def _chosen(trajectory: Trajectory, times: Sequence[float] | None) -> NDArray[np.intp]:
-    """Output times nearest to those asked for."""
+    """Output times nearest to those asked for; by default of the last period, or of the run."""
     t = trajectory.time
     if times is None:
-        count = min(_TIMES, len(t))
-        return np.unique(np.linspace(0, len(t) - 1, count + 1).round().astype(np.intp)[1:]) if (
-            len(t) > 1) else np.zeros(1, dtype=np.intp)
+        period = steadiness(trajectory).period
+        count = min(_TIMES, len(t) - 1)
+        if count < 1:
+            return np.zeros(1, dtype=np.intp)
+        if period is not None:
+            # Phases of a motion that repeats differ; quarters of the run may all have the same.
+            wanted = t[-1] - period * np.arange(count)[::-1] / count
+            return np.unique(np.abs(t[None] - wanted[:, None]).argmin(axis=1))
+        return np.unique(np.linspace(0, len(t) - 1, count + 1).round().astype(np.intp)[1:])
     if isinstance(times, Real):
         times = (times,)  # type: ignore[assignment]
     given = np.asarray(times, dtype=float) if all(isinstance(one, Real) for one in times) else (
