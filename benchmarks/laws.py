@@ -68,7 +68,8 @@ FRICTION = {
     "friction_coefficient": 0.55, "minimum_velocity": 1e-2, "stribeck_velocity": 1e-3,
     "stribeck_exponent": 2.0, "decay": 1000.0, "factor": 0.14, "excess": 1.14,
     "smoothing_slope": 100.0, "stiffness": 1e7, "presliding_stiffness": 1e5,
-    "bristle_stiffness": 1e5, "yield_displacement": 5e-6, "chi": -0.5, "beta": 0.1}
+    "bristle_stiffness": 1e5, "yield_displacement": 5e-6, "chi": -0.5, "beta": 0.1,
+    "springs": (3.0, 2.0, 1.0), "limits": (1.0, 2.0, 3.0)}
 
 
 def main(quick: bool = False) -> None:

@@ -10,7 +10,7 @@ from fecontact.bifurcation.codim2_nearby import begun
 from fecontact.bifurcation.codim2_switch import other_curve, tangent_at, widths_of
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
-from fecontact.bifurcation.continuation.newton import newton
+from fecontact.bifurcation.continuation.newton import newton, weighted_norm
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import (
     DiscontinuityPoint,
@@ -238,11 +238,12 @@ def _towards_growth(
     problem: Problem, u: Array, tangent: Array, options: ContinuationOptions,
     grows: Callable[[Array], float],
 ) -> Array:
-    """The tangent, turned to the side of the curve on which ``grows`` of the unknowns is larger.
+    """Direction of the curve to the side on which ``grows`` of the unknowns is larger.
 
     At a point of codimension two the equations may have more than one direction, and rounding then
     decides which part of the other ones the tangent has. Therefore ``grows`` is compared at points
-    of the curve itself, a step away from u on both sides, or nearer where there are none.
+    of the curve itself, a step away from u on both sides, or nearer where there are none; the
+    direction is that from one of them to the other.
 
     Raises
     ------
@@ -258,7 +259,9 @@ def _towards_growth(
         except FecontactError:
             continue
         if behind is not None and ahead is not None:
-            return -tangent if grows(behind[0]) > grows(ahead[0]) else tangent
+            one, other = behind[0], ahead[0]
+            chord = one - other if grows(one) > grows(other) else other - one
+            return np.asarray(chord / weighted_norm(problem.weights(), chord))
     raise AnalysisError(f"The curve has no points within {_SIDES[0] * options.step:.3g} of its "
                         f"start on both sides; start from another point of it, or with a shorter "
                         f"step than step = {options.step:g}.")
