@@ -210,3 +210,22 @@ def test_errors_that_could_not_be_estimated_are_said_in_words(errors, words):
                     {"state_error": error, "mesh": np.linspace(0.0, 1.0, 21)}, None)
         for p, error in enumerate(errors))
     assert ("state error", words) in Branch("ground.speed", points).summary()
+
+
+def test_descriptions_show_what_differs_from_defaults():
+    assert repr(fc.Drive()) == "Drive()"
+    assert repr(fc.Ground(speed=1.0, centre=(0.0, 0.0))) == "Ground(speed=1.0)"
+    load = fc.Load(5.0, forces=(fc.PointLoad("tip", signal=3.0),))
+    assert repr(load) == f"Load(normal=5.0, forces=({load.forces[0]!r},))"
+    assert repr(load.forces[0]).startswith("PointLoad(point='tip', signal=")
+    assert eval(repr(fc.Ground(0.5, amplitude=1e-6)), {"Ground": fc.Ground}) == fc.Ground(
+        0.5, amplitude=1e-6)
+
+
+def test_a_stored_run_is_one_line(tmp_path):
+    file = fc.write_case(tmp_path / "one.vtkhdf", run(), study=TOML)
+    shown = repr(fc.read_case(file))
+    assert shown.startswith("<Case ")
+    assert "study: stored" in shown
+    assert "speed" not in shown
+    assert len(shown) < 1000

@@ -2,9 +2,10 @@
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from html import escape
 from itertools import chain, repeat
+from typing import Any, cast
 
 # Units by their base: factors and symbols, ascending.
 UNITS = {
@@ -128,3 +129,27 @@ class Summarised:
 
     def _repr_html_(self) -> str:
         return html_table(type(self).__name__, self.summary())
+
+
+class Brief:
+    """Base class of dataclasses shown with those values that differ from their defaults.
+
+    Dataclasses among them have ``repr=False``.
+    """
+
+    def __repr__(self) -> str:
+        given: list[str] = []
+        for entry in fields(cast(Any, self)):
+            value = getattr(self, entry.name)
+            default = (entry.default if entry.default_factory is MISSING
+                       else entry.default_factory())
+            if entry.repr and not _same(value, default):
+                given.append(f"{entry.name}={value!r}")
+        return f"{type(self).__name__}({', '.join(given)})"
+
+
+def _same(value: Any, default: Any) -> bool:
+    """Whether a value is the default; arrays are not compared."""
+    return value is default or (type(value) is type(default)
+                                and isinstance(value, int | float | str | tuple)
+                                and bool(value == default))

@@ -16,7 +16,7 @@ from fecontact.core.errors import (
     require_not_negative,
 )
 from fecontact.core.types import Array, Coordinates
-from fecontact.core.units import Unit
+from fecontact.core.units import Brief, Unit
 from fecontact.laws.signals.harmonic import Constant, Harmonic, Signal
 
 AXES = ("x", "y", "z")
@@ -27,8 +27,8 @@ _MOTIONS = tuple((f"motion_{axis}", f"amplitude_{axis}") for axis in AXES)
 _COMPONENTS = ("x", "y", "z", "phi", "phi_x", "phi_y", "phi_z")
 
 
-@dataclass(frozen=True)
-class Drive:
+@dataclass(frozen=True, repr=False)
+class Drive(Brief):
     r"""Base excitation of B through springs and dashpots (4.1-8..11).
 
     .. math:: F_{Bx} = c_x (x_B - u_x(t)) + b_x x_B', \qquad u_x(t) = x_0 \sin 2 \pi f_E t
@@ -142,8 +142,8 @@ class Drive:
                    default=0.0)
 
 
-@dataclass(frozen=True)
-class PointLoad:
+@dataclass(frozen=True, repr=False)
+class PointLoad(Brief):
     """Force or moment on the body at a point, constant or in time.
 
     Parameters
@@ -211,8 +211,8 @@ class PointLoad:
         return np.asarray(np.array(self.component) @ rows[: len(self.component)])
 
 
-@dataclass(frozen=True)
-class BoundaryLoad:
+@dataclass(frozen=True, repr=False)
+class BoundaryLoad(Brief):
     """Uniform pressure and shear on a named boundary of the body, constant or in time.
 
     They follow neither the motion nor the rotation of the body. The force is the stress times the
@@ -253,8 +253,8 @@ class BoundaryLoad:
                              f"give one of them, or leave the load out.")
 
 
-@dataclass(frozen=True)
-class Load:
+@dataclass(frozen=True, repr=False)
+class Load(Brief):
     r"""Loads on the body: at C (4.1-6), at points, along boundaries, and on its mass.
 
     Gravity acts on all mass with the force rho g per volume. Base acceleration is for a body whose

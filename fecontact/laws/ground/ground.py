@@ -17,7 +17,7 @@ from fecontact.core.errors import (
     require_positive,
 )
 from fecontact.core.types import Array, ArrayLike
-from fecontact.core.units import Unit
+from fecontact.core.units import Brief, Unit
 from fecontact.laws.ground.height_map import HeightMap
 from fecontact.laws.ground.motion import (
     GroundMotion,
@@ -30,8 +30,8 @@ from fecontact.laws.ground.profile import Flat, Profile, Sine
 __all__ = ["Ground", "GroundMotion", "HarmonicSpeed", "SpeedRamp"]
 
 
-@dataclass(frozen=True)
-class Ground:
+@dataclass(frozen=True, repr=False)
+class Ground(Brief):
     r"""Ground that moves in +x, by default at constant speed V and with a sine waviness (4.3-1).
 
     .. math:: y_R(\xi) = y_A \sin(2 \pi \xi / \lambda_w), \qquad \xi = X + x - \int_0^t V\,dt

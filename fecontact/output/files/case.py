@@ -13,6 +13,7 @@ from fecontact.analysis.histories import component_of
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.files.stored import DamagedError, array, from_json, member, reading, text, texts
+from fecontact.core.units import Summarised
 from fecontact.integrate.event_table import Events
 from fecontact.integrate.kept_steps import KeptSteps
 from fecontact.integrate.recorded import RecordedContact
@@ -60,8 +61,8 @@ _ACROSS = {columns.FRICTION_FORCE: columns.FRICTION_ACROSS,
 _MOST_FORCES, _ROWS = 4_000_000, 1000
 
 
-@dataclass(frozen=True)
-class Case:
+@dataclass(frozen=True, repr=False)
+class Case(Summarised):
     """A run read from its file.
 
     Attributes
@@ -77,6 +78,11 @@ class Case:
     trajectory: Trajectory
     study: str | None = None
     versions: dict[str, str] = field(default_factory=dict)
+
+    def summary(self) -> list[tuple[str, str]]:
+        """That of the run, whether its study is known, and the version that computed it."""
+        return [*self.trajectory.summary(), ("study", "none" if self.study is None else "stored"),
+                ("fecontact", self.versions.get("fecontact", "unknown"))]
 
     def to_xarray(self) -> "xarray.Dataset":
         """The run as an :class:`xarray.Dataset`; see :func:`fecontact.io.to_xarray`."""
