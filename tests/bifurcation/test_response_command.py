@@ -10,8 +10,9 @@ from response_study import STUDY, linear_amplitude, study
 from systems import TURN
 
 from fecontact import Study
-from fecontact.bifurcation import BranchStatus, ResponseSettings
+from fecontact.bifurcation import BranchStatus, ResponseSettings, responses
 from fecontact.bifurcation.responses import follow_responses
+from fecontact.cli.console import INTERRUPTED
 from fecontact.cli.orbit_files import OrbitChoice, stored_orbit_or_run
 from fecontact.cli.response_results import keep_response
 from fecontact.core.errors import InputError
@@ -156,6 +157,23 @@ def test_resumed_response_has_the_numbers_of_an_uninterrupted_one(points, file, 
             assert (a.tangent == b.tangent).all()
             assert a.kind == b.kind
             assert all(np.array_equal(a.values[name], b.values[name]) for name in b.values)
+
+
+def test_an_interrupted_response_tells_how_to_go_on(cli, file, monkeypatch):
+    follow = responses.follow_responses
+
+    def interrupted(system, wanted, progress, *rest):
+        return follow(system, wanted, _Interrupts("drive.amplitude_x = 0.0003", 5), *rest)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(responses, "follow_responses", interrupted)
+        code, said, _ = cli("response", file)
+    assert code == INTERRUPTED
+    assert "was interrupted" in said
+    assert "go on with --resume" in " ".join(said.split())
+    code, said, _ = cli("response", file, "--resume")
+    assert code == 0
+    assert "was interrupted" not in said
 
 
 def test_points_that_run_out_before_the_peak(cli, file):

@@ -171,7 +171,7 @@ def mode_response(
 def _refined(
     mode: NonlinearMode, system: ContactSystem, along_of: Callable[[NonlinearMode], "_Along"]
 ) -> "_Along":
-    """What is known along a mode, with points of it near all resonances."""
+    """Quantities along a mode, which is solved near all resonances."""
     for _ in range(_ROUNDS):
         along, amplitudes = along_of(mode), mode.amplitude
         far = [(place, one.amplitude) for place, one in along.resonances().items()

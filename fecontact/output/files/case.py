@@ -80,7 +80,7 @@ class Case(Summarised):
     versions: dict[str, str] = field(default_factory=dict)
 
     def summary(self) -> list[tuple[str, str]]:
-        """That of the run, whether its study is known, and the version that computed it."""
+        """Summary of the run, whether its study is known, and the version that computed it."""
         return [*self.trajectory.summary(), ("study", "none" if self.study is None else "stored"),
                 ("fecontact", self.versions.get("fecontact", "unknown"))]
 
