@@ -95,7 +95,7 @@ def curves(
     settings: ContinuationOptions, peer: Auto | None,
 ) -> None:
     """Print the lines of the curves from a branch whose orbits take so many seconds each."""
-    intervals = int(branch.attributes["intervals"])
+    intervals = int(branch.method.intervals)
     for kind, (speed, force) in ENDS.items():
         point = branch.of_kind(kind)[0]
         seconds, curve = timed(partial(

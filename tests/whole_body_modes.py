@@ -29,7 +29,7 @@ class WholeBody:
         sizes = np.abs(mode.harmonic())
         place = int(np.flatnonzero(np.diff(sizes > amplitude))[0])
         part = (amplitude - sizes[place]) / (sizes[place + 1] - sizes[place])
-        harmonics = int(mode.branch.attributes["harmonics"])
+        harmonics = mode.branch.method.highest
         turn = np.exp(-1j * np.arange(harmonics + 1) * np.angle(mode.harmonic()[place]))
         q = (np.array([mode.coordinates(k)[place] for k in range(harmonics + 1)])
              * turn[:, None]).real

@@ -15,6 +15,7 @@ from fecontact.bifurcation.orbits.starts import MotionStart, corrected_samples
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.resources.blas_threads import one_blas_thread
+from fecontact.integrate.solvers import SetValued
 from fecontact.system.fields.vector_field import VectorField, require_field
 
 # Samples of the orbit, degree of the polynomials, doublings of the intervals, and the change of the
@@ -62,7 +63,7 @@ def with_normal_form(
     if point.criticality is not None:
         return point
     require_no_family(point)
-    if "solver" in point.branch.attributes:
+    if isinstance(getattr(point.method, "solver", None), SetValued):
         raise InputError(f"{point.place} is one of a set-valued system, which has no smooth normal "
                          f"form.")
     values, free = point.parameter_values(field), field.index(point.branch.parameter_name)

@@ -114,7 +114,7 @@ def test_orbits_of_twice_the_period_begin_at_a_doubling(by, to):
     assert period == pytest.approx(4.0 * np.pi, rel=1e-9)
     counted = {"collocation": "intervals", "shooting": "segments",
                "harmonic balance": "harmonics"}[to]
-    assert found.attributes[counted] == getattr(TWICE[to], counted)
+    assert getattr(found.method, counted) == getattr(TWICE[to], counted)
     exact, _ = extremes(orbit_branch(field(), doubling("collocation"), bounds=(13.85, 16.0)), 13.9)
     # Harmonic balance doubles .4 % early with 30 harmonics of twice the period.
     assert sizes == pytest.approx(exact, rel=3e-3 if to == "harmonic balance" else 1e-6)

@@ -218,7 +218,8 @@ harmonics = 15
     for method in ("collocation", "harmonic balance"):
         assert execute(["branch", str(path), "--set", f'branch.method="{method}"']) == 0
         found = read_branches(tmp_path / "results" / "waves-branch.h5")["orbits of the run"]
-        assert (found.attributes.get("harmonics") == 15) == (method == "harmonic balance")
+        assert (getattr(found.method, "harmonics", None) == 15) == (
+            method == "harmonic balance")
         first = max(found.points, key=lambda point: point.parameter)
         ranges.append([first.values[f"observed_{end}"] for end in ("minimum", "maximum")])
     assert ranges[0] == pytest.approx(ranges[1], rel=1e-3)

@@ -171,7 +171,7 @@ def test_folds_are_found_without_stability(tmp_path):
     on = orbit_branch(contact_field(cubic_system(), ["drive.frequency_hz"]),
                       stored.branches[0].points[20], bounds=BOUNDS,
                       options=ContinuationOptions(points=3))
-    assert on.attributes["stability"] == "none"
+    assert on.method.stability is None
     plot.plot_response(stored, path=tmp_path / "response.png")
     assert (tmp_path / "response.png").stat().st_size > 10_000
     assert found[1].amplitude().max() == pytest.approx(found[0].amplitude().max(), rel=1e-3)

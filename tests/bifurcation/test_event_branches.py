@@ -53,7 +53,7 @@ def test_orbits_of_either_impact_law_are_those_of_runs(law):
     motion = periodic_motion(system, solver=solver, initial=[0.0, 0.5, 0.0, 0.0], rtol=1e-9)
     branch = orbit_branch(field, motion, method=Shooting(3, solver=solver), bounds=(7.2, 8.8),
                           options=ContinuationOptions(points=2, step=0.05))
-    assert branch.attributes["segments"] == (1 if law == "newton" else 3)
+    assert branch.method.segments == (1 if law == "newton" else 3)
     point = branch.points[-1]
     there, period = field.system(np.array([point.parameter])), point.values["period"]
     start = point.u[:4]
@@ -78,7 +78,7 @@ def test_time_stepping_is_differenced():
         contact_field(system, "ground.speed"), motion,
         method=Shooting(2, solver=solver, rtol=1e-8), bounds=(2.9, 3.1),
         options=ContinuationOptions(points=1))
-    assert branch.attributes["segments"] == 2
+    assert branch.method.segments == 2
     assert branch.message == ""
     matrix = np.array([[0.0, 1.0], [-1.0, -2.0 * DAMPING]])
     known = np.exp(np.linalg.eigvals(matrix) * branch.points[0].values["period"])

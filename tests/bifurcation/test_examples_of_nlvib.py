@@ -38,7 +38,7 @@ def harmonics_at(example, branch, w, which=0):
     states = point.orbit(field, 1025).states[:-1, : system.basis.modes]
     found = np.fft.rfft(states @ rows.T, axis=0) / 512.0
     found[0] /= 2.0
-    harmonics = int(branch.attributes["harmonics"])
+    harmonics = branch.method.highest
     return point.values["observed_harmonics"][: harmonics + 1], found[: harmonics + 1]
 
 

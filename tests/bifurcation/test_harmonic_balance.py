@@ -132,7 +132,7 @@ def test_tolerance_takes_as_many_harmonics_as_it_needs():
     found = orbit_branch(field, motion, "W", bounds=(0.8, 1.2), options=options,
                          method=HarmonicBalance(2, tolerance=1e-6))
     assert found.column("truncation_error").max() <= 1e-6
-    assert 5 <= found.attributes["harmonics"] <= 20
+    assert 5 <= found.method.highest <= 20
     with pytest.raises(AnalysisError, match="most_harmonics"):
         orbit_branch(field, motion, "W", bounds=(0.8, 1.2), options=options,
                      method=HarmonicBalance(2, tolerance=1e-12, most_harmonics=4))

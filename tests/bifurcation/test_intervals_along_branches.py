@@ -162,7 +162,7 @@ def test_intervals_rise_and_fall_along_a_branch():
     back = orbit_branch(field, there.points[-1], bounds=(0.05, 30.0), direction=-1.0,
                         options=ContinuationOptions(largest_step=0.01, points=1000))
     assert back.status is BranchStatus.BOUND
-    assert back.attributes["state_tolerance"] == 1e-5
+    assert back.method.state_tolerance == 1e-5
     assert back.column("state_error").max() <= 1e-5
     found = counts(back)
     assert found[0] > 50 > 40 >= found[-1]
@@ -388,7 +388,7 @@ def test_limits_below_the_intervals_are_raised_to_them():
     assert Collocation(16, most_intervals=40).most_intervals == 40
     branch = circles(Collocation(24, state_tolerance=1e-11, most_intervals=16))
     assert set(counts(branch)) == {24}
-    assert branch.attributes["most_intervals"] == 24
+    assert branch.method.most_intervals == 24
     assert branch.message.endswith(": allow more than most_intervals = 24.")
 
 

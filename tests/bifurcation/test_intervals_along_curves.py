@@ -1,5 +1,7 @@
 """Intervals along curves of orbits over two parameters: errors beside closed forms and runs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from collocation_fields import settled
@@ -60,7 +62,7 @@ def test_a_closed_curve_of_folds_on_changing_meshes(tolerance, tmp_path):
     assert curve.status is BranchStatus.CLOSED
     assert curve.message == ""
     found = counts(curve)
-    assert found[0] == curve.attributes["intervals"] == min(found)
+    assert found[0] == curve.method.intervals == min(found)
     assert max(found) >= 1.7 * min(found)
     assert (np.diff(found) < 0).any()
     p, q = curve.parameter, curve.column("q")
@@ -130,7 +132,8 @@ def test_doublings_of_stick_slip_on_finer_meshes():
     for method, tolerance in ((Collocation(), 1e-7), (Collocation(400), None)):
         branch = orbit_branch(field, sliding.of_kind("Hopf")[0], bounds=(0.3, 9.0), method=method)
         doubling, = branch.of_kind("period doubling")
-        doubling.branch.attributes["state_tolerance"] = tolerance
+        doubling.branch.attributes["method"] = replace(
+            doubling.branch.method, state_tolerance=tolerance)
         intervals += counts([doubling])
         curves.append(codim2_curve(
             field, doubling, "slope", both=False, direction=-1.0,
@@ -167,7 +170,7 @@ def test_special_points_get_the_intervals_that_they_need(most, intervals):
         field, PeriodicMotion(t, circle, period=np.pi), "lam", bounds=(0.3, 0.9),
         method=Collocation(4, most_intervals=most, tolerance=1.0), scales=np.ones(3))
     point = branch.of_kind("Neimark-Sacker")[0]
-    point.branch.attributes["tolerance"] = 1e-9
+    point.branch.attributes["method"] = replace(point.branch.method, tolerance=1e-9)
     curve = codim2_curve(field, point, "nu", direction=-1.0, both=False,
                          bounds={"lam": (0.3, 0.9), "nu": (0.0, 1.0)})
     assert curve.message.endswith("" if most > 6 else ": allow more than most_intervals = 6.")

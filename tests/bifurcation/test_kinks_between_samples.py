@@ -74,7 +74,7 @@ def test_enough_harmonics_give_stability():
 @pytest.mark.parametrize("samples", [16, 20, 31, 48, 56, 64, 100, 128, 256, 512, 2048])
 def test_parameter_turns_twice_or_a_sentence_says_why_not(samples):
     branch = response(stability=None, samples=samples)
-    assert branch.attributes["samples"] == samples
+    assert branch.method.samples == samples
     assert turns(branch) == 2 or "take more samples" in branch.message
     assert sum(point.kind == "fold" for point in branch.points) == turns(branch)
     if samples >= 128:
@@ -216,4 +216,4 @@ def test_samples_that_are_given_are_kept():
     branch = frequency_response(
         stop(), (2.0 / TURN, 6.0 / TURN), observe=("B", "y"), method=HarmonicBalance(3, samples=24),
         options=ContinuationOptions(largest_step=0.1)).branches[0]
-    assert branch.attributes["samples"] == 24
+    assert branch.method.samples == 24

@@ -50,8 +50,8 @@ def test_odd_harmonics_of_symmetric_systems(make, stability):
     known = {"samples": 64, "stability": stability}
     all_, odd = (followed(make(), harmonics, (0.7, 1.4), **known).branches[0]
                  for harmonics in (7, ODD))
-    assert odd.attributes["orders"].tolist() == ODD
-    assert "orders" not in all_.attributes
+    assert list(odd.method.orders) == ODD
+    assert all_.method.orders is None
     assert len(odd) == len(all_)
     np.testing.assert_allclose(odd.column("observed_harmonics"),
                                all_.column("observed_harmonics"), rtol=0.0, atol=2e-6)
@@ -146,8 +146,8 @@ def test_points_are_restored(tmp_path):
     few = ContinuationOptions(points=5, largest_step=0.05)
     same, more = (orbit_branch(field, read.points[-1], bounds=(0.7, 1.0), method=method,
                                options=few) for method in (None, HarmonicBalance(7)))
-    assert same.attributes["orders"].tolist() == ODD
-    assert "orders" not in more.attributes
+    assert list(same.method.orders) == ODD
+    assert more.method.orders is None
     assert same.points[-1].values["maximum"] == pytest.approx(
         more.points[-1].values["maximum"], rel=1e-6)
 

@@ -58,10 +58,10 @@ def test_curves_have_at_least_the_intervals_of_their_first_point(masses):
                           bounds=(7.8, 8.2), options=ContinuationOptions(step=0.02))
     start, = branch.of_kind("period doubling")
     intervals = len(start.values["mesh"]) - 1
-    assert intervals > branch.attributes["intervals"]
+    assert intervals > branch.method.intervals
     curve = codim2_curve(field, start, "D", bounds={"B": (0.2, 20.0)}, both=False,
                          options=ContinuationOptions(points=2))
-    assert curve.attributes["intervals"] == intervals == len(curve.points[0].values["mesh"]) - 1
+    assert curve.method.intervals == intervals == len(curve.points[0].values["mesh"]) - 1
 
 
 @pytest.mark.parametrize("kind", ["fold", "period doubling"])

@@ -208,7 +208,7 @@ def test_shooting_goes_on_and_is_solved_at_a_value():
         shot.points[0].orbit()
     on = orbit_branch(field, shot.points[-1], options=ContinuationOptions(step=0.05),
                       bounds=(5.9, 6.3))
-    assert on.attributes["segments"] == 2
+    assert on.method.segments == 2
     assert on.parameter[-1] == pytest.approx(6.3, rel=1e-12)
     found = on.at(field, 6.2)
     assert found.values["period"] == pytest.approx(wanted.values["period"], rel=1e-7)

@@ -219,10 +219,10 @@ def test_orbits_of_three_periods_are_as_accurate_as_those_of_one():
     saddles = orbit_branch(field, point, bounds=BOX["e"], options=ContinuationOptions(points=3))
     folds = codim2_curve(field, point, "f", bounds=BOX, options=ContinuationOptions(points=3))
     for found in (saddles, folds):
-        assert found.attributes["tolerance"] == 1e-8
-        assert found.attributes["state_tolerance"] == 1e-8
-        assert found.attributes["most_intervals"] == 300
-        assert found.attributes["intervals"] % 3 == 0
+        assert found.method.tolerance == 1e-8
+        assert found.method.state_tolerance == 1e-8
+        assert found.method.most_intervals == 300
+        assert found.method.intervals % 3 == 0
         assert found.column("state_error").max() <= 1e-8
         assert found.message == ""
 

@@ -85,8 +85,8 @@ def test_command_line_overrides_the_section(cli, file):
     found = read_response(file.parent / "there" / "block-response.h5")
     assert found.level_name == "load.normal"
     assert found.levels == pytest.approx([10.0, 20.0])
-    assert found.branches[0].attributes["harmonics"] == 1
-    assert found.branches[0].attributes["samples"] == 64
+    assert found.branches[0].method.highest == 1
+    assert found.branches[0].method.samples == 64
     assert found.branches[0].parameter[[0, -1]] == pytest.approx([9.0, 10.0])
 
 
@@ -96,13 +96,13 @@ def test_a_list_of_harmonics(cli, file):
     for how in (["--harmonics", "0,1,3"], ["--set", "response.harmonics=[0,1,3]"]):
         assert cli("response", file, "--bounds", 9, 9.5, "--samples", 64, *how)[0] == 0
         found = read_response(file.parent / "results" / "block-response.h5")
-        assert found.branches[0].attributes["orders"].tolist() == [0, 1, 3]
+        assert list(found.branches[0].method.orders) == [0, 1, 3]
         assert not found.harmonic(2).any()
         assert found.harmonic(3).any()
     assert cli("modes", file, "--nonlinear", 1, "--amplitudes", 1e-6, 1e-5, "--set",
                "response.harmonics=[0,1,3]")[0] == 0
     mode = read_mode(file.parent / "results" / "block-mode-1.h5")
-    assert mode.branch.attributes["orders"].tolist() == [0, 1, 3]
+    assert list(mode.branch.method.orders) == [0, 1, 3]
 
 
 def test_another_parameter_than_the_frequency(cli, file):

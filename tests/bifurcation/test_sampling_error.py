@@ -120,7 +120,7 @@ def test_folds_have_errors_like_the_points_beside_them():
     field = duffing(0.6, 0.25)
     branch = frequency_response(
         field, (0.6, 1.8), "W", method=HarmonicBalance(5, 14, sampling_tolerance=1e-3)).branches[0]
-    assert branch.attributes["samples"] == 14
+    assert branch.method.samples == 14
     folds = branch.of_kind("fold")
     assert len(folds) == 2
     largest = 0.0
@@ -136,7 +136,7 @@ def test_folds_have_errors_like_the_points_beside_them():
     # Twice the samples are exact here, and move the folds by no more than the estimate.
     fine = frequency_response(field, (0.6, 1.8), "W", method=HarmonicBalance(
         5, 14, sampling_tolerance=1e-9)).branches[0]
-    assert fine.attributes["samples"] == 28
+    assert fine.method.samples == 28
     assert fine.attributes["sampling_error"] < 1e-12
     for coarse, better in zip(folds, fine.of_kind("fold"), strict=True):
         off = abs(coarse.parameter - better.parameter) / 1.2
@@ -149,13 +149,13 @@ def test_branches_that_cross_have_an_error_too():
         9, 40, sampling_tolerance=1e-9)).branches[0]
     assert branch.of_kind("branch point")
     assert branch.attributes["sampling_error"] < 1e-11
-    assert branch.attributes["samples"] == 40
+    assert branch.method.samples == 40
 
 
 def test_what_newton_left_is_no_error_of_samples():
     branch = frequency_response(duffing(0.6, 0.5), (0.6, 1.8), "W", method=HarmonicBalance(
         5, 32, sampling_tolerance=1e-9)).branches[0]
-    assert branch.attributes["samples"] == 32
+    assert branch.method.samples == 32
     assert branch.attributes["sampling_error"] < 1e-11
     problem, u = orbit(duffing(), 5, 14, W=0.9, P=2.0)
     expected = sampling_error(problem, u, fixed(u))
@@ -170,7 +170,7 @@ def test_orbits_at_rest_have_no_error(bounds):
     branch = frequency_response(duffing(0.8), bounds, "P", method=HarmonicBalance(
         5, 14, sampling_tolerance=1e-6), start=0.0).branches[0]
     assert min(np.abs(point.u[:-1]).max() for point in branch.points) < 1e-12
-    assert branch.attributes["samples"] == 14
+    assert branch.method.samples == 14
     assert branch.attributes["sampling_error"] < 1e-6
     # Rounding of forces on a body that they do not move, beside a motion and alone.
     problem, _ = orbit(duffing(), 5, 14)
@@ -186,7 +186,7 @@ def test_samples_are_doubled_until_a_response_is_accurate(stability):
         jenkins_system(), BOUNDS, method=HarmonicBalance(
             1, 4, stability=stability, sampling_tolerance=1e-3),
         options=ContinuationOptions(points=60, largest_step=0.1)).branches[0]
-    samples = found.attributes["samples"]
+    samples = found.method.samples
     assert samples == 16
     assert found.attributes["sampling_error"] < 1e-3
     off = [abs((point.u[1] - 1j * point.u[2]) / exact(TURN * point.parameter) - 1.0)
@@ -200,7 +200,7 @@ def test_samples_are_doubled_until_a_response_is_accurate(stability):
         options=ContinuationOptions(points=60, largest_step=0.1)).branches[0]
         for count, tolerance in ((samples // 2, 0.5), (samples, 1e-3)))
     assert fewer.attributes["sampling_error"] > 1e-3
-    assert same.attributes["samples"] == samples
+    assert same.method.samples == samples
     assert same.attributes["sampling_error"] == pytest.approx(
         found.attributes["sampling_error"], rel=0.3)
 
@@ -212,14 +212,14 @@ def test_harmonics_and_samples_grow_together():
         options=ContinuationOptions(points=4)).branches[0]
     assert found.column("truncation_error").max() <= 2e-3
     assert found.attributes["sampling_error"] <= 1e-4
-    assert found.attributes["harmonics"] > 2
-    assert found.attributes["samples"] > 4 * found.attributes["harmonics"]
+    assert found.method.highest > 2
+    assert found.method.samples > 4 * found.method.highest
 
 
 def test_modes_get_samples_enough_too():
     mode = nonlinear_mode(jenkins_system(), (2.5, 6.0), method=HarmonicBalance(
         1, 4, sampling_tolerance=2e-3), options=ContinuationOptions(points=60, largest_step=0.1))
-    assert mode.branch.attributes["samples"] > 4
+    assert mode.branch.method.samples > 4
     assert mode.branch.attributes["sampling_error"] <= 2e-3
 
 
@@ -229,8 +229,8 @@ def test_modes_without_losses_do_not_hold_the_parameter():
     few, fine = (nonlinear_mode(system, (1e-3, 2.0), 2, observe=("a.p", "y"),
                                 method=HarmonicBalance(5, samples, sampling_tolerance=tolerance))
                  for samples, tolerance in ((12, 1e-2), (12, 1e-9)))
-    assert few.branch.attributes["samples"] == 12
-    assert fine.branch.attributes["samples"] == 24
+    assert few.branch.method.samples == 12
+    assert fine.branch.method.samples == 24
     assert fine.branch.attributes["sampling_error"] < 1e-11
     assert fine.amplitude[-1] == pytest.approx(few.amplitude[-1], rel=1e-9)
     off = abs(fine.angular_frequency[-1] / few.angular_frequency[-1] - 1.0)

@@ -67,7 +67,7 @@ def test_stick_slip_ends_where_slip_ends_no_more(tmp_path):
     back = orbit_branch(field, known.points[0], direction=-1.0, bounds=(0.94 * last, last),
                         options=ContinuationOptions(step=0.02))
     assert back.status is BranchStatus.BOUND
-    assert back.attributes["solver"] == branch.attributes["solver"]
+    assert back.method.solver == branch.method.solver
     assert back.points[-1].parameter == pytest.approx(0.94 * last, rel=1e-9)
 
 

@@ -1,5 +1,7 @@
 """Periodic orbits by shooting: the belt with steep friction, and collocation as a check."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from systems import TURN, belt, lorenz_field, two_mass_field
@@ -15,6 +17,7 @@ from fecontact.bifurcation import (
     orbit_branch,
     quantity_range,
 )
+from fecontact.bifurcation.continuation.point import BranchHeader
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.orbits.mesh import interpolate
 from fecontact.bifurcation.orbits.restored import restored
@@ -120,4 +123,5 @@ def orbits_by_shooting_point(field, problem, u):
     shot, v = shooting_from(problem, u, 3)
     row = np.zeros(len(v))
     row[-1] = 1.0
-    return next(continuation(shot, v, ContinuationOptions(points=1), tangent=row))
+    point = next(continuation(shot, v, ContinuationOptions(points=1), tangent=row))
+    return replace(point, header=BranchHeader("B", shot.attributes()))

@@ -403,13 +403,6 @@ def without(group, name):
     return change
 
 
-def added(name, value):
-    """A change of a file: a dataset that it does not have."""
-    def change(file):
-        file[name] = value
-    return change
-
-
 def filled(name, value):
     """A change of a file: one value everywhere in a dataset."""
     return lambda file: other(name, np.full(file[name].shape, value))(file)
@@ -420,7 +413,7 @@ ATTRIBUTES, VALUES = "branches/0/attributes", "branches/0/values"
 
 @pytest.mark.parametrize("change", [
     *(without(ATTRIBUTES, name) for name in (
-        "displacements", "harmonics", "level_name", "memory", "memory_nodes", "observed", "periods",
+        "displacements", "level_name", "memory", "memory_nodes", "method", "observed", "periods",
         "state_names")),
     *(without(VALUES, name) for name in (
         "memory", "observed_amplitude", "period", "truncation_error")),
@@ -428,11 +421,14 @@ ATTRIBUTES, VALUES = "branches/0/attributes", "branches/0/values"
     other(f"{ATTRIBUTES}/level", "high"), other(f"{ATTRIBUTES}/level", np.ones(2)),
     other(f"{ATTRIBUTES}/level", 1j), other(f"{ATTRIBUTES}/observed", 3.0),
     other(f"{ATTRIBUTES}/state_names", "qqqqq"), other(f"{ATTRIBUTES}/state_names", ["q1"]),
-    other(f"{ATTRIBUTES}/scales", 1.0), other(f"{ATTRIBUTES}/harmonics", -1),
+    other(f"{ATTRIBUTES}/scales", 1.0), other(f"{ATTRIBUTES}/method", 3.0),
     *(filled(f"{VALUES}/observed_amplitude", value) for value in (np.nan, np.inf)),
     filled(f"{VALUES}/unstable", np.nan), filled("branches/0/u", np.nan),
     filled("branches/0/u", 1e300), filled("branches/0/tangent", -np.inf),
-    *(added(f"{ATTRIBUTES}/orders", value) for value in (3, [1, 4], [1.0, 3.0], [-1, 1], "1")),
+    *(other(f"{ATTRIBUTES}/method", value) for value in (
+        "", "3", "{}", '{"name": "shooting", "segments": 2}', '{"name": "collocation", "x": 1}',
+        *(f'{{"name": "harmonic balance", "harmonics": {value}}}'
+          for value in ("-1", "[1, 4]", "[1.0, 3.0]", "[-1, 1]", '"1"')))),
 ])
 def test_a_damaged_response_is_one_sentence(response, change, tmp_path):
     path = tmp_path / "damaged.h5"

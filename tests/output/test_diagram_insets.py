@@ -13,6 +13,7 @@ from fecontact.bifurcation import (
     Basins,
     Branch,
     BranchPoint,
+    Collocation,
     PoincareScan,
     basins,
     contact_field,
@@ -74,7 +75,7 @@ def test_phase_plane_of_an_orbit():
               "minimum": nodes.min(axis=0), "maximum": nodes.max(axis=0)}
     point = BranchPoint(np.append(nodes.ravel(), 10.0), np.zeros(nodes.size + 1), values)
     branch = Branch("drive.frequency_hz", (point,), attributes={
-        "periods": 1, "degree": 4, "parameter_values": np.array([10.0])})
+        "periods": 1, "method": Collocation(20), "parameter_values": np.array([10.0])})
     inset = phase_inset(field, branch.points[0], observe=("B", "y"))
     assert inset.title == "drive.frequency_hz = 10"
     assert inset.displacement[0] == pytest.approx(a, rel=1e-12)

@@ -136,6 +136,11 @@ class Branch(Summarised):
         return np.array([point.parameter for point in self.points])
 
     @property
+    def method(self) -> Any:
+        """Options of the method of its orbits, such as Collocation; None if it has none."""
+        return self.attributes.get("method")
+
+    @property
     def parameter_names(self) -> tuple[str, ...]:
         """Name of the parameter, or of both along a curve over two: (first, second)."""
         return tuple(self.attributes.get("parameters", (self.parameter_name,)))

@@ -75,6 +75,11 @@ class BranchHeader:
     parameter_name: str
     attributes: Mapping[str, Any]
 
+    @property
+    def method(self) -> Any:
+        """Options of the method of its orbits; None if it has none."""
+        return self.attributes.get("method")
+
 
 @read_only_arrays
 @dataclass(frozen=True, eq=False, repr=False)
@@ -156,7 +161,8 @@ class BranchPoint(Summarised):
         """
         from fecontact.bifurcation.orbits.orbit_points import orbit_points_of
 
-        found: Method = orbit_points_of(self).method_of(self)
+        orbit_points_of(self)
+        found: Method = self.branch.method
         return found
 
     @property

@@ -22,7 +22,6 @@ from fecontact.bifurcation.events.linearisation import EventLinearisation
 from fecontact.bifurcation.events.orbit import ADMISSIBLE, EventOrbit
 from fecontact.bifurcation.events.phases import BRIEF, PERIOD, Motion, Phase, Strike
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.orbits.motions import solver_of
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.solvers import SetValued
@@ -259,7 +258,8 @@ def _other_side(
 def _restored(field: ContactField, point: DiscontinuityPoint) -> tuple[EventOrbit, Array]:
     """The orbit of a border in its unknowns from event to event."""
     known = point.branch.attributes
-    solver = solver_of(known)
+    method = point.branch.method
+    solver = method.solver
     assert isinstance(solver, SetValued)
     margins = np.asarray(point._detail("margins"), dtype=float)
     strikes = np.atleast_2d(np.asarray(point._detail("strikes"), dtype=np.int64))
@@ -275,4 +275,4 @@ def _restored(field: ContactField, point: DiscontinuityPoint) -> tuple[EventOrbi
     values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
     return EventOrbit(field, values, free, tuple(phases), solver,
                       np.asarray(known["scales"], dtype=float), margins, int(known["periods"]),
-                      float(known.get("rtol", 1e-9))), np.asarray(point._detail("unknowns"))
+                      method.rtol), np.asarray(point._detail("unknowns"))

@@ -85,7 +85,7 @@ class ByHarmonics(BalancedPoints, Discretisation):
         problem, u, tangent = self._rescaled(point, request)
         method = request.method
         if method is None:
-            method = _method_of(problem)
+            method = problem.method
         else:
             problem, u, tangent = starts.with_more(problem, u, tangent, method)
         return follow(problem, u, request.sign * tangent, method, request.options,
@@ -96,11 +96,11 @@ class ByHarmonics(BalancedPoints, Discretisation):
         problem, u, tangent = self._rescaled(point, request)
         if problem.orders is not None:
             # The other orbits may have harmonics that these leave out.
-            every = replace(_method_of(problem), harmonics=problem.harmonics)
+            every = replace(problem.method, harmonics=problem.harmonics)
             problem, u, tangent = starts.with_more(problem, u, tangent, every)
         problem, u, tangent = (starts.doubled(problem, u) if point.kind == "period doubling"
                                else starts.crossing(problem, u, tangent))
-        own = _method_of(problem)
+        own = problem.method
         if request.method is not None:
             own = request.method
             problem, u, tangent = starts.with_more(problem, u, tangent, own)
@@ -139,12 +139,6 @@ class ByHarmonics(BalancedPoints, Discretisation):
         limits = problem.limits if request.scales is None else None
         return (replace(rescaled(problem, request.scales, request.width), limits=limits), u,
                 tangent)
-
-
-def _method_of(problem: HarmonicProblem) -> HarmonicBalance:
-    return HarmonicBalance(problem.orders or problem.harmonics, problem.samples,
-                           stability=problem.stability,
-                           repeats=None if problem.waves is None else problem.waves.repeats)
 
 
 def follow(

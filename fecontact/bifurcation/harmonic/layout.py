@@ -162,6 +162,7 @@ def balanced(
     """
     layout, period = layout_from(attributes), float(values["period"])
     phases = np.linspace(0.0, 1.0, samples)
-    X = u[: (2 * int(attributes["harmonics"]) + 1) * layout.harmonic].reshape(-1, layout.harmonic)
+    count = 2 * attributes["method"].highest + 1
+    X = u[: count * layout.harmonic].reshape(-1, layout.harmonic)
     z = np.asarray(values.get("memory", np.zeros((1, 0))))
     return PeriodicMotion(phases * period, series_states(layout, X, z, period, phases), period)

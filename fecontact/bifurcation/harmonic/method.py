@@ -1,8 +1,7 @@
 """Options of harmonic balance."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -150,12 +149,3 @@ def _require_count(name: str, value: object) -> None:
     if not (isinstance(value, int | np.integer) and 1 <= value <= MOST):
         raise InputError(f"HarmonicBalance: {name} = {value!r} must be a whole number from 1 to "
                          f"{MOST}.")
-
-
-def method_from(attributes: Mapping[str, Any]) -> HarmonicBalance:
-    """Harmonic balance as a branch has it, from its attributes."""
-    stability = str(attributes["stability"])
-    orders = attributes.get("orders")
-    return HarmonicBalance(int(attributes["harmonics"]) if orders is None else
-                           np.asarray(orders).tolist(), int(attributes["samples"]),
-                           stability=None if stability == "none" else stability)

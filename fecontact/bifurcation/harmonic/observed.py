@@ -45,7 +45,7 @@ def observed_of_orbits(
 def observed_of_series(points: Sequence[Any], row: Array) -> dict[str, Any]:
     """Values (N, ...) by name of orbits of one branch by harmonic balance."""
     known = points[0].branch.attributes
-    layout, H = layout_from(known), int(known["harmonics"])
+    layout, H = layout_from(known), known["method"].highest
     b = layout.harmonic
     X = np.array([point.u[: (2 * H + 1) * b] for point in points]).reshape(-1, 2 * H + 1, b)
     periods = np.array([float(point.values["period"]) for point in points])

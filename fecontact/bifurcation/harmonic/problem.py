@@ -35,6 +35,7 @@ from fecontact.bifurcation.harmonic.compiled.orbit import (
 )
 from fecontact.bifurcation.harmonic.compiled.step_batches import StepBatches
 from fecontact.bifurcation.harmonic.layout import grown
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.series import differentiated, shifted
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions, stability_grid
 from fecontact.bifurcation.harmonic.stored import ERRORS, StoredOrbits, StoredValues
@@ -197,17 +198,21 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
     polishes: ClassVar[bool] = True
     ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF}
 
+    @property
+    def method(self) -> HarmonicBalance:
+        """The options with which this is the problem of a branch."""
+        return HarmonicBalance(self.orders or self.harmonics, self.samples,
+                               stability=self.stability,
+                               repeats=None if self.waves is None else self.waves.repeats)
+
     def attributes(self) -> dict[str, Any]:
         """Attributes of a branch from which the problem of its points is restored."""
         field, layout = self.field, self.layout
         found: dict[str, Any] = {} if self.limits is None else {"limits": self.limits}
-        if self.orders is not None:
-            found["orders"] = np.array(self.orders)
         if self.waves is not None:
             found |= self.waves.repeats.attributes()
         return {**found, **attributes_of(field, self.values), "scales": self.scales,
-                "harmonics": self.harmonics, "samples": self.samples,
-                "stability": self.stability or "none", "periods": self.periods,
+                "method": replace(self.method, repeats=None), "periods": self.periods,
                 "displacements": layout.displacements, "memory": layout.memory,
                 "memory_nodes": layout.nodes,
                 **({"kept_deflections": self.kept.offsets} if layout.memory else {})}

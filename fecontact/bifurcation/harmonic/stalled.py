@@ -27,7 +27,7 @@ def stall_reason(field: VectorField, branch: Branch) -> str:
     """
     if branch.status is not BranchStatus.STALLED or not isinstance(field, ContactField):
         return branch.message
-    last, N = branch.points[-1], int(branch.attributes["samples"])
+    last, N = branch.points[-1], branch.method.count
     motion = last.orbit(samples=N + 1)
     system = field.system(last.parameter_values(field))
     force = system.contact_history(motion.times[:-1], motion.states[:-1])[:, :, NORMAL_FORCE]
@@ -47,7 +47,7 @@ def stall_reason(field: VectorField, branch: Branch) -> str:
             needed = 2 ** int(np.ceil(np.log2(_ENOUGH * N / fewest)))
             said.append(f"Take samples = {needed}, or a softer contact.")
     if error > _LARGE:
-        said.append(f"The truncation error is {error:.2g} with {branch.attributes['harmonics']} "
+        said.append(f"The truncation error is {error:.2g} with {branch.method.highest} "
                     f"harmonics: take more, or damp the modes that they excite.")
     if isinstance(field, WaveField):
         if np.isnan(error):

@@ -14,7 +14,7 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.engine_order import WaveField, Waves
 from fecontact.bifurcation.harmonic.layout import kept_by, layout_of
-from fecontact.bifurcation.harmonic.method import HarmonicBalance, method_from, require_wave
+from fecontact.bifurcation.harmonic.method import HarmonicBalance, require_wave
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.series import with_harmonics
 from fecontact.bifurcation.harmonic.timing import timing_of
@@ -141,10 +141,10 @@ def restored(field: VectorField, point: BranchPoint) -> Start:
         order = known["engine_order"]
         raise InputError(f"{point.place} is a wave of a wheel under engine order {order}; give the "
                          f"field EngineOrder(wheel, {order}).field(...).")
-    if "harmonics" not in known or "period" not in point.values:
+    if type(point.branch.method) is not HarmonicBalance or "period" not in point.values:
         raise InputError(f"{point.place} is no periodic orbit by harmonic balance.")
     values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
-    problem = problem_for(field, values, free, method_from(known),
+    problem = problem_for(field, values, free, point.branch.method,
                           np.asarray(known["scales"], dtype=float), int(known["periods"]),
                           known.get("kept_deflections"))
     if len(point.u) != problem.size + problem.common:

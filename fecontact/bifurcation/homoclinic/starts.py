@@ -11,6 +11,7 @@ from fecontact.bifurcation.equilibria.equilibrium import newton
 from fecontact.bifurcation.homoclinic import open_mesh
 from fecontact.bifurcation.homoclinic.problem import HomoclinicProblem
 from fecontact.bifurcation.homoclinic.saddle import left_subspaces, saddle_of
+from fecontact.bifurcation.orbit_methods import Collocation
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ArrayLike
@@ -42,15 +43,16 @@ def homoclinic_curve(
     AnalysisError
         If no homoclinic orbit is found beside it.
     """
-    known = point.branch.attributes
+    known, method = point.branch.attributes, point.branch.method
     names = (second, point.branch.parameter_name)
     active = (field.index(second), field.index(names[1]))
+    on_mesh = type(method) is Collocation
     if point.is_homoclinic:
         values = point._curve_values(field)
-        motion, degree = None, int(known["degree"])
+        motion, degree = None, method.degree
     else:
         values = point.parameter_values(field)
-        motion, degree = point.orbit(field, _SAMPLES), int(known.get("degree", _DEGREE))
+        motion, degree = point.orbit(field, _SAMPLES), method.degree if on_mesh else _DEGREE
     if field.forcing_period(values) is not None:
         raise InputError(f"{point.place} is one of an excited system, whose orbits approach no "
                          f"saddle at rest.")
@@ -65,7 +67,7 @@ def homoclinic_curve(
         rest = np.asarray(point.values["saddle"], dtype=float)
         time = float(point.values["time"])
     else:
-        given = (len(point.values["mesh"]) - 1 if "degree" in known else _INTERVALS)
+        given = len(point.values["mesh"]) - 1 if on_mesh else _INTERVALS
         nodes, rest, mesh, time = _cut_open(field, values, motion, point, given, degree, sizes)
     _, J, _ = field.derivatives(np.zeros(1), rest[None], values)
     jacobian = J[0] * sizes / sizes[:, None]
@@ -76,7 +78,7 @@ def homoclinic_curve(
     u = np.concatenate([nodes.reshape(-1), rest, values[list(active)]])
     problem, u = _converged(problem, u, point)
     attributes = {"parameter_names": list(field.parameters), "parameter_values": values,
-                  "scales": problem.scales, "degree": degree}
+                  "scales": problem.scales, "method": Collocation(len(mesh) - 1, degree)}
     return problem, u, attributes
 
 

@@ -214,7 +214,7 @@ class _Along:
         P: ComplexArray = np.array(forces)
         C = field.arrays(values).damping
         lost, damped = np.zeros(len(w)), np.zeros(len(w))
-        for k in range(1, int(mode.branch.attributes["harmonics"]) + 1):
+        for k in range(1, mode.branch.method.highest + 1):
             each = k * mode.coordinates(k)
             lost += w * mode.xi * (np.abs(each) ** 2).sum(axis=1)
             damped += np.einsum("ni,ij,nj->n", each.conj(), C, each).real

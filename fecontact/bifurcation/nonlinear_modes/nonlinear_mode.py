@@ -20,7 +20,7 @@ from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.engine_order import EngineOrder
 from fecontact.bifurcation.harmonic.layout import layout_from
-from fecontact.bifurcation.harmonic.method import HarmonicBalance, method_from
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.series import complex_harmonics
 from fecontact.bifurcation.harmonic.stalled import stall_reason
@@ -174,7 +174,7 @@ class NonlinearMode(Summarised):
         known = self.branch.attributes
         _require_harmonics(self.branch, "coordinates")
         layout = layout_from(known)
-        H, m, b = int(known["harmonics"]), layout.displacements or layout.states, layout.harmonic
+        H, m, b = self.branch.method.highest, layout.displacements or layout.states, layout.harmonic
         if not (isinstance(k, int | np.integer) and 0 <= k <= H):
             raise InputError(f"coordinates: k = {k!r} must be a whole number from 0 to {H}, the "
                              f"number of harmonics.")
@@ -410,7 +410,7 @@ def continued_mode(
         loose=np.asarray(known["rigid_motions"]).reshape(-1, plain.layout.displacements),
         home=np.asarray(known["rest"]))
     left = max(2, options.points - len(points) + 1)
-    rest = branches.follow(problem, u, tangent, method_from(known),
+    rest = branches.follow(problem, u, tangent, known["method"],
                            _between(replace(options, points=left), low, high))
     ended = _ended(replace(rest, message=stall_reason(field, rest)), {})
     return replace(mode, branch=replace(
@@ -420,7 +420,7 @@ def continued_mode(
 
 def _require_harmonics(branch: Branch, name: str) -> None:
     """Raise InputError unless a mode was found by harmonic balance."""
-    if "harmonics" not in branch.attributes:
+    if type(branch.method) is not HarmonicBalance:
         raise InputError(f"NonlinearMode.{name}: the mode was found by shooting and has no "
                          f"harmonics of its coordinates; find it by HarmonicBalance().")
 

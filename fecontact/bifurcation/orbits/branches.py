@@ -21,7 +21,6 @@ from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.jumps import require_smooth_friction
 from fecontact.bifurcation.orbit_methods import Collocation, Method
 from fecontact.bifurcation.orbits import starts
-from fecontact.bifurcation.orbits.by_collocation import ByCollocation
 from fecontact.bifurcation.orbits.curves.resonant import (
     AWAY,
     StrongResonance,
@@ -136,7 +135,7 @@ def orbit_branch(
     if name == known:
         direction = direction * float(np.copysign(1.0, start.tangent[-1]))
     return _from_motion(start.orbit(field), name, replace(
-        request, method=method or by.method_of(start), direction=direction))
+        request, method=method or start.method, direction=direction))
 
 
 def as_motion(start: PeriodicMotion | Trajectory | FieldRun | tuple[Any, ...]) -> PeriodicMotion:
@@ -168,7 +167,7 @@ def _require_parameter(point: BranchPoint, parameter: str | None) -> None:
 
 def method_of_several(at: StrongResonance) -> Collocation:
     """Collocation for a curve of tori: intervals for orbits of several periods near a resonance."""
-    usual = ByCollocation().method_of(at.point)
+    usual: Collocation = at.point.branch.method
     return replace(usual, intervals=at.order * at.orbit.intervals,
                    most_intervals=at.order * usual.most_intervals)
 
@@ -253,13 +252,12 @@ def _both_halves(
 def _beyond(point: BranchPoint, request: Request) -> Branch:
     """The other orbits at a special point of a branch of orbits, by any method."""
     own = discretisation_of(point)
-    chosen = request.method or own.method_of(point)
+    chosen = request.method or point.method
     by = discretisation_by(chosen)
     if by is own and point.kind in own.own_starts:
         return own.beyond(point, request)
     require_smooth_friction(request.field)
-    collocation = ByCollocation()
-    whole = collocation.holds(point) and (by is not own or own.suits(point, chosen))
+    whole = own.options is Collocation and (by is not own or own.suits(point, chosen))
     problem, u, tangent = (restored(request.field, point) if whole
                            else _collocated(request.field, point, *by.mesh(chosen)))
     problem = rescaled(problem, request.scales, request.width)

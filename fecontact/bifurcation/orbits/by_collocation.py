@@ -26,7 +26,7 @@ class ByCollocation(CollocatedPoints, Discretisation):
 
     def suits(self, point: BranchPoint, method: Collocation) -> bool:
         """Whether unknowns of a point are those of the options, but for their number."""
-        return method.degree == self.method_of(point).degree
+        return method.degree == point.branch.method.degree
 
     def require(self, field: VectorField) -> None:
         """Raise InputError for friction whose switches are not located."""
@@ -70,7 +70,7 @@ class ByCollocation(CollocatedPoints, Discretisation):
         limits = None if request.scales is not None else point.branch.attributes.get("limits")
         problem, u, tangent = restored(request.field, point)
         problem = replace(rescaled(problem, request.scales, request.width), limits=limits)
-        method = request.method or self.method_of(point)
+        method = request.method or point.branch.method
         problem, u, tangent = _on_own_intervals((problem, u, tangent), method)
         start = problem.adapted(u, request.sign * tangent)
         return self.followed(start, method, request.options, limits, both=request.both)
@@ -81,12 +81,9 @@ class ByCollocation(CollocatedPoints, Discretisation):
     ) -> Branch:
         """Follow a branch and refine its special points."""
         problem, u, tangent = self.projected(start, method, limits)
-        attributes = problem.attributes() | {
-            "intervals": int(method.intervals), "tolerance": method.tolerance,
-            "most_intervals": method.most_intervals}
+        attributes = problem.attributes() | {"method": replace(method, degree=problem.degree)}
         sizes, newton = _sizes(method), options.tolerance
         if sizes is not None:
-            attributes["state_tolerance"] = sizes.tolerance
             newton = sizes.newton(newton)
         name = list(problem.field.parameters)[problem.free]
         stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)

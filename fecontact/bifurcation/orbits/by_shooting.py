@@ -46,7 +46,7 @@ class ByShooting(ShotPoints, Discretisation):
 
     def suits(self, point: BranchPoint, method: Shooting) -> bool:
         """Whether unknowns of a point are those of the options, but for their number."""
-        return method.segments == self.method_of(point).segments
+        return method.segments == point.branch.method.segments
 
     def require_family(self, method: Shooting, field: VectorField) -> None:
         """Raise InputError for a field or options without families."""
@@ -207,8 +207,8 @@ def _from_event_to_event(
                            rtol=problem.rtol, solver=problem.solver)
     except AnalysisError as error:
         return None, f"The runs of the orbit were differenced: {error}"
-    whole = {**replace(problem, limits=None).attributes(), "scales": found[0].scales,
-             "segments": 1}
+    whole = replace(problem, limits=None).attributes()
+    whole |= {"scales": found[0].scales, "method": replace(whole["method"], segments=1)}
     try:
         return followed(*found, options, name=_name(problem), attributes=whole, **how), ""
     except InputError as error:

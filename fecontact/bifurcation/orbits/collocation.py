@@ -12,6 +12,7 @@ from fecontact.bifurcation.continuation.point import BranchPoint, attributes_of
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
 from fecontact.bifurcation.fields.fast_modes import unresolved_modes
 from fecontact.bifurcation.fields.jumps import missed_jumps
+from fecontact.bifurcation.orbit_methods import Collocation
 from fecontact.bifurcation.orbits.collocation_equations import (
     CollocationEquations,
     CollocationLinearisation,
@@ -195,7 +196,8 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
         """Attributes of a branch from which its points are restored."""
         kept: dict[str, Any] = {
             **attributes_of(self.field, self.values), "scales": self.scales,
-            "degree": self.degree, "periods": self.periods, "intervals": self.intervals}
+            "periods": self.periods,
+            "method": Collocation(self.intervals, self.degree, state_tolerance=None)}
         return kept if self.limits is None else kept | {"limits": self.limits}
 
     def note(self, points: Sequence[BranchPoint]) -> str:

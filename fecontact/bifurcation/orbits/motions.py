@@ -1,8 +1,6 @@
 """Sampled periodic motions, from runs and from orbits of branches."""
 
-import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +12,7 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.core.units import Summarised, listed, span
 from fecontact.integrate.simulate import simulate
-from fecontact.integrate.solvers import AUTO, SetValued, Solver, solver_by_name
+from fecontact.integrate.solvers import Solver
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.columns import POWERS
 from fecontact.system.contact_system import ContactSystem
@@ -224,20 +222,6 @@ def collocated(u: Array, mesh: Array, states: int, period: float, samples: int) 
     nodes, _ = nodes_on_mesh(u, mesh, states)
     phases = np.linspace(0.0, 1.0, samples)
     return PeriodicMotion(phases * period, interpolate(mesh, nodes, phases), period)
-
-
-def solver_text(solver: Solver) -> str | None:
-    """Options of a set-valued solver as text for a branch's attributes; None for the default."""
-    return json.dumps({"name": solver.name} | asdict(solver)) if isinstance(
-        solver, SetValued) else None
-
-
-def solver_of(known: Mapping[str, Any]) -> Solver:
-    """The solver of a branch by shooting, from its attributes."""
-    if "solver" not in known:
-        return AUTO
-    options = json.loads(known["solver"])
-    return solver_by_name(options.pop("name"), options)
 
 
 def run_again(

@@ -1,7 +1,7 @@
 """Orbits of points of branches: their method, motion and extremes, by what is stored of them."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.estimates import peaks
 from fecontact.bifurcation.harmonic.layout import balanced
-from fecontact.bifurcation.harmonic.method import HarmonicBalance, method_from
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.observed import (
     OBSERVED,
     OBSERVED_HARMONICS,
@@ -26,7 +26,6 @@ from fecontact.bifurcation.orbits.motions import (
     of_runs,
     run_again,
     sampled_run,
-    solver_of,
 )
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
@@ -55,14 +54,6 @@ class OrbitPoints(ABC):
 
     options: ClassVar[type[Any]]
     stores_orbits: ClassVar[bool] = True
-
-    @abstractmethod
-    def holds(self, point: Any) -> bool:
-        """Whether a point is an orbit by this method."""
-
-    @abstractmethod
-    def method_of(self, point: Any) -> Any:
-        """The options by which a point was computed."""
 
     @abstractmethod
     def motion(self, point: Any, field: VectorField | None, samples: int) -> PeriodicMotion:
@@ -100,19 +91,6 @@ class CollocatedPoints(OrbitPoints):
 
     options = Collocation
 
-    def holds(self, point: Any) -> bool:
-        """By its mesh."""
-        return "mesh" in point.values and not BY_SHOOTING.holds(point)
-
-    def method_of(self, point: Any) -> Collocation:
-        """The options by which a point was computed."""
-        known, usual = point.branch.attributes, Collocation()
-        # Special points may have more intervals than their branch.
-        return Collocation(int(known.get("intervals", len(point.values["mesh"]) - 1)),
-                           int(known["degree"]), float(known.get("tolerance", usual.tolerance)),
-                           int(known.get("most_intervals", usual.most_intervals)),
-                           known.get("state_tolerance"))
-
     def motion(self, point: Any, field: VectorField | None, samples: int) -> PeriodicMotion:
         """The polynomials, sampled."""
         known = point.values
@@ -141,16 +119,6 @@ class ShotPoints(OrbitPoints):
     options = Shooting
     stores_orbits = False
 
-    def holds(self, point: Any) -> bool:
-        """By the number of its segments."""
-        return point.header is not None and "segments" in point.header.attributes
-
-    def method_of(self, point: Any) -> Shooting:
-        """The options by which a point was computed."""
-        known = point.branch.attributes
-        return Shooting(int(known["segments"]), float(known.get("rtol", 1e-9)),
-                        known.get("derivative_rtol"), solver_of(known))
-
     def motion(self, point: Any, field: VectorField | None, samples: int) -> PeriodicMotion:
         """The runs of the segments, one after the other; some more samples than asked for."""
         if field is None:
@@ -168,15 +136,6 @@ class BalancedPoints(OrbitPoints):
 
     options = HarmonicBalance
 
-    def holds(self, point: Any) -> bool:
-        """By the number of its harmonics."""
-        return (point.header is not None and "harmonics" in point.header.attributes
-                and "period" in point.values)
-
-    def method_of(self, point: Any) -> HarmonicBalance:
-        """The options by which a point was computed."""
-        return method_from(point.branch.attributes)
-
     def motion(self, point: Any, field: VectorField | None, samples: int) -> PeriodicMotion:
         """The series, sampled."""
         return balanced(point.u, point.values, point.branch.attributes, samples)
@@ -192,12 +151,13 @@ class BalancedPoints(OrbitPoints):
 
 
 BY_COLLOCATION, BY_SHOOTING, BY_HARMONICS = CollocatedPoints(), ShotPoints(), BalancedPoints()
+_BY_OPTIONS: Mapping[type[Any], OrbitPoints] = {
+    one.options: one for one in (BY_COLLOCATION, BY_SHOOTING, BY_HARMONICS)}
 
 
 def holder_of(point: Any) -> OrbitPoints | None:
     """The method by which a point is an orbit; None if it is none."""
-    return next((one for one in (BY_COLLOCATION, BY_SHOOTING, BY_HARMONICS) if one.holds(point)),
-                None)
+    return None if point.header is None else _BY_OPTIONS.get(type(point.header.method))
 
 
 def orbit_points_of(point: Any) -> OrbitPoints:
@@ -219,7 +179,7 @@ def _runs(point: Any, field: VectorField, samples: int) -> list[Trajectory]:
     # Shooting is for contact fields alone, the only ones with a system.
     system = field.system(point.parameter_values(field))  # type: ignore[attr-defined]
     return run_again(system, point.u, np.asarray(point.values["mesh"], dtype=float),
-                     float(point.values["period"]), samples, solver_of(point.branch.attributes))
+                     float(point.values["period"]), samples, point.branch.method.solver)
 
 
 def _observed(motion: PeriodicMotion, row: Array) -> dict[str, Any]:

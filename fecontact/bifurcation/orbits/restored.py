@@ -13,12 +13,12 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.starts import restored as restored_balance
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
-from fecontact.bifurcation.orbits.motions import solver_of
 from fecontact.bifurcation.orbits.orbit_points import (
     BY_COLLOCATION,
     BY_HARMONICS,
     BY_SHOOTING,
     OrbitPoints,
+    holder_of,
     orbit_points_of,
 )
 from fecontact.bifurcation.orbits.shooting import ShootingProblem
@@ -40,10 +40,10 @@ def restored(
         If the point is not such an orbit, or belongs to another field.
     """
     known = point.branch.attributes
-    if "degree" not in known or "mesh" not in point.values:
+    if holder_of(point) is not BY_COLLOCATION:
         raise InputError(f"{point.place} is no periodic orbit by collocation.")
     values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
-    mesh, degree, d = np.asarray(point.values["mesh"]), int(known["degree"]), field.dimension
+    mesh, degree, d = np.asarray(point.values["mesh"]), point.branch.method.degree, field.dimension
     nodes = point.u[: (len(mesh) - 1) * degree * d].reshape(-1, d).copy()
     problem = CollocationProblem(field, values, free, mesh, degree, nodes,
                                  np.asarray(known["scales"]), int(known["periods"]))
@@ -62,7 +62,8 @@ def restored_shooting(
         a contact system.
     """
     known = point.branch.attributes
-    if "segments" not in known or "mesh" not in point.values:
+    method = point.branch.method
+    if holder_of(point) is not BY_SHOOTING:
         raise InputError(f"{point.place} is no periodic orbit by shooting.")
     values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
     if not isinstance(field, ContactField):
@@ -71,8 +72,7 @@ def restored_shooting(
     problem = ShootingProblem(field, values, free, np.asarray(point.values["mesh"], dtype=float),
                               point.u[: field.dimension].copy(),
                               np.asarray(known["scales"], dtype=float), int(known["periods"]),
-                              float(known.get("rtol", 1e-9)), known.get("derivative_rtol"),
-                              solver_of(known))
+                              method.rtol, method.derivative_rtol, method.solver)
     return problem, point.u, point.tangent
 
 

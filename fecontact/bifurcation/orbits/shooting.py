@@ -16,10 +16,10 @@ from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, en
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
+from fecontact.bifurcation.orbit_methods import Shooting
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests, floquet_of, require_same
 from fecontact.bifurcation.orbits.mesh import interpolate, require_segments
-from fecontact.bifurcation.orbits.motions import solver_text
 from fecontact.bifurcation.orbits.same_orbit import VANISHING, near_saddle, same_place, shrunk
 from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns
 from fecontact.core.errors import AnalysisError, InputError
@@ -111,13 +111,10 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
     def attributes(self) -> dict[str, Any]:
         """Attributes of a branch from which the problem of its points is restored."""
         found = {**attributes_of(self.field, self.values), "scales": self.scales,
-                 "segments": len(self.mesh) - 1, "periods": self.periods, "rtol": self.rtol}
-        if self.derivative_rtol is not None:
-            found["derivative_rtol"] = self.derivative_rtol
+                 "periods": self.periods, "method": Shooting(
+                     len(self.mesh) - 1, self.rtol, self.derivative_rtol, self.solver)}
         if self.limits is not None:
             found["limits"] = self.limits
-        if (solver := solver_text(self.solver)) is not None:
-            found["solver"] = solver
         return found
 
     def starts(self, u: Array) -> Array:

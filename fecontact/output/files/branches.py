@@ -10,9 +10,12 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
 from fecontact.bifurcation.continuation.points import details_of, special_point
 from fecontact.bifurcation.harmonic.layout import layout_from
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.response import FrequencyResponse, response_of
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode, mode_of
 from fecontact.bifurcation.nonlinear_modes.resonance_curve import ResonanceCurve, resonances_of
+from fecontact.bifurcation.orbit_methods import Method
+from fecontact.bifurcation.stored_methods import method_from_text, method_text
 from fecontact.core.checks import as_path, require_kind
 from fecontact.core.errors import InputError, shown
 from fecontact.core.files.stored import (
@@ -215,7 +218,8 @@ def _store(group: Any, branch: Branch) -> None:
         for name, value in details_of(point).items():
             group.create_dataset(f"details/{index}/{name}", data=value)
     for name, value in branch.attributes.items():
-        group.create_dataset(f"attributes/{name}", data=value)
+        group.create_dataset(f"attributes/{name}",
+                             data=method_text(value) if name == "method" else value)
 
 
 def _stored(group: Any, path: str | Path) -> Branch:
@@ -236,6 +240,8 @@ def _stored(group: Any, path: str | Path) -> Branch:
         attributes = {name: _value(item)
                       for name, item in _members(group, "attributes").items()}
         _require_kinds(attributes)
+        if "method" in attributes:
+            attributes["method"] = _method(attributes["method"])
         _require_orbits(attributes, u, stored)
         _require_tori(attributes, u, stored)
         return Branch(text(group, "parameter"), points, BranchStatus[text(group, "status")],
@@ -243,14 +249,13 @@ def _stored(group: Any, path: str | Path) -> Branch:
 
 
 # Attributes of branches by what they are.
-_COUNTS = ("degree", "displacements", "harmonics", "memory", "memory_nodes", "mode_number",
-           "periods", "samples", "torus_displacements", "torus_memory")
-_LAYOUT = ("displacements", "harmonics", "memory", "memory_nodes", "state_names")
+_COUNTS = ("displacements", "memory", "memory_nodes", "mode_number", "periods",
+           "torus_displacements", "torus_memory")
+_LAYOUT = ("displacements", "memory", "memory_nodes", "method", "state_names")
 _NUMBERS = ("level",)
-_TEXTS = ("condition", "kind", "level_label", "level_name", "observed", "stability")
+_TEXTS = ("condition", "kind", "level_label", "level_name", "method", "observed")
 _LISTS = ("labels", "parameter_names", "parameters", "state_names")
-_ARRAYS = ("limits", "orders", "parameter_values", "scales", "torus_harmonics",
-           "torus_samples", "widths")
+_ARRAYS = ("limits", "parameter_values", "scales", "torus_harmonics", "torus_samples", "widths")
 _TORI = ("torus_harmonics", "torus_samples", "torus_displacements", "torus_multipliers",
          "tolerance", "periods", "scales", "state_names")
 
@@ -275,12 +280,20 @@ def _require_kinds(attributes: dict[str, Any]) -> None:
             raise DamagedError(f"the attribute '{name}' is {shown(value)}")
 
 
+def _method(written: str) -> Method:
+    try:
+        return method_from_text(written)
+    except InputError as error:
+        raise DamagedError(f"the attribute 'method' is {shown(written)}") from error
+
+
 def _require_orbits(attributes: dict[str, Any], u: list[Array], stored: dict[str, Any]) -> None:
     """Raise DamagedError where responses and orbits by harmonic balance lack a part, or disagree.
 
     ``u`` are the unknowns of the points, ``stored`` their values by name.
     """
-    balanced, response = not attributes.keys().isdisjoint(_LAYOUT[:2]), "level" in attributes
+    method, response = attributes.get("method"), "level" in attributes
+    balanced = "displacements" in attributes or isinstance(method, HarmonicBalance)
     needed = (_LAYOUT if balanced else ()) + (
         ("level_name", "observed", "periods") if response else ())
     values = (("period", "truncation_error") if balanced else ()) + (
@@ -300,11 +313,10 @@ def _require_orbits(attributes: dict[str, Any], u: list[Array], stored: dict[str
         raise DamagedError(f"the attribute 'periods' is {attributes['periods']}")
     if not balanced:
         return
-    layout, orders = layout_from(attributes), attributes.get("orders", np.zeros(0, dtype=int))
-    if orders.dtype.kind != "i" or not set(orders.tolist()) <= set(
-            range(attributes["harmonics"] + 1)):
-        raise DamagedError(f"the attribute 'orders' is {shown(orders)}")
-    count = (2 * attributes["harmonics"] + 1) * layout.harmonic
+    if not isinstance(method, HarmonicBalance):
+        raise DamagedError("the attribute 'method' is not harmonic balance")
+    layout = layout_from(attributes)
+    count = (2 * method.highest + 1) * layout.harmonic
     if not (2 * layout.displacements + layout.memory <= layout.states and layout.nodes <= (
             layout.memory) and all(count < len(each) for each in u)):
         raise DamagedError(f"{layout.states} states do not fit its displacements and harmonics")

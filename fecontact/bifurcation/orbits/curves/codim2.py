@@ -330,16 +330,15 @@ def orbit_curve(
         JacobianKinks(CollocationLinearisation(orbit, start)).passages)
     curve = (PeriodCurve if kind == "period" else OrbitCurve)(
         orbit, kind, problem.period(u), has_kinks=kinked)
-    return curve, start, {**point.branch.attributes, "scales": orbit.scales,
-                          "intervals": problem.intervals}
+    return curve, start, {**point.branch.attributes, "scales": orbit.scales, "method": replace(
+        point.branch.method, intervals=problem.intervals)}
 
 
 def _sizes(point: BranchPoint, least: int) -> Intervals | None:
     """Numbers of intervals along a curve; None where those of the point's branch are kept."""
-    known = point.branch.attributes
-    tolerance = known.get("state_tolerance")
-    return None if tolerance is None else Intervals(
-        least, max(least, int(known.get("most_intervals", least))), float(tolerance))
+    method = point.branch.method
+    return None if method.state_tolerance is None else Intervals(
+        least, max(least, int(method.most_intervals)), method.state_tolerance)
 
 
 def _unit(size: int, place: int) -> Array:

@@ -61,8 +61,8 @@ def _sharpened(
 
     Each mesh has twice the intervals of the one before, up to the most of the start's branch.
     """
-    most, widths = int(known.get("most_intervals", 0)), curve.orbit.scales[-2:]
-    allowed = float(known.get("tolerance", np.inf)) * widths
+    method, widths = known["method"], curve.orbit.scales[-2:]
+    most, allowed = int(method.most_intervals), method.tolerance * widths
     best, here, errors = point, point, np.zeros(2)
     place = _on_twice(curve, here)
     found = finer = found_near(place, str(point.kind))
