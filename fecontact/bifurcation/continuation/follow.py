@@ -62,9 +62,13 @@ def continue_branch(
 
 
 def labelled(problem: Problem, name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:
-    """Attributes of a branch with the labels of its parameters, in their order."""
-    names = [str(one) for one in attributes.get("parameters", (name,))]
-    return {**attributes, "labels": problem.labels(names)}
+    """Attributes of a branch with labels of its parameters for axes, as the field gives them.
+
+    Of equations without a field they are the names.
+    """
+    names, field = map(str, attributes.get("parameters", (name,))), getattr(problem, "field", None)
+    return {**attributes, "labels": tuple(
+        one if field is None else field.parameter_label(one) for one in names)}
 
 
 def regular(points: Iterable[BranchPoint]) -> int:

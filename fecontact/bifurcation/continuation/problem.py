@@ -167,11 +167,6 @@ class Problem(Protocol):
         """True if the stability of a point is unknown, by its stored values."""
         return False
 
-    def labels(self, names: Sequence[str]) -> tuple[str, ...]:
-        """Labels of parameters for axes, which the field of the equations gives, or their names."""
-        field = getattr(self, "field", None)
-        return tuple(name if field is None else field.parameter_label(name) for name in names)
-
     def note(self, points: Any) -> str:
         """Further notes on the points of a branch for its message."""
         return ""

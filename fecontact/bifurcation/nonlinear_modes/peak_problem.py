@@ -19,7 +19,7 @@ pi / 2 the force does no work in phase with them.
 Held: the observed amplitude has a given value, a(y) = a_0.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -46,6 +46,7 @@ from fecontact.bifurcation.nonlinear_modes.given_force import given_force
 from fecontact.bifurcation.orbits.unknowns import by_differences
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
+from fecontact.system.fields.vector_field import VectorField
 
 # Step of differences along the response in its inner product.
 _ALONG_STEP = 1e-4
@@ -97,9 +98,10 @@ class PeakProblem(Problem):
     keeps_matrix: ClassVar[bool] = True
     polishes: ClassVar[bool] = True
 
-    def labels(self, names: Sequence[str]) -> tuple[str, ...]:
-        """See :meth:`Problem.labels`."""
-        return self.orbit.labels(names)
+    @property
+    def field(self) -> VectorField:
+        """The field of the orbits."""
+        return self.orbit.field
 
     def linearise(self, u: Array) -> "PeakLinearised":
         """Residual and derivative at u, on demand."""
