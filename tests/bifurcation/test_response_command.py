@@ -321,7 +321,8 @@ def test_orbits_of_the_file_are_drawn_and_reported(cli, file, monkeypatch):
         assert stored.with_name(f"block-response-{kind}.png").stat().st_size > 10_000
     run = stored_orbit_or_run(stored, False, None, OrbitChoice("1", 9.8))
     assert run.observed == ("C", "x")
-    assert re.fullmatch(r"drive amplitude x = \d+ µm, 9\.\d+ Hz", run.settings.title)
+    level = 1e6 * float(read_response(stored).levels[1])
+    assert re.fullmatch(rf"drive amplitude x = {level:.5g} µm, 9\.\d+ Hz", run.settings.title)
     assert cli("report", stored, "-o", "page.html")[0] == 0
     shown = []
     monkeypatch.setattr("webbrowser.open", lambda url: shown.append(url) or True)
