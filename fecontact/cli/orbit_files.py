@@ -84,15 +84,13 @@ def stored_orbit_or_run(
 
 def _title(name: str, branch: "Branch", point: "BranchPoint") -> str:
     """Branch or level of an orbit, its parameter, and its frequency, with units."""
-    from fecontact.output.diagrams.labels import branch_label, with_value
-    from fecontact.system.parameter_labels import parameter_label
+    from fecontact.output.diagrams.labels import branch_label, level_label, with_value
 
     known, parts = branch.attributes, []
     if "level" not in known:
         parts.append(name)
-    elif level_name := str(known["level_name"]):
-        label = str(known.get("level_label") or parameter_label(level_name))
-        parts.append(with_value(label, float(known["level"])))
+    elif known["level_name"]:
+        parts.append(with_value(level_label(branch), float(known["level"])))
     if not branch.parameter_name.endswith(("frequency_hz", "xi")):
         parts.append(with_value(branch_label(branch), point.parameter))
     return ", ".join([*parts, f"{1.0 / float(point.values['period']):.5g} Hz"])

@@ -17,11 +17,10 @@ from fecontact.core.types import Array
 from fecontact.core.units import has_prefixes, suitable_unit
 from fecontact.output.diagrams.colours import distinct_colours
 from fecontact.output.diagrams.diagram import Curve, Diagram, Level, Mark
-from fecontact.output.diagrams.labels import branch_label, name_and_unit
+from fecontact.output.diagrams.labels import branch_label, level_label, name_and_unit
 from fecontact.output.diagrams.special_points import SPECIAL
 from fecontact.output.diagrams.spectra import beyond_band
 from fecontact.system.complex_modes import followed
-from fecontact.system.parameter_labels import parameter_label
 
 Quantity = str | int | Callable[[BranchPoint], float]
 
@@ -188,9 +187,8 @@ def level_texts(response: FrequencyResponse) -> tuple[str, list[str]]:
     """
     if not response.level_name:
         return "", [""] * len(response.branches)
-    levels, known = response.levels, response.branches[0].attributes
-    label = str(known.get("level_label") or parameter_label(response.level_name))
-    words, unit = name_and_unit(label)
+    levels = response.levels
+    words, unit = name_and_unit(level_label(response.branches[0]))
     factor, symbol = 1.0, unit
     if has_prefixes(unit):
         factor, symbol = suitable_unit(float(np.median(np.abs(levels))), unit)

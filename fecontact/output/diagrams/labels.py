@@ -38,6 +38,14 @@ def with_value(label: str, value: float) -> str:
     return f"{name} = {value / factor:.5g} {symbol}".rstrip()
 
 
+def level_label(branch: "Branch") -> str:
+    """Label of the parameter of the levels of a response, with its unit."""
+    from fecontact.system.parameter_labels import parameter_label
+
+    known = branch.attributes
+    return str(known.get("level_label") or parameter_label(str(known["level_name"])))
+
+
 def branch_label(branch: "Branch", name: str | int = "parameter") -> str:
     """Axis label of the parameter, of a stored value or of a state of a branch, with its unit.
 
