@@ -10,7 +10,8 @@ from fecontact.bifurcation.codim2_nearby import begun
 from fecontact.bifurcation.codim2_switch import other_curve, tangent_at, widths_of
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
-from fecontact.bifurcation.continuation.newton import newton, weighted_norm
+from fecontact.bifurcation.continuation.inner_product import weighted_norm
+from fecontact.bifurcation.continuation.newton import newton
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import (
     DiscontinuityPoint,

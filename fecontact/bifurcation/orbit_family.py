@@ -1,7 +1,7 @@
 """Families of periodic orbits of conservative systems."""
 
 from dataclasses import dataclass, fields, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -11,11 +11,13 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of, sizes_of
+from fecontact.bifurcation.continuation.rounding import Rounding
 from fecontact.bifurcation.orbit_methods import Collocation, Method
 from fecontact.bifurcation.orbits import starts
 from fecontact.bifurcation.orbits.branches import as_motion
 from fecontact.bifurcation.orbits.discretisations import DISCRETISATIONS, discretisation_by
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.orbits.multiplier_rounding import MultiplierRounding
 from fecontact.bifurcation.orbits.same_orbit import VANISHING
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import InputError, require_finite
@@ -36,6 +38,19 @@ _PRECISION, _TOLERANCE = 1e-9, 1e-11
 _GROWS, _MAY, _MUST = 1e-6, 1e-9, 1e-4
 
 
+class _FamilyRounding(MultiplierRounding):
+    """Turns of the unfolding parameter are rounding; where multipliers meet, so is its root."""
+
+    def unstable(self, linearisation: Any, values: Any) -> tuple[int, int]:
+        """Least and largest number of growing perturbations."""
+        multipliers = values["multipliers"]
+        return _beyond(multipliers, _MUST), _beyond(multipliers, _MAY)
+
+    def kinds(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """'fold'."""
+        return {"fold"}
+
+
 class _FamilyTests:
     """Orbits of a conservative system: two multipliers are one, the others come in pairs mu, 1/mu.
 
@@ -46,17 +61,18 @@ class _FamilyTests:
 
     confirms: ClassVar[frozenset[str]] = frozenset()
 
+    @cached_property
+    def rounding(self) -> Rounding:
+        """That of families, with the Newton steps of other orbits."""
+        known = super().rounding  # type: ignore[misc]
+        return _FamilyRounding(known.width, known.steps)
+
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """As of other orbits; unstable are those of which a perturbation grows exponentially."""
         found: dict[str, Any] = dict(super().point(  # type: ignore[misc]
             u, linearisation, tangent))
         unstable = _beyond(found["multipliers"], _GROWS)
         return found | {"unstable": unstable, "stable": unstable == 0}
-
-    def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
-        """Least and largest number of growing perturbations that rounding leaves open."""
-        multipliers = values["multipliers"]
-        return _beyond(multipliers, _MUST), _beyond(multipliers, _MAY)
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Functions that change sign where a pair meets at -1, and at 1."""
@@ -72,10 +88,6 @@ class _FamilyTests:
     ) -> dict[str, Any] | None:
         """No data: test functions alone decide on special points."""
         return {}
-
-    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """Turns of the unfolding parameter are rounding."""
-        return {"fold"}
 
 
 @cache

@@ -101,7 +101,7 @@ def test_the_tangent_of_a_compiled_step_is_that_of_all_equations(batches):
     problem, u, _ = restored(field, response.branches[0].points[0])
     start = start_of(problem, u, options, None, 1.0)
     far = replace(start, u=np.append(start.u[:-1], 1400.0 / TURN))
-    found = problem.batch_maker(options).batch(problem, start, 0.01, 6, far)
+    found = problem.fast_steps(options).batch(problem, start, 0.01, 6, far)
     assert batches[0] >= 3
     workspace = problem.equations(500.0 / TURN).workspace
     assert 1 <= workspace.coupled[0] < 12

@@ -11,6 +11,7 @@ from fecontact.bifurcation import (
     orbit_branch,
     vector_field,
 )
+from fecontact.bifurcation.continuation.predictor import Trail
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.curves.codim2 import OrbitCurve
 from fecontact.bifurcation.orbits.mesh import extremes, node_times, rule
@@ -40,7 +41,7 @@ def followed(step, last=0.7):
     """The problem behind four orbits whose radii differ by a step."""
     field = vector_field(stuart_landau, {"r": 0.5, "w": 2.0}, 2)
     problem = CollocationProblem(field, field.values, 0, MESH, 4, CIRCLE.reshape(-1, 2),
-                                 np.ones(5), renewal=0, second=1)
+                                 np.ones(5), renewal=0, second=1, predictor=Trail())
     for k in (3, 2, 1, 0):
         radius = last - k * step
         problem, _, _ = problem.adapted(orbit(radius), tangent(radius))
@@ -64,7 +65,7 @@ def test_guess_by_two_points_is_of_fourth_order_and_tells_how_far_it_is_off():
         length = step * np.sqrt(1.0 + 4.0 * 0.7**2)
         guess = problem.predicted(orbit(0.7), tangent(0.7), length)
         errors.append(missed(problem, guess, 0.7))
-        assert problem.off(length) == pytest.approx(errors[-1], rel=0.4)
+        assert problem.predictor.off(length) == pytest.approx(errors[-1], rel=0.4)
     assert 12.0 < errors[0] / errors[1] < 20.0
 
 
@@ -82,8 +83,8 @@ def test_what_was_off_of_late_counts():
     beside = orbit(0.74)
     beside[:-3] += 1e-3 * np.roll(CIRCLE, 2)
     spoilt, _, _ = problem.adapted(beside, tangent(0.74))
-    assert problem.off(0.01) < 1e-5
-    assert spoilt.off(0.01) > 5e-4
+    assert problem.predictor.off(0.01) < 1e-5
+    assert spoilt.predictor.off(0.01) > 5e-4
 
 
 def test_peaks_between_the_ends_of_an_interval_and_its_next_point():

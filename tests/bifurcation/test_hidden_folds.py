@@ -12,6 +12,21 @@ from fecontact.bifurcation import (
     orbit_branch,
 )
 from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.rounding import Rounding
+
+
+class Lost(Rounding):
+    """Stability is lost where points say so, and turns may be rounding there."""
+
+    def __init__(self, uncertain):
+        super().__init__()
+        self.uncertain = uncertain
+
+    def lost(self, values):
+        return values["near"]
+
+    def turns(self, tangents, values):
+        return self.uncertain and any(stored["near"] for stored in values)
 
 
 class Steep(Plane):
@@ -29,11 +44,9 @@ class Steep(Plane):
         return {"x": u[0], "unstable": 1 + self.more * int(u[0] > 0.0),
                 "near": abs(float(u[0])) < self.within}
 
-    def lost(self, values):
-        return values["near"]
-
-    def uncertain_turn(self, tangents, values):
-        return self.uncertain and any(stored["near"] for stored in values)
+    @property
+    def rounding(self):
+        return Lost(self.uncertain)
 
 
 def followed(problem, x=-0.5):

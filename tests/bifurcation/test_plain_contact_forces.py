@@ -154,9 +154,9 @@ def test_compiled_steps_that_end_just_behind_a_fold(stability, monkeypatch):
             before, _, last = found.points[-3:]
             assert np.array_equal(found.before.u, before.u)
             assert found.before.tests["fold"] == before.tangent[-1] > 0.0 > last.tangent[-1]
-            if found.problem.bend is not None:
+            if found.problem.predictor.bend is not None:
                 length = np.sqrt(problem.weights() @ (last.u - before.u) ** 2)
-                assert found.problem.bend == pytest.approx(
+                assert found.problem.predictor.bend == pytest.approx(
                     (last.tangent - before.tangent) / length, rel=1e-9)
     assert seen > 0
 

@@ -21,8 +21,8 @@ from fecontact.bifurcation import (
     orbit_branch,
     vector_field,
 )
-from fecontact.bifurcation.continuation import sharpening
 from fecontact.bifurcation.continuation.points import with_details
+from fecontact.bifurcation.orbits import sharpening
 from fecontact.bifurcation.orbits.normal_forms import verdict
 from fecontact.cli.branch_results import branches_csv, special_table
 from fecontact.io import read_branch, write_branch

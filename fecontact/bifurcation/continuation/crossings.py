@@ -31,7 +31,7 @@ def counted(
     if "unstable" not in here.values:
         return 0
     for side, known in ((there, here), (here, there)):
-        if problem.lost(side.values):
+        if problem.rounding.lost(side.values):
             return int(known.values["unstable"])
     reached = {int(here.values["unstable"])}
     for point in special:
@@ -39,7 +39,7 @@ def counted(
             changes = _CHANGES_AT.get(str(point.kind), _CHANGES_AT_OTHERS)
             reached = {number + change for number in reached for change in changes}
     found = int(there.values["unstable"])
-    least, most = problem.unstable_range(there.linearisation, there.values)
+    least, most = problem.rounding.unstable(there.linearisation, there.values)
     fitting = [number for number in reached if least <= number <= most]
     return min(fitting, key=lambda number: abs(number - found)) if fitting else None
 

@@ -7,31 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.inner_product import weighted_norm, weighted_product
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Linearisation, Problem
-from fecontact.core.compiled import helper, kernel
+from fecontact.core.compiled import kernel
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, choices
 from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array
-
-
-@helper
-def _product(weights, a, b):
-    total = 0.0
-    for k in range(len(a)):
-        total += weights[k] * a[k] * b[k]
-    return total
-
-
-@kernel
-def weighted_product(weights: Vector, a: Vector, b: Vector) -> float:
-    """Sum w a b."""
-    return _product(weights, a, b)
-
-
-@kernel
-def weighted_norm(weights: Vector, x: Vector) -> float:
-    """Square root of sum w x x."""
-    return math.sqrt(_product(weights, x, x))
 
 
 @kernel
@@ -54,7 +35,7 @@ def improve(weights: Vector, steps: Matrix, count: int) -> float:
     change = steps[count]
     for index in range(count):
         step = steps[index]
-        part = _product(weights, step, change) / _product(weights, step, step)
+        part = weighted_product(weights, step, change) / weighted_product(weights, step, step)
         if index + 1 < count:
             following = steps[index + 1]
             for k in range(len(change)):
@@ -62,7 +43,7 @@ def improve(weights: Vector, steps: Matrix, count: int) -> float:
         else:
             for k in range(len(change)):
                 change[k] /= 1.0 - part
-    return math.sqrt(_product(weights, change, change))
+    return weighted_norm(weights, change)
 
 
 # Step of rounding, in the size of the solution, after which its equations serve as they are.
@@ -147,7 +128,7 @@ def _iterated(
         steps[count_kept] = (kept or linearisation).solve(row, rhs)
         size = improve(weights, steps, count_kept)
         change = steps[count_kept]
-        if count > 2 and size > before and before <= problem.rounding * scale:
+        if count > 2 and size > before and before <= problem.rounding.steps * scale:
             if kept is not None:
                 u, linearisation, _ = _polished(problem, u, guess, row, exact)
             return u, linearisation, count

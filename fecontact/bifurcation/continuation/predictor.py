@@ -1,24 +1,29 @@
 """Guesses of the next point of a branch from the last points and their tangents.
 
-Lengths along the branch are those of its projection on the last tangent t_0, x_j = <t_0, u_j - u_0>
-for the points u_0, u_1, ... backwards, with the slopes du/dx = t_j / <t_0, t_j>. A parabola, a
-cubic and a quartic have the slopes of the last two, three and four points (Adams and Bashforth);
-another cubic, of Hermite, those of two points and their places, too. That counts which was nearest
-at the last point. Rounding and a change of mesh tell against higher orders.
+A :class:`Bent` guess lies on a parabola by the last two points, a :class:`Trail` has more of them.
+There lengths along the branch are those of its projection on the last tangent t_0,
+x_j = <t_0, u_j - u_0> for the points u_0, u_1, ... backwards, with the slopes
+du/dx = t_j / <t_0, t_j>. A parabola, a cubic and a quartic have the slopes of the last two, three
+and four points (Adams and Bashforth); another cubic, of Hermite, those of two points and their
+places, too. That counts which was nearest at the last point. Rounding and a change of mesh tell
+against higher orders.
 """
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import weighted_norm, weighted_product
+from fecontact.bifurcation.continuation.inner_product import weighted_norm, weighted_product
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array
 
 # Points behind the last one that count at most.
-MOST_BEHIND = 3
+_MOST_BEHIND = 3
+# Largest distance of a guess from the tangent, in steps.
+_MOST_BENT = 0.2
 # Powers of the step with which the errors of parabola, Hermite's cubic, cubic and quartic grow.
 _POWERS = (3, 4, 4, 5)
 # Part of the largest error of late that counts at the next point.
@@ -39,7 +44,134 @@ class Misses(NamedTuple):
     worst: float = 0.0
 
 
-UNKNOWN = Misses()
+_UNKNOWN = Misses()
+
+
+@dataclass(frozen=True, eq=False)
+class Predictor:
+    """Guesses along the tangent.
+
+    Attributes
+    ----------
+    rows : (k, n) array
+        u and tangent of the last point, and what else is known of the branch behind it; empty
+        before the first step.
+    """
+
+    rows: Array = field(default_factory=lambda: np.empty((0, 0)))
+
+    @property
+    def last(self) -> Array | None:
+        """The last point (n,); None before the first step."""
+        return self.rows[0] if len(self.rows) else None
+
+    @property
+    def bend(self) -> Array | None:
+        """Derivative (n,) of the tangent along the branch; None if unknown."""
+        return None
+
+    def ahead(self, weights: Array, u: Array, tangent: Array, step: float) -> Array:
+        """The guess a step ahead of u, in the inner product of the weights (n,)."""
+        return u + step * tangent
+
+    def off(self, step: float) -> float:
+        """Expected error of the guess a step ahead; infinite if unknown."""
+        return math.inf
+
+    def after(self, weights: Array, u: Array, tangent: Array) -> Self:
+        """The predictor at the next point."""
+        return replace(self, rows=np.array([u, tangent]))
+
+    def moved(self, rows: Array) -> Self:
+        """The predictor for other unknowns, such as those on a new mesh."""
+        return replace(self, rows=rows)
+
+
+class Bent(Predictor):
+    """Guesses with the curvature of the last step, the third of the rows where it is known."""
+
+    @classmethod
+    def of(cls, u: Array, tangent: Array, bend: Array | None) -> Self:
+        """The predictor at a point, with the derivative of the tangent along the branch."""
+        return cls(np.array([u, tangent] if bend is None else [u, tangent, bend]))
+
+    @property
+    def bend(self) -> Array | None:
+        """Derivative (n,) of the tangent along the branch; None if unknown."""
+        return self.rows[2] if len(self.rows) > 2 else None
+
+    def ahead(self, weights: Array, u: Array, tangent: Array, step: float) -> Array:
+        """A parabola, or the tangent where that is bent too much to be believed."""
+        straight, bend = super().ahead(weights, u, tangent, step), self.bend
+        if bend is None:
+            return straight
+        # The length of the old tangent changes with mesh and scales.
+        length = step / weighted_norm(weights, self.rows[1])
+        bow = 0.5 * length * length * bend
+        return straight if weighted_norm(weights, bow) > _MOST_BENT * step else straight + bow
+
+    def after(self, weights: Array, u: Array, tangent: Array) -> Self:
+        """With the curvature of the step to the point."""
+        if self.last is None:
+            return super().after(weights, u, tangent)
+        direction = self.rows[1] / weighted_norm(weights, self.rows[1])
+        length = weighted_product(weights, direction, u - self.last)
+        return self.of(u, tangent, (tangent - direction) / length if length > 0.0 else None)
+
+
+# Before the first step.
+BENT = Bent()
+
+
+@dataclass(frozen=True, eq=False)
+class Trail(Predictor):
+    """Guesses by what was nearest at the last point; the rows are u and tangent of each point.
+
+    Attributes
+    ----------
+    misses : Misses
+        How far guesses of the last point were off.
+    """
+
+    misses: Misses = _UNKNOWN
+
+    def ahead(self, weights: Array, u: Array, tangent: Array, step: float) -> Array:
+        """The guess, or the tangent where that is bent too much to be believed."""
+        straight = super().ahead(weights, u, tangent, step)
+        found = np.empty((len(_POWERS), len(u)))
+        count = _guesses(weights, self.rows, step, found) if len(self.rows) > 2 else 0
+        if count == 0:
+            return straight
+        expected = _expected(self.misses, step)[:count]
+        guess: Array = found[expected.index(min(expected))] if expected else found[0]
+        bent = weighted_norm(weights, guess - straight) > _MOST_BENT * step
+        return straight if bent else guess
+
+    def off(self, step: float) -> float:
+        """As at the last points, for a step of this length."""
+        return max(min(_expected(self.misses, step), default=math.inf), self.misses.worst)
+
+    def after(self, weights: Array, u: Array, tangent: Array) -> Self:
+        """With one more point, and how far it was off."""
+        here = np.array([u, tangent])
+        if self.last is None:
+            return replace(self, rows=here)
+        return replace(self, rows=np.concatenate([here, self.rows[: 2 * _MOST_BEHIND]]),
+                       misses=self._misses_at(weights, u))
+
+    def _misses_at(self, weights: Array, there: Array) -> Misses:
+        u, tangent = self.rows[:2]
+        step = float(weighted_product(weights, tangent, there - u)
+                     / weighted_norm(weights, tangent))
+        found = np.empty((len(_POWERS), len(u)))
+        count = _guesses(weights, self.rows, step, found) if step > 0.0 else 0
+        if count == 0:
+            return _UNKNOWN
+        each = tuple(float(weighted_norm(weights, guess - there)) for guess in found[:count])
+        before, worst = _expected(self.misses, step)[:count], 0.0
+        if before:
+            worst = max(each[before.index(min(before))], _REMEMBERED * self.misses.worst)
+        return Misses(each, step, worst)
 
 
 @helper
@@ -107,55 +239,6 @@ def _guesses(weights: Vector, trail: Matrix, step: float, out: Matrix) -> int:
         out[1, k] = (trail[2, k] + by_old * trail[3, k] + blend * (trail[0, k] - trail[2, k])
                      + by_here * trail[1, k])
     return count
-
-
-def predicted(
-    weights: Array, trail: Array, straight: Array, step: float, misses: Misses, most: float
-) -> Array:
-    """The guess a step ahead by what was nearest at the last point.
-
-    Parameters
-    ----------
-    weights : (n,) array
-        Of the inner product.
-    trail : (2 k, n) array
-        u and tangent of the last point, of the one before it, and so on; of any length.
-    straight : (n,) array
-        The guess along the tangent.
-    step : float
-        Its distance.
-    misses : Misses
-        At the last point.
-    most : float
-        Largest distance from the tangent, in steps; beyond it the guess lies on the tangent.
-    """
-    found = np.empty((len(_POWERS), len(straight)))
-    count = _guesses(weights, trail, step, found)
-    if count == 0:
-        return straight
-    expected = _expected(misses, step)[:count]
-    guess: Array = found[expected.index(min(expected))] if expected else found[0]
-    return straight if weighted_norm(weights, guess - straight) > most * step else guess
-
-
-def expected(step: float, misses: Misses) -> float:
-    """Expected error of :func:`predicted` a step ahead."""
-    return max(min(_expected(misses, step), default=math.inf), misses.worst)
-
-
-def misses_at(weights: Array, there: Array, trail: Array, misses: Misses) -> Misses:
-    """The :class:`Misses` at a point ``there`` reached from the first of a trail, with its own."""
-    u, tangent = trail[0], trail[1]
-    step = float(weighted_product(weights, tangent, there - u) / weighted_norm(weights, tangent))
-    found = np.empty((len(_POWERS), len(u)))
-    count = _guesses(weights, trail, step, found) if step > 0.0 else 0
-    if count == 0:
-        return UNKNOWN
-    each = tuple(float(weighted_norm(weights, guess - there)) for guess in found[:count])
-    before, worst = _expected(misses, step)[:count], 0.0
-    if before:
-        worst = max(each[before.index(min(before))], _REMEMBERED * misses.worst)
-    return Misses(each, step, worst)
 
 
 def _expected(misses: Misses, step: float) -> list[float]:

@@ -7,12 +7,16 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.predictor import Predictor
+from fecontact.bifurcation.continuation.rounding import Rounding
 from fecontact.core.checks import as_count, as_floats, as_texts, require_flags, require_kind
 from fecontact.core.errors import InputError, choices, nearest, require_positive, shown
 from fecontact.core.types import Array, ArrayLike
 
 _GROWTH = 1e4  # largest factor by which scales grow with the orbits of a branch
 _NEARLY = 1.5  # factor to the size of an orbit up to which scales are kept
+_ROUNDING = Rounding()
+_TANGENT = Predictor()
 _SAME_DIRECTION = 0.9  # cosine between directions that count as the same
 
 
@@ -70,8 +74,13 @@ class Stride:
     status: BranchStatus | None = None
 
 
-class StepBatchMaker(Protocol):
-    """Function object that computes plain steps in batches."""
+class FastSteps(Protocol):
+    """Starts and plain steps of a branch that a problem makes in another way than others."""
+
+    def start(self, problem: Any, u: Array, row: Array) -> Any:
+        """The :class:`~fecontact.bifurcation.continuation.newton.Solution` at right angles to a row
+        near u; None where it is not found so.
+        """
 
     def batch(
         self, problem: Any, here: Any, step: float, most: int, start: Any, header: Any = None
@@ -122,6 +131,16 @@ class Problem(Protocol):
     ends: ClassVar[Mapping[str, BranchStatus]] = {}
 
     @property
+    def predictor(self) -> Predictor:
+        """What guesses the next point."""
+        return _TANGENT
+
+    @property
+    def rounding(self) -> Rounding:
+        """What rounding leaves open at points of the branch."""
+        return _ROUNDING
+
+    @property
     def kinked(self) -> bool:
         """Whether the equations may have kinks, where Newton's method suddenly converges slowly."""
         return False
@@ -156,20 +175,9 @@ class Problem(Protocol):
         """
         ...
 
-    def unstable_range(
-        self, linearisation: Linearisation, values: Mapping[str, Any]
-    ) -> tuple[int, int]:
-        """Least and largest number of unstable directions that rounding leaves open."""
-        count = int(values.get("unstable", 0))
-        return count, count
-
-    def lost(self, values: Mapping[str, Any]) -> bool:
-        """True if the stability of a point is unknown, by its stored values."""
-        return False
-
     def note(self, points: Any) -> str:
-        """Further notes on the points of a branch for its message."""
-        return ""
+        """Notes on the points of a branch for its message, here that on their rounding."""
+        return self.rounding.note(points)
 
     def tests(
         self, u: Array, linearisation: Linearisation, tangent: Array
@@ -199,27 +207,12 @@ class Problem(Protocol):
         """Sign of det [[dG/du], [w tangent]], constant along a branch; 0 if unknown."""
         return 0.0
 
-    @property
-    def rounding(self) -> float:
-        """Relative size of Newton steps below which growing steps are rounding."""
-        return 1e-7
-
     def predicted(self, u: Array, tangent: Array, step: float) -> Array:
-        """The predictor, a step from u."""
-        return u + step * tangent
-
-    def off(self, step: float) -> float:
-        """Expected error of the predictor a step ahead; infinite if unknown."""
-        return np.inf
+        """The guess a step ahead of u."""
+        return self.predictor.ahead(self.weights(), u, tangent, step)
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[Problem, Array, Array] | None":
         """Problem, u and tangent on a new mesh, asked for after each step; None to keep the old."""
-        return None
-
-    def started(self, u: Array, row: Array, options: "ContinuationOptions") -> Any:
-        """The :class:`~fecontact.bifurcation.continuation.newton.Solution` at right angles to a row
-        near u, found faster than by steps one by one; None where it is not.
-        """
         return None
 
     def refined(
@@ -232,39 +225,22 @@ class Problem(Protocol):
         """
         return None
 
-    def batch_maker(self, options: "ContinuationOptions") -> StepBatchMaker | None:
-        """Object that computes plain steps of a branch in batches; None for one by one."""
+    def fast_steps(self, options: "ContinuationOptions") -> FastSteps | None:
+        """What makes plain steps at once; None for one by one."""
         return None
 
     def met_again(
-        self, origin: "Problem", u: Array, tangent: Array, like: Array, heading: Array,
-        within: float,
+        self, origin: Any, u: Array, tangent: Array, like: Array, heading: Array, within: float
     ) -> Array | None:
         """The start u of the branch in the unknowns of this problem; None where it goes elsewhere.
 
-        ``origin`` is the problem at the start, and ``tangent`` the direction there; ``like`` and
+        ``origin`` is this problem at the start, and ``tangent`` the direction there; ``like`` and
         ``heading`` are those of the point that was reached, on this problem. A start that is
         surely farther from ``like`` than ``within`` need not be given.
         """
         if len(u) != len(like) or float(self.weights() * heading @ tangent) < _SAME_DIRECTION:
             return None
         return u
-
-    def unresolved(
-        self, tangents: tuple[Array, Array], values: tuple[Mapping[str, Any], Mapping[str, Any]],
-        tests: tuple[Mapping[str, float], Mapping[str, float]],
-    ) -> Iterable[str]:
-        """Kinds whose tests change sign between two neighbouring points by rounding alone."""
-        return ()
-
-    def uncertain_turn(
-        self, tangents: tuple[Array, Array], values: tuple[Mapping[str, Any], Mapping[str, Any]]
-    ) -> bool:
-        """Whether the parameter may turn between two neighbouring points by rounding alone.
-
-        A fold is then sought only where the parameter itself changes as its slopes say.
-        """
-        return False
 
 
 # Kinds of special points of the branches and curves of this package.

@@ -101,10 +101,10 @@ def continuation(
     stops = {options.stop_at} if isinstance(options.stop_at, str) else set(options.stop_at)
     before: Solution | None = None
     halved, whole = 0, step
-    batch_maker = problem.batch_maker(options)
+    fast = problem.fast_steps(options)
     while count < options.points:
-        if batch_maker is not None and halved == 0:
-            batch = batch_maker.batch(problem, here, step, options.points - count, start, header)
+        if fast is not None and halved == 0:
+            batch = fast.batch(problem, here, step, options.points - count, start, header)
             if batch is not None:
                 yield from batch.points
                 if batch.status is not None:
@@ -235,9 +235,10 @@ def start_of(
         row[-1] = 1.0 if direction >= 0.0 else -1.0
     else:
         row = problem.weights() * tangent / norm(problem, tangent)
-    started: Solution | None = problem.started(u, row, options)
-    if started is not None:
-        return started
+    fast = problem.fast_steps(options)
+    start: Solution | None = None if fast is None else fast.start(problem, u, row)
+    if start is not None:
+        return start
     found = newton(problem, np.array(u, dtype=float), row, options.tolerance,
                       3 * options.iterations)
     if found is None:
@@ -254,7 +255,7 @@ def _step(
     row = problem.weights() * here.tangent
     guess = problem.predicted(here.u, here.tangent, step)
     # One step with the matrix at the guess does where that is no farther than others leave it.
-    near = problem.polishes and problem.off(step) <= _NEAR * options.tolerance * (
+    near = problem.polishes and problem.predictor.off(step) <= _NEAR * options.tolerance * (
         1.0 + norm(problem, guess))
     found = newton(problem, guess, row, options.tolerance, options.iterations,
                       known=None if near else here.linearisation)
@@ -361,5 +362,6 @@ def _lead_to_one(
         return False
     if found[0] is None or found[1] is None:
         return False
-    near = _SAME_SOLUTION * max(options.tolerance, problem.rounding) * (1.0 + norm(problem, one))
+    tolerance = max(options.tolerance, problem.rounding.steps)
+    near = _SAME_SOLUTION * tolerance * (1.0 + norm(problem, one))
     return norm(problem, found[0][0] - found[1][0]) < near

@@ -81,7 +81,7 @@ def located_on(step: Step, strict: bool = True) -> tuple[Solution, list[BranchPo
             found.append(_jump_of_stability(replace(step, there=end)))
         else:
             turns = step.here.turns + sum(point.kind == "fold" for point in found)
-            lost = step.problem.lost(end.values)
+            lost = step.problem.rounding.lost(end.values)
             end = replace(with_count(end, count), turns=turns if lost else 0)
             found += _change_behind(step, end, turns)
     found.sort(key=lambda point: step.along(point.u))
@@ -96,8 +96,8 @@ def _zeros(step: Step, strict: bool) -> list[BranchPoint] | None:
     None if the end is on another sheet, or lies where rounding hides a turn of the parameter.
     """
     problem, here, there = step.problem, step.here, step.there
-    rounding = set(problem.unresolved((here.tangent, there.tangent), (here.values, there.values),
-                                      (here.tests, there.tests)))
+    rounding = set(problem.rounding.kinds((here.tangent, there.tangent),
+                                          (here.values, there.values), (here.tests, there.tests)))
     found = []
     for name in _changed(here, there):
         if name in rounding or name in problem.ends:
@@ -137,7 +137,7 @@ def _parameter_turns(step: Step) -> bool | None:
     side alone.
     """
     ends = step.here, step.there
-    if not step.problem.uncertain_turn((ends[0].tangent, ends[1].tangent),
+    if not step.problem.rounding.turns((ends[0].tangent, ends[1].tangent),
                                        (ends[0].values, ends[1].values)):
         return True
     exact = replace(step, options=replace(step.options, tolerance=_EXACT))
@@ -216,7 +216,7 @@ def _change_behind(step: Step, end: Solution, turns: int) -> list[BranchPoint]:
     changed by one.
     """
     problem, here = step.problem, step.here
-    if not problem.lost(here.values) or problem.lost(end.values):
+    if not problem.rounding.lost(here.values) or problem.rounding.lost(end.values):
         return []
     before, after = (int(at.values["unstable"]) for at in (here, end))
     if abs(after - before) <= turns:
@@ -234,7 +234,7 @@ def _hidden_change(step: Step, end: Solution, found: list[BranchPoint]) -> bool:
     """
     change = int(end.values["unstable"]) - int(step.here.values["unstable"])
     return abs(change) <= _HIDDEN_CHANGE and any(
-        point.kind == "fold" and step.problem.lost(point.values) for point in found)
+        point.kind == "fold" and step.problem.rounding.lost(point.values) for point in found)
 
 
 def _jump_of_stability(step: Step) -> BranchPoint:

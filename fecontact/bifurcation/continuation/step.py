@@ -5,14 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import (
-    Solution,
-    finished,
-    newton,
-    weighted_norm,
-    weighted_product,
-    with_values,
-)
+from fecontact.bifurcation.continuation.inner_product import weighted_norm, weighted_product
+from fecontact.bifurcation.continuation.newton import Solution, finished, newton, with_values
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array

@@ -10,6 +10,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
+from fecontact.bifurcation.continuation.rounding import Rounding
 from fecontact.bifurcation.equilibria.equilibrium import (
     Equilibrium,
     default_scales,
@@ -60,8 +61,17 @@ class _Bordered:
         return sorted_eigenvalues(self.jacobian)
 
 
+class _EigenvalueRounding(Rounding):
+    def unstable(self, linearisation: Any, values: Mapping[str, Any]) -> tuple[int, int]:
+        """Eigenvalues on the imaginary axis, to rounding, may lie on either side."""
+        eigenvalues = linearisation.eigenvalues
+        return int(values["unstable"]), len(eigenvalues) - int(unstable_count(-eigenvalues))
+
+
 class EquilibriumProblem(Problem):
     """f(x, p) = 0 with one parameter of the field free; unknowns u = [x, p]."""
+
+    rounding = _EigenvalueRounding()
 
     def __init__(
         self, field: VectorField, values: Array, index: int, scales: Array, width: float,
@@ -113,13 +123,6 @@ class EquilibriumProblem(Problem):
         unstable = int(unstable_count(eigenvalues))
         return {"state": u[:-1].copy(), "unstable": unstable, "stable": unstable == 0,
                 "eigenvalues": eigenvalues}
-
-    def unstable_range(
-        self, linearisation: Any, values: Mapping[str, Any]
-    ) -> tuple[int, int]:
-        """Eigenvalues on the imaginary axis, to rounding, may lie on either side."""
-        eigenvalues = linearisation.eigenvalues
-        return int(values["unstable"]), len(eigenvalues) - int(unstable_count(-eigenvalues))
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, float]:
         """Branch points and Hopf points; see :func:`pair_test`."""

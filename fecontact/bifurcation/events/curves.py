@@ -9,6 +9,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.points import DiscontinuityPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, sizes_of
+from fecontact.bifurcation.continuation.rounding import Rounding
 from fecontact.bifurcation.events.borders import beyond
 from fecontact.bifurcation.events.branches import FITS, nothing_left
 from fecontact.bifurcation.events.conditions import (
@@ -31,6 +32,7 @@ from fecontact.system.fields.vector_field import VectorField
 _STEP = 1e-5
 # Conditions with less left than this at the start belong to the border that is followed.
 _SAME = 1e-5
+_ROUNDING = Rounding(1e-8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,9 +89,9 @@ class BorderCurve(Problem):
         return np.concatenate([found[:-1], [1.0 / self.width**2], found[-1:]])
 
     @property
-    def rounding(self) -> float:
-        """Relative size of Newton steps below which rounding dominates."""
-        return 1e-8
+    def rounding(self) -> Rounding:
+        """Of Newton steps alone."""
+        return _ROUNDING
 
     def left(
         self, orbit: EventOrbit, u: Array, start: Array, begin: float, tau: float, motion: Motion

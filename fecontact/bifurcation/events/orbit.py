@@ -8,10 +8,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.continuation.rounding import Rounding
 from fecontact.bifurcation.events.linearisation import EventLinearisation
 from fecontact.bifurcation.events.phases import Motion, Phase
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbits.floquet import FloquetTests
+from fecontact.bifurcation.orbits.multiplier_rounding import MultiplierRounding
 from fecontact.bifurcation.orbits.shooting import run_from
 from fecontact.bifurcation.orbits.unknowns import FreeParameters
 from fecontact.core.errors import AnalysisError
@@ -141,10 +143,10 @@ class EventOrbit(FreeParameters, FloquetTests, Problem):
             found.append(np.array([period]))
         return np.concatenate([*found, 1.0 / self.scales[-1:] ** 2])
 
-    @property
-    def rounding(self) -> float:
-        """Relative size of Newton steps below which the errors of the steps dominate."""
-        return max(1e-10, self.rtol)
+    @cached_property
+    def rounding(self) -> Rounding:
+        """Of the multipliers; the errors of the steps dominate in small Newton steps."""
+        return MultiplierRounding(float(self.scales[-1]), max(1e-10, self.rtol))
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, and the extremes of the states from samples.

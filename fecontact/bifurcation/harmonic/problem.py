@@ -8,13 +8,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import Solution, completed, weighted_norm
+from fecontact.bifurcation.continuation.inner_product import weighted_norm
 from fecontact.bifurcation.continuation.point import BranchPoint, attributes_of
+from fecontact.bifurcation.continuation.predictor import BENT, Predictor
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
     Problem,
 )
+from fecontact.bifurcation.continuation.rounding import RestingParameter, Rounding
 from fecontact.bifurcation.fields.fast_modes import unresolved_modes
 from fecontact.bifurcation.fields.jumps import missed_jumps
 from fecontact.bifurcation.harmonic import estimates
@@ -40,6 +42,7 @@ from fecontact.bifurcation.harmonic.series import differentiated, shifted
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions, stability_grid
 from fecontact.bifurcation.harmonic.stored import ERRORS, StoredOrbits, StoredValues
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests
+from fecontact.bifurcation.orbits.multiplier_rounding import MultiplierRounding
 from fecontact.bifurcation.orbits.same_orbit import (
     HALVING,
     VANISHING,
@@ -50,8 +53,6 @@ from fecontact.bifurcation.orbits.same_orbit import (
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
-# Largest curvature correction of the predictor, in steps.
-_MOST_BENT = 0.2
 # Largest relative size of the odd harmonics of a doubled orbit that is a single one, and smallest
 # part of the tangent that leads back to doubled ones.
 _HALVES_MEET, _HALVES_PART = 0.02, 0.9
@@ -177,10 +178,8 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
     stability : str
         'transitions' or 'Koopman-Hill', see :mod:`fecontact.bifurcation.harmonic.stability`; None
         for none.
-    before : tuple of (n,) arrays
-        u and tangent at the start of the last step, for the curvature of the predictor.
-    bend : (n,) array, optional
-        Derivative of the tangent along the branch.
+    predictor : Predictor
+        Of the next orbit, from those before it.
     limits : (d,) array, optional
         Upper limits up to which the scales of the states grow with the orbit; None keeps the
         scales constant.
@@ -189,8 +188,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
     """
 
     stability: str | None = "transitions"
-    before: tuple[Array, ...] = ()
-    bend: Array | None = None
+    predictor: Predictor = BENT
     limits: Array | None = None
     row: Array | None = None
 
@@ -217,6 +215,12 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
                 "memory_nodes": layout.nodes,
                 **({"kept_deflections": self.kept.offsets} if layout.memory else {})}
 
+    @cached_property
+    def rounding(self) -> Rounding:
+        """Of the multipliers, if they are known."""
+        width = float(self.scales[-1])
+        return RestingParameter(width) if self.stability is None else MultiplierRounding(width)
+
     @property
     def kinked(self) -> bool:
         """See :attr:`Problem.kinked`; vector fields that are no contact systems count as smooth."""
@@ -240,27 +244,16 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
             return BodyLinearisation(self, u, e)
         return CompiledLinearisation(self, u, e, derivatives)
 
-    def predicted(self, u: Array, tangent: Array, step: float) -> Array:
-        """Predictor along the tangent, with the curvature of the last step."""
-        guess = u + step * tangent
-        if self.bend is None:
-            return guess
-        bow = 0.5 * step * step * self.bend
-        return guess if weighted_norm(self.weights(), bow) > _MOST_BENT * step else guess + bow
-
     def orientation(self, linearisation: Any, tangent: Array) -> float:
         """Sign of the determinant of the equations, in their scales, with the tangent below."""
         return orientation(linearisation.condensed, self.weights(), tangent)
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[HarmonicProblem, Array, Array]":
         """The problem for the next step, with the phase condition at u."""
-        bend = None
-        if self.before:
-            start, direction = self.before
-            length = float(self.weights() * direction @ (u - start))
-            bend = (tangent - direction) / length if length > 0.0 else None
-        return replace(self, reference=self.coefficients(u).copy(), values=self.parameters(u),
-                       scales=self._grown(u), before=(u, tangent), bend=bend), u, tangent
+        return replace(
+            self, reference=self.coefficients(u).copy(), values=self.parameters(u),
+            scales=self._grown(u),
+            predictor=self.predictor.after(self.weights(), u, tangent)), u, tangent
 
     def _grown(self, u: Array) -> Array:
         """Scales of states, period and parameter, enlarged with the orbit."""
@@ -289,20 +282,6 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         orbits = StoredOrbits(layout, u[:, : self.size].reshape(count, -1, layout.harmonic), z,
                               periods, forces, mean, sizes, self.row, known, self.orders)
         return [StoredValues(orbits, k) for k in range(count)]
-
-    def started(
-        self, u: Array, row: Array, options: ContinuationOptions
-    ) -> Solution | None:
-        """See :meth:`Problem.started`."""
-        found = self.found(u, row, options.tolerance)
-        if found is None:
-            return None
-        u, along, forces, mean, z = found
-        values = None if self.stability is not None else self.stored(
-            u[None], z[None], forces[None], mean[None], self.scales[None, self.layout.columns],
-            {})[0]
-        return completed(self, u, self.linearise(u), along / weighted_norm(self.weights(), along),
-                         1, options, values)
 
     def found(
         self, u: Array, row: Array, tolerance: float
@@ -343,7 +322,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
             grid = stability_grid(self)
             fast = unresolved_modes(self.field, points, lambda point: grid,
                                     f"take more than {self.samples} samples")
-        return " ".join(filter(None, (super().note(points), missed, fast)))
+        return " ".join(filter(None, (self.rounding.note(points), missed, fast)))
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
         """At orbits that are homoclinic to a saddle, as far as numbers tell."""
@@ -358,7 +337,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         """Scales of the states that are series."""
         return self.scales[self.layout.columns]
 
-    def batch_maker(self, options: ContinuationOptions) -> StepBatches | None:
+    def fast_steps(self, options: ContinuationOptions) -> StepBatches | None:
         """Compiled steps, for forced orbits of contact systems."""
         return StepBatches.of(self, options) if type(self) is HarmonicProblem else None
 
@@ -366,10 +345,6 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         """Smallest and largest value (d,) of each state over the orbit."""
         low, high = estimates.extremes(self.whole(u, self.period(u))[None], z[None])
         return low[0], high[0]
-
-    def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
-        """Range of the number of unstable multipliers, given their errors."""
-        return (0, 0) if self.stability is None else super().unstable_range(linearisation, values)
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
@@ -395,8 +370,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         return odd_part(u) < _HALVES_MEET and odd_part(tangent) > _HALVES_PART
 
     def met_again(
-        self, origin: "Problem", u: Array, tangent: Array, like: Array, heading: Array,
-        within: float,
+        self, origin: Any, u: Array, tangent: Array, like: Array, heading: Array, within: float
     ) -> Array | None:
         """See :meth:`Problem.met_again`: in the phase of ``like``."""
         if len(u) != len(like) or not same_place(self, (u, tangent), (like, heading), within):

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.continuation.rounding import RestingParameter, Rounding
 from fecontact.bifurcation.homoclinic import open_mesh
 from fecontact.bifurcation.homoclinic.linearisation import HomoclinicLinearised, OpenOrbit
 from fecontact.bifurcation.homoclinic.saddle import (
@@ -30,7 +31,6 @@ from fecontact.bifurcation.homoclinic.saddle import (
     left_subspaces,
     saddle_of,
 )
-from fecontact.bifurcation.orbits.floquet import resting
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
 from fecontact.system.complex_modes import sorted_eigenvalues
@@ -48,6 +48,14 @@ _LEAST, _SLOWEST = 1e-2, 0.2
 _ABSENT = 1e-4
 # Ratio of its rates at which the saddle counts as one that meets another equilibrium.
 _MEETS = 1e-3
+
+
+class _FlipRounding(RestingParameter):
+    def kinds(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+        """Turns of a parameter that rests, and flips where nothing lies along the direction."""
+        absent = {name for name in tests[0] if name.endswith("flip")
+                  and max(abs(side.get(name, np.inf)) for side in tests) < _ABSENT}
+        return super().kinds(tangents, values, tests) | absent
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,11 +176,10 @@ class HomoclinicProblem(OpenOrbit, Problem):
         """A point where one parameter turns is no fold but a turning point."""
         return {"kind": "turning point"} if kind == "fold" else {}
 
-    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
+    @property
+    def rounding(self) -> Rounding:
         """Turns of a parameter that rests, flips where there is no part along the direction."""
-        absent = {name for name in tests[0] if name.endswith("flip")
-                  and max(abs(side.get(name, np.inf)) for side in tests) < _ABSENT}
-        return resting(tangents, float(self.scales[-1])) | absent
+        return _FlipRounding(float(self.scales[-1]))
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
         """HOPF where orbit and rates vanish, SADDLE_NODE where one rate does, else None.

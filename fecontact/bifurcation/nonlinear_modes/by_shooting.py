@@ -66,10 +66,6 @@ class ShootingMode(AlongMode, ShootingProblem):
         """None."""
         return {}
 
-    def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
-        """Zero: multipliers under negative damping say nothing."""
-        return 0, 0
-
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
         """None: a mode ends at its amplitudes."""
         return None

@@ -1,6 +1,5 @@
 """Continuation problem of a nonlinear mode: periodic motion under negative damping."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.problem import ContinuationOptions
+from fecontact.bifurcation.continuation.rounding import NoFolds, Rounding
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.observed import observed_values
@@ -67,17 +67,14 @@ class ModeLinearisation(HarmonicLinearisation):
 class AlongMode(OrbitUnknowns):
     """Branches of orbits along a mode, whose multipliers and turns of xi say nothing of it."""
 
-    def lost(self, values: Mapping[str, Any]) -> bool:
-        """False: no special point of a mode follows from multipliers."""
-        return False
+    @property
+    def rounding(self) -> Rounding:
+        """No folds, and no multipliers, that say anything of the mode."""
+        return NoFolds(super().rounding.steps)  # type: ignore[misc]
 
     def note(self, points: Any) -> str:
         """Empty note: 'trivial_error' is the error of the multipliers."""
         return ""
-
-    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """Turns of xi are no folds of the mode."""
-        return {"fold"}
 
     def _grown(self, u: Array) -> Array:
         """Scales enlarged with the motion; those of period and xi follow the frequency."""
@@ -124,9 +121,9 @@ class ModeProblem(AlongMode, HarmonicProblem):
         return np.zeros((0, 0))
 
     @property
-    def rounding(self) -> float:
-        """Relative size of Newton steps below which growing steps are rounding."""
-        return _ROUNDING_OF_MEANS if self.layout.memory else super().rounding
+    def rounding(self) -> Rounding:
+        """As along other modes, with larger Newton steps where elements stick."""
+        return NoFolds(_ROUNDING_OF_MEANS) if self.layout.memory else super().rounding
 
     def longest_step(self, tangent: Array, turn: float, options: ContinuationOptions) -> float:
         """Longer than the largest step where a smooth mode without losses keeps its period.
@@ -137,7 +134,9 @@ class ModeProblem(AlongMode, HarmonicProblem):
         smooth = isinstance(self.field, ContactField) and not self.field.kinked
         if not (smooth and self.conservative):
             return options.largest_step
-        rate = float(np.sqrt(self.weights()[-2:] @ tangent[-2:] ** 2))
+        bend = self.predictor.bend
+        rate = max(float(np.sqrt(self.weights()[-2:] @ way[-2:] ** 2)) for way in (
+            tangent, tangent if bend is None else tangent + options.largest_step * bend))
         if rate * _LONGER * options.largest_step <= _RESTS:
             return _LONGER * options.largest_step
         return max(options.largest_step, _RESTS / rate)

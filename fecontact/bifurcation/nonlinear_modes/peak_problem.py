@@ -28,8 +28,10 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
-from fecontact.bifurcation.continuation.newton import newton, weighted_norm
+from fecontact.bifurcation.continuation.inner_product import weighted_norm
+from fecontact.bifurcation.continuation.newton import newton
 from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.predictor import Bent
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem, width_of
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic import starts
@@ -130,7 +132,7 @@ class PeakProblem(Problem):
     def adapted(self, u: Array, tangent: Array) -> "tuple[PeakProblem, Array, Array]":
         """The problem for the next step: border along the response at u, scales of its orbit."""
         orbit, _, _ = self.at(u).adapted(u[:-1], tangent[:-1])
-        orbit = replace(orbit, before=(), bend=None)
+        orbit = replace(orbit, predictor=Bent())
         along = self.linearise(u).along
         weights = orbit.weights()
         return replace(self, orbit=orbit,

@@ -7,7 +7,6 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
-from fecontact.bifurcation.continuation.sharpening import ROUGHLY, SHARPENED, Accuracy, sharpened
 from fecontact.bifurcation.fields.jumps import require_smooth_friction
 from fecontact.bifurcation.orbit_methods import Collocation
 from fecontact.bifurcation.orbits import starts
@@ -16,6 +15,7 @@ from fecontact.bifurcation.orbits.discretisation import Discretisation, Request
 from fecontact.bifurcation.orbits.orbit_points import CollocatedPoints
 from fecontact.bifurcation.orbits.restored import rescaled, restored
 from fecontact.bifurcation.orbits.same_orbit import HALVING
+from fecontact.bifurcation.orbits.sharpening import ROUGHLY, SHARPENED, Accuracy, sharpened
 from fecontact.bifurcation.orbits.state_error import state_error
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField

@@ -6,9 +6,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation import predictor
-from fecontact.bifurcation.continuation.newton import Solution, weighted_norm, weighted_product
+from fecontact.bifurcation.continuation.newton import Solution
 from fecontact.bifurcation.continuation.point import BranchPoint, attributes_of
+from fecontact.bifurcation.continuation.predictor import BENT, Predictor
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
 from fecontact.bifurcation.fields.fast_modes import unresolved_modes
 from fecontact.bifurcation.fields.jumps import missed_jumps
@@ -46,7 +46,6 @@ _NEWTON = 1e-2
 _CALM = 10
 # Numbers of intervals are multiples of this: so many are eliminated at once.
 _AT_ONCE = 8
-_NONE = np.empty((0, 0))
 
 
 @dataclass(frozen=True)
@@ -142,11 +141,8 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
     precision : float
         Tolerance of the location of special points, relative to the step. Above 1e-6 normal forms
         are omitted.
-    trail : (k, n) array
-        u and tangent of the last points, the latest first; on branches of the last one, and the
-        derivative of the tangent along the branch. Empty before the first step.
-    misses : Misses
-        How far guesses of the last point were off.
+    predictor : Predictor
+        Of the next orbit, from those before it.
     sizes : Intervals, optional
         Of orbits along the branch; None keeps their number.
     calm : int
@@ -159,8 +155,7 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
     renewal: int = 1
     limits: Array | None = None
     precision: float = 1e-12
-    trail: Array = field(default_factory=lambda: _NONE)
-    misses: predictor.Misses = predictor.UNKNOWN
+    predictor: Predictor = BENT
     sizes: Intervals | None = None
     calm: int = 0
     noted: list[tuple[Array, float]] = field(default_factory=list)
@@ -209,7 +204,7 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
             self.field, points, lambda point: (np.diff(np.asarray(point.values["mesh"])), gauss),
             "take more intervals")
         missed = missed_jumps(self.field, points)
-        return " ".join(filter(None, (super().note(points), missed, fast)))
+        return " ".join(filter(None, (self.rounding.note(points), missed, fast)))
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Test functions of the multipliers, and of orbits that shrink to an equilibrium."""
@@ -234,12 +229,10 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
         return examined(kind, self, u, linearisation, self.precision < 1e-6)
 
     def met_again(
-        self, origin: "Problem", u: Array, tangent: Array, like: Array, heading: Array,
-        within: float,
+        self, origin: Any, u: Array, tangent: Array, like: Array, heading: Array, within: float
     ) -> Array | None:
         """See :meth:`Problem.met_again`: on this mesh, in the phase of ``like``."""
-        if not (isinstance(origin, CollocationProblem)
-                and same_place(self, (u, tangent), (like, heading), within)):
+        if not same_place(self, (u, tangent), (like, heading), within):
             return None
         # The amplitude does not depend on the phase either.
         one, other = origin._amplitude(u, self.scales), self._amplitude(like, self.scales)
@@ -253,32 +246,9 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
         weights = np.repeat(self.widths / self.degree, self.degree)
         return float(np.sqrt((weights @ (nodes - weights @ nodes) ** 2).sum()))
 
-    def predicted(self, u: Array, tangent: Array, step: float) -> Array:
-        """Predictor along the tangent, bent as the branch was before."""
-        straight = u + step * tangent
-        if len(self.trail) < 3:
-            return straight
-        weights = self.weights()
-        if self.second is not None:
-            return predictor.predicted(weights, self.trail, straight, step, self.misses, _MOST_BENT)
-        # The length of the old tangent changes with mesh and scales.
-        length = step / weighted_norm(weights, self.trail[1])
-        bow = 0.5 * length * length * self.trail[2]
-        return straight if weighted_norm(weights, bow) > _MOST_BENT * step else straight + bow
-
-    def off(self, step: float) -> float:
-        """See :meth:`Problem.off`."""
-        return predictor.expected(step, self.misses)
-
     def adapted(self, u: Array, tangent: Array) -> tuple["CollocationProblem", Array, Array]:
         """The problem for the next step: phase condition at u, periodically a new mesh."""
-        behind, misses = self.trail, predictor.UNKNOWN
-        if len(behind) and self.second is None:
-            behind = self._bend(u, tangent)
-        elif len(behind):
-            misses = predictor.misses_at(self.weights(), u, behind, self.misses)
-            behind = behind[: 2 * predictor.MOST_BEHIND]
-        trail = np.concatenate([[u, tangent], behind]) if len(behind) else np.array([u, tangent])
+        predictor = self.predictor.after(self.weights(), u, tangent)
         mesh, age, count, calm = self.mesh, self.age + 1, self.intervals, 0
         if self.sizes is not None:
             error = next((error for known, error in self.noted if known is u), None)
@@ -290,10 +260,11 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
                 count, calm = fewer, 0
         if (self.renewal and age >= self.renewal) or count < self.intervals:
             mesh, age = equidistributed(mesh, self.nodes(u), self.degree, count), 0
-            trail = self._carried(mesh, trail)
-        problem = replace(self, mesh=mesh, age=age, reference=self._nodes_on(mesh, trail[0]),
-                          scales=self._grown(u), trail=trail, misses=misses, calm=calm)
-        return problem, trail[0], trail[1]
+            predictor = predictor.moved(self._carried(mesh, predictor.rows))
+        u_on, turned = predictor.rows[:2]
+        problem = replace(self, mesh=mesh, age=age, reference=self._nodes_on(mesh, u_on),
+                          scales=self._grown(u), predictor=predictor, calm=calm)
+        return problem, u_on, turned
 
     def refined(
         self, u: Array, tangent: Array, ahead: Sequence[Solution | BranchPoint]
@@ -306,17 +277,12 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
         if count <= self.intervals:
             return None
         mesh = equidistributed(self.mesh, self.nodes(worst.u), self.degree, count)
-        moved = self._carried(mesh, np.concatenate([[u, tangent], self.trail[2:]]) if len(
-            self.trail) else np.array([u, tangent]))
+        known = self.predictor.rows
+        moved = self._carried(mesh, np.concatenate([[u, tangent], known[2:]]) if len(known)
+                              else np.array([u, tangent]))
         problem = replace(self, mesh=mesh, age=0, reference=self._nodes_on(mesh, moved[0]),
-                          trail=moved if len(self.trail) else moved[:0], calm=0)
+                          predictor=self.predictor.moved(moved[: len(known)]), calm=0)
         return problem, moved[0], moved[1]
-
-    def _bend(self, u: Array, tangent: Array) -> Array:
-        """Derivative (1, n) of the tangent along a branch, from the last step; (0, n) without."""
-        direction = self.trail[1] / weighted_norm(self.weights(), self.trail[1])
-        length = weighted_product(self.weights(), direction, u - self.trail[0])
-        return (tangent - direction)[None] / length if length > 0.0 else self.trail[:0]
 
     def _grown(self, u: Array) -> Array:
         """Scales of states, period and parameter, enlarged with the orbit."""
@@ -329,8 +295,9 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
     ) -> tuple["CollocationProblem", Array, Array]:
         """Problem, u and tangent on another mesh."""
         moved, turned = self._on_other_mesh(mesh, [u, tangent])
+        known = self.predictor.rows
         return replace(self, mesh=mesh, age=0, reference=self._nodes_on(mesh, moved),
-                       trail=_NONE), moved, turned
+                       predictor=self.predictor.moved(known[:0])), moved, turned
 
     def _nodes_on(self, mesh: Array, u: Array) -> Array:
         """Copy of the nodes (N m, d) of an orbit on another mesh."""

@@ -1,7 +1,7 @@
 """Floquet multipliers and stability of a periodic orbit."""
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,24 +9,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.rounding import FLAT, Rounding
 from fecontact.bifurcation.linalg.condensation import CondensedFactors
 from fecontact.bifurcation.linalg.periodic_schur import eigenvalues_of_product
 from fecontact.bifurcation.linalg.transition_matrices import transitions
+from fecontact.bifurcation.orbits.multiplier_rounding import LOST, WORST, MultiplierRounding
 from fecontact.core.compiled import kernel
 from fecontact.core.errors import AnalysisError, ModelWarning
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.records import ComplexVector, Vector
 from fecontact.core.types import Array
 
-# Smallest and largest uncertainty of the distance of a multiplier from the unit circle.
-_ROUNDING, _WORST = 1e-8, 0.1
+# Smallest uncertainty of the distance of a multiplier from the unit circle.
+_ROUNDING = 1e-8
 _NEAR = 1e-2  # distance of a critical multiplier from the circle at a coarsely located point
 # Multipliers by differences to one side may be so far from those to both, in parts of the largest
 # or of 1: where ends of runs are smooth they are to 1e-3, beside a jump anywhere.
 _APART = 0.02
-# Error of the trivial multiplier above which the mesh is too coarse for any conclusion.
-_LOST = 0.5
 
 
 @read_only_arrays
@@ -75,7 +74,7 @@ class Floquet:
         The error of the trivial multiplier is known. Next to a fold another multiplier is close
         to it and has an error of the same size.
         """
-        error = min(max(_ROUNDING, 2.0 * self.trivial_error), _WORST)
+        error = min(max(_ROUNDING, 2.0 * self.trivial_error), WORST)
         sizes = [abs(multiplier) for place, multiplier in enumerate(self.multipliers.tolist())
                  if place != self.trivial]
         return sum(size > 1.0 + error for size in sizes), sum(size > 1.0 - error for size in sizes)
@@ -135,7 +134,7 @@ class Floquet:
         A torus bifurcation becomes 'Neimark-Sacker', with the angle of the pair.
         """
         mu = self.others
-        if kind in ("period doubling", "torus") and self.trivial_error > _LOST:
+        if kind in ("period doubling", "torus") and self.trivial_error > LOST:
             return None
         if kind == "period doubling":
             return {} if np.abs(mu + 1.0).min() <= _NEAR else None
@@ -197,11 +196,6 @@ def by_falling_modulus(multipliers: NDArray[np.complex128]) -> NDArray[np.comple
 
 # Relative distance of a multiplier from the conjugate of another one up to which they are a pair.
 _PAIR = 1e-6
-# Slope of the parameter along a branch, in widths of the diagram, below which its sign is rounding,
-# and below which it may be where multipliers are lost.
-FLAT, _FLAT_LOST = 1e-8, 1e-4
-# A multiplier differs from one if its distance exceeds this multiple of the trivial error.
-_RESOLVED = 10.0
 
 
 @kernel
@@ -227,72 +221,6 @@ def multiplier_tests(mu: ComplexVector, trivial: int, out: Vector) -> None:
     out[0], out[1], out[2] = minus.real, plus.real, pairs.real
 
 
-def lost(stored: Mapping[str, Any]) -> bool:
-    """Whether the multipliers of an orbit are lost in rounding, from its stored values.
-
-    Differences that grow by more than the inverse of rounding along one part of the orbit, and
-    shrink along another, as on canards, leave the trivial multiplier anywhere.
-    """
-    return float(stored.get("trivial_error", 0.0)) > _WORST
-
-
-def unresolved(
-    slopes: tuple[float, float],
-    values: tuple[Mapping[str, Any], Mapping[str, Any]],
-    tests: tuple[Mapping[str, float], Mapping[str, float]],
-) -> set[str]:
-    """Kinds of special points that may be due to round-off between two orbits of a branch.
-
-    Towards a homoclinic orbit, on a canard and in a conservative family the parameter changes by
-    less than round-off: its turns are no folds, and sign changes in the test for branch points no
-    crossings. In a conservative family a second multiplier equals one throughout. Where multipliers
-    are lost nothing of them counts; see :func:`uncertain_turn` for turns of the parameter.
-
-    Parameters
-    ----------
-    slopes : pair of float
-        Component of the tangents along the parameter, in widths of the diagram.
-    values, tests : pairs of mappings
-        Stored values of the two orbits, and their test functions.
-    """
-    flat = [abs(slope) < FLAT for slope in slopes]
-    found: set[str] = {"fold"} if all(flat) else set()
-    signs = [np.sign(test.get("branch point", 0.0)) * (-1.0 if slope <= -FLAT else 1.0)
-             for slope, test in zip(slopes, tests, strict=True)]
-    if any(flat) and signs[0] == signs[1]:
-        found.add("branch point")
-    if all(flat) and all(_near_one(stored) for stored in values):
-        found.add("branch point")
-    if any(lost(stored) for stored in values):
-        found.add("branch point")
-        if any(float(stored["trivial_error"]) > _LOST for stored in values):
-            found |= {"period doubling", "torus"}
-    return found
-
-
-def uncertain_turn(
-    slopes: tuple[float, float], values: tuple[Mapping[str, Any], Mapping[str, Any]]
-) -> bool:
-    """Return True if a sign change of the slope between two orbits may be due to round-off.
-
-    Where multipliers are lost, tangents have errors that a small slope may not exceed.
-    """
-    return (any(lost(stored) for stored in values)
-            and min(abs(slope) for slope in slopes) < _FLAT_LOST)
-
-
-def resting(tangents: tuple[Array, Array], width: float) -> set[str]:
-    """'fold' where the parameter, of this width, changes by less than round-off at both ends."""
-    return {"fold"} if all(abs(float(each[-1])) / width < FLAT for each in tangents) else set()
-
-
-def _near_one(stored: Mapping[str, Any]) -> bool:
-    """Whether a second multiplier is indistinguishable from one."""
-    off = np.sort(np.abs(np.asarray(stored["multipliers"]) - 1.0))
-    error = max(float(stored["trivial_error"]), 1e-10)
-    return len(off) > 1 and bool(off[1] <= _RESOLVED * error)
-
-
 class FloquetTests:
     """Test functions of problems whose linearisations have multipliers, ``floquet``.
 
@@ -301,14 +229,14 @@ class FloquetTests:
 
     scales: Array
 
+    @property
+    def rounding(self) -> Rounding:
+        """What rounding leaves open of the multipliers."""
+        return MultiplierRounding(float(self.scales[-1]))
+
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Test functions of 'period doubling', 'torus' and 'branch point'."""
         found: dict[str, float] = linearisation.floquet.tests(float(tangent[-1] / self.scales[-1]))
-        return found
-
-    def unstable_range(self, linearisation: Any, values: Any) -> tuple[int, int]:
-        """Range of the number of unstable multipliers, given their errors."""
-        found: tuple[int, int] = linearisation.floquet.unstable_range
         return found
 
     def examine(
@@ -317,37 +245,6 @@ class FloquetTests:
         """The kind of a torus bifurcation; None for a neutral saddle."""
         found: dict[str, Any] | None = linearisation.floquet.confirmed(kind)
         return found
-
-    def lost(self, values: Mapping[str, Any]) -> bool:
-        """See :func:`fecontact.bifurcation.orbits.floquet.lost`."""
-        return lost(values)
-
-    def note(self, points: Sequence[BranchPoint]) -> str:
-        """Note on lost multipliers; empty if there are none."""
-        places = [point.parameter for point in points if lost(point.values)]
-        folds = [f"{point.parameter:.10g}" for point in points
-                 if point.kind == "fold" and lost(point.values)]
-        if not places:
-            return ""
-        said = (f"Multipliers of {len(places)} orbit{'s' if len(places) > 1 else ''} are lost in "
-                f"rounding, at parameters from {min(places):.10g} to {max(places):.10g}: nothing "
-                f"is known of their stability, and of special points only folds are sought among "
-                f"them.")
-        return said if not folds else (
-            f"{said} Beside the fold{'s' if len(folds) > 1 else ''} at {', '.join(folds)} a period "
-            f"doubling may be hidden.")
-
-    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """See :func:`fecontact.bifurcation.orbits.floquet.unresolved`."""
-        return unresolved(self._slopes(tangents), values, tests)
-
-    def uncertain_turn(self, tangents: Any, values: Any) -> bool:
-        """See :func:`fecontact.bifurcation.orbits.floquet.uncertain_turn`."""
-        return uncertain_turn(self._slopes(tangents), values)
-
-    def _slopes(self, tangents: Any) -> tuple[float, float]:
-        first, last = (float(tangent[-1] / self.scales[-1]) for tangent in tangents)
-        return first, last
 
 
 def require_same(

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import weighted_norm
+from fecontact.bifurcation.continuation.inner_product import weighted_norm
 from fecontact.bifurcation.equilibria.equilibrium import newton
 from fecontact.bifurcation.orbits.collocation_equations import CollocationEquations
 from fecontact.bifurcation.orbits.collocation_kernels import amplitude_along

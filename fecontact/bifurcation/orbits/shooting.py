@@ -10,9 +10,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import weighted_norm, weighted_product
 from fecontact.bifurcation.continuation.point import attributes_of
+from fecontact.bifurcation.continuation.predictor import BENT, Predictor
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
+from fecontact.bifurcation.continuation.rounding import Rounding
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
@@ -20,6 +21,7 @@ from fecontact.bifurcation.orbit_methods import Shooting
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests, floquet_of, require_same
 from fecontact.bifurcation.orbits.mesh import interpolate, require_segments
+from fecontact.bifurcation.orbits.multiplier_rounding import MultiplierRounding
 from fecontact.bifurcation.orbits.same_orbit import VANISHING, near_saddle, same_place, shrunk
 from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns
 from fecontact.core.errors import AnalysisError, InputError
@@ -31,8 +33,6 @@ from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
 
 _SAMPLES = 33  # of a segment, for the extremes of the states
-# Largest curvature correction of the predictor, in steps.
-_MOST_BENT = 0.2
 # Phase after the start of a segment below which the start itself is used.
 _AT_START = 1e-10
 # Part of a period over which rates of set-valued motions are taken.
@@ -78,8 +78,8 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
         Solver that runs the segments.
     precision : float
         Tolerance of the location of special points, relative to the step: that of the runs.
-    before, bend
-        The previous orbit with its tangent, and the derivative of the tangent along the branch.
+    predictor : Predictor
+        Of the next orbit, from those before it.
     limits : (d,) array, optional
         Upper limits up to which the scales of the states grow with the orbit; None keeps the
         scales.
@@ -98,8 +98,7 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
     derivative_rtol: float | None = None
     solver: Solver = AUTO
     precision: float = 1e-7
-    before: tuple[Array, Array] | None = None
-    bend: Array | None = None
+    predictor: Predictor = BENT
     limits: Array | None = None
     noted: list[tuple[Array, Array]] = dataclasses.field(default_factory=list)
 
@@ -147,33 +146,17 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
         nodal = (np.diff(self.mesh)[:, None] / self.scales[:d] ** 2).reshape(-1)
         return np.concatenate([nodal, 1.0 / self.scales[-self.common:] ** 2])
 
-    @property
-    def rounding(self) -> float:
-        """Relative size of Newton steps below which the errors of the runs dominate."""
-        return max(1e-7, 10.0 * self.rtol)
-
-    def predicted(self, u: Array, tangent: Array, step: float) -> Array:
-        """Predictor along the tangent, with the curvature of the last step."""
-        guess = u + step * tangent
-        if self.bend is None:
-            return guess
-        weights = self.weights()
-        assert self.before is not None
-        # The length of the last tangent changes with the scales.
-        length = step / weighted_norm(weights, self.before[1])
-        bow = 0.5 * length * length * self.bend
-        return guess if weighted_norm(weights, bow) > _MOST_BENT * step else guess + bow
+    @cached_property
+    def rounding(self) -> Rounding:
+        """Of the multipliers; the errors of the runs dominate in small Newton steps."""
+        return MultiplierRounding(float(self.scales[-1]), max(1e-7, 10.0 * self.rtol))
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[ShootingProblem, Array, Array]":
         """The problem for the next step, with the phase condition at u."""
-        bend = None
-        if self.before is not None:
-            start, direction = self.before[0], self.before[1] / weighted_norm(
-                self.weights(), self.before[1])
-            length = weighted_product(self.weights(), direction, u - start)
-            bend = (tangent - direction) / length if length > 0.0 else None
-        return replace(self, reference=self.starts(u)[0].copy(), values=self.parameters(u),
-                       scales=self._grown(u), before=(u, tangent), bend=bend), u, tangent
+        return replace(
+            self, reference=self.starts(u)[0].copy(), values=self.parameters(u),
+            scales=self._grown(u),
+            predictor=self.predictor.after(self.weights(), u, tangent)), u, tangent
 
     def _grown(self, u: Array) -> Array:
         """Scales of states, period and parameter, enlarged with the orbit."""
@@ -196,11 +179,12 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Test functions of the multipliers, and of orbits that shrink to an equilibrium."""
         found = super().tests(u, linearisation, tangent)
-        if self.autonomous and self.before is not None:
+        before = self.predictor.last
+        if self.autonomous and before is not None:
             # About the middle of this orbit, which is nearly that of the one before.
             middle = linearisation.paths.mean(axis=(0, 1))
             found[VANISHING] = shrunk(self.scales[: len(middle)] ** -2.0, self.starts(u) - middle,
-                                      self.starts(self.before[0]) - middle)
+                                      self.starts(before) - middle)
         return found
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
@@ -218,8 +202,7 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
             raise AnalysisError("The set-valued motion jumps there: an event appears or vanishes.")
 
     def met_again(
-        self, origin: "Problem", u: Array, tangent: Array, like: Array, heading: Array,
-        within: float,
+        self, origin: Any, u: Array, tangent: Array, like: Array, heading: Array, within: float
     ) -> Array | None:
         """See :meth:`Problem.met_again`: started in the phase of ``like``."""
         if len(u) != len(like) or not same_place(self, (u, tangent), (like, heading), within):

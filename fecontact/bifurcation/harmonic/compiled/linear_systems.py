@@ -7,7 +7,7 @@ together. What that neglects is made good by iteration with all derivatives at t
 
 import math
 
-from fecontact.bifurcation.continuation.newton import weighted_norm
+from fecontact.bifurcation.continuation.inner_product import weighted_norm
 from fecontact.bifurcation.harmonic.compiled.evaluation import (
     balance,
     take_pushes,

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import right_side, weighted_norm
+from fecontact.bifurcation.continuation.inner_product import weighted_norm
+from fecontact.bifurcation.continuation.newton import right_side
 from fecontact.bifurcation.harmonic.compiled.arrays import (
     KINKS,
     PLAIN,

@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import Solution
+from fecontact.bifurcation.continuation.inner_product import weighted_norm
+from fecontact.bifurcation.continuation.newton import Solution, completed
 from fecontact.bifurcation.continuation.point import BranchHeader
 from fecontact.bifurcation.continuation.points import branch_points
+from fecontact.bifurcation.continuation.predictor import Bent
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
@@ -57,17 +59,33 @@ class StepBatches:
 
     @classmethod
     def of(cls, problem: Any, options: ContinuationOptions) -> "StepBatches | None":
-        """Plain steps of a problem; None if they are not made by compiled code."""
-        if (problem.compiled is None or options.events
-                or problem.stability not in (None, "transitions")):
+        """Steps of a problem; None if it has no compiled code."""
+        if problem.compiled is None:
             return None
         return cls(options, _FIRST if problem.stability is not None else _WITHOUT_STABILITY)
+
+    def start(self, problem: Any, u: Array, row: Array) -> Solution | None:
+        """The solution at right angles to a row near u; None where it is not found."""
+        found = problem.found(u, row, self.options.tolerance)
+        if found is None:
+            return None
+        u, along, forces, mean, z = found
+        values = None if problem.stability is not None else problem.stored(
+            u[None], z[None], forces[None], mean[None],
+            problem.scales[None, problem.layout.columns], {})[0]
+        return completed(problem, u, problem.linearise(u),
+                         along / weighted_norm(problem.weights(), along), 1, self.options, values)
 
     def batch(
         self, problem: Any, here: Solution, step: float, most: int, start: Solution,
         header: BranchHeader | None = None,
     ) -> Stride | None:
-        """Plain steps from a solution; see :class:`Stride`. None where there are none."""
+        """Plain steps from a solution; see :class:`Stride`. None where there are none.
+
+        Events, and stability by other means, need points one by one.
+        """
+        if self.options.events or problem.stability not in (None, "transitions"):
+            return None
         if self.waits > 0:
             self.waits -= 1
             return None
@@ -78,7 +96,7 @@ class StepBatches:
         stops = [options.stop_at] if isinstance(options.stop_at, str) else options.stop_at
         e.numbers[arrays.FIRST_BOUND : arrays.RESTS] = [
             *options.bounds, options.tolerance, options.largest_step, options.largest_turn,
-            problem.rounding, options.locate and "fold" not in stops]
+            problem.rounding.steps, options.locate and "fold" not in stops]
         if problem.limits is not None:
             e.limits[:] = problem.limits[: len(e.limits)]
         else:
@@ -92,7 +110,8 @@ class StepBatches:
             np.empty((count, N, m)), np.empty((count, m, 2 * m)), np.empty((count, m + 1)),
             np.empty(count), np.empty(count, dtype=np.int64), np.array([step]))
         why = np.empty(1)
-        bend = np.zeros(n) if problem.bend is None else problem.bend.copy()
+        known = problem.predictor.bend
+        bend = np.zeros(n) if known is None else known.copy()
         scales = np.append(problem.scales[:m], problem.scales[-1])
         made = steps(here.u.copy(), here.tangent.copy(), bend, scales, e, out, why)
         self.waits = _APART if why[0] == COUPLED else 0
@@ -165,8 +184,8 @@ class StepBatches:
             tangent = tangent / np.sqrt(_weights(problem, out.scales[last]) @ tangent**2)
         reached = replace(
             problem, reference=problem.coefficients(u[last]).copy(),
-            values=problem.parameters(u[last]), scales=scales, before=(u[last], tangent),
-            bend=bend)
+            values=problem.parameters(u[last]), scales=scales,
+            predictor=Bent.of(u[last], tangent, bend))
         ends = [Solution(u[k], reached.linearise(u[k]), way, 0, values[k],
                          _tests(problem, found[k] if found else None, way)
                          if self.options.locate else {})

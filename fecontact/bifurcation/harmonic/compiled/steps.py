@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import weighted_norm
+from fecontact.bifurcation.continuation.inner_product import weighted_norm
 from fecontact.bifurcation.harmonic.compiled.arrays import (
     FIRST_BOUND,
     FOLDS,

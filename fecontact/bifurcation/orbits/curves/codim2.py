@@ -12,7 +12,9 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.newton import Solution
 from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.predictor import Predictor, Trail
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.continuation.rounding import RestingParameter, Rounding
 from fecontact.bifurcation.linalg.bordered import Bordered
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, Intervals
 from fecontact.bifurcation.orbits.collocation_equations import CollocationLinearisation
@@ -28,7 +30,6 @@ from fecontact.bifurcation.orbits.curves.singularity import (
     of_torus,
     second_derivatives,
 )
-from fecontact.bifurcation.orbits.floquet import resting
 from fecontact.bifurcation.orbits.kinks import JacobianKinks
 from fecontact.bifurcation.orbits.normal_forms import Expansion, Share
 from fecontact.bifurcation.orbits.restored import rescaled, restored
@@ -101,13 +102,10 @@ class OrbitCurve(Problem):
         """Weights of the inner product, those of the orbit."""
         return self.orbit.weights()
 
-    def predicted(self, u: Array, tangent: Array, step: float) -> Array:
-        """Predictor, that of orbits."""
-        return self.orbit.predicted(u, tangent, step)
-
-    def off(self, step: float) -> float:
-        """See :meth:`Problem.off`."""
-        return self.orbit.off(step)
+    @property
+    def predictor(self) -> Predictor:
+        """That of the orbits."""
+        return self.orbit.predictor
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[OrbitCurve, Array, Array]":
         """The problem for the next step, on a new mesh."""
@@ -122,11 +120,9 @@ class OrbitCurve(Problem):
         return None if finer is None else (replace(self, orbit=finer[0]), *finer[1:])
 
     def met_again(
-        self, origin: Problem, u: Array, tangent: Array, like: Array, heading: Array, within: float,
+        self, origin: Any, u: Array, tangent: Array, like: Array, heading: Array, within: float
     ) -> Array | None:
         """Start of the curve in the unknowns of its orbit; see :meth:`Problem.met_again`."""
-        if not isinstance(origin, OrbitCurve):
-            return None
         return self.orbit.met_again(origin.orbit, u, tangent, like, heading, within)
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
@@ -181,9 +177,10 @@ class OrbitCurve(Problem):
         return tests | {"fold-Neimark-Sacker": unit, "flip-Neimark-Sacker": flip,
                         "double Neimark-Sacker": pair}
 
-    def unresolved(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """Turns of the first parameter where it does not change beyond rounding."""
-        return resting(tangents, self.orbit.scales[-1])
+    @property
+    def rounding(self) -> Rounding:
+        """Turns of the first parameter where it rests."""
+        return RestingParameter(float(self.orbit.scales[-1]))
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array
@@ -321,7 +318,7 @@ def orbit_curve(
     value = float(problem.values[index])
     width = widths.get(second, abs(value) or 1.0)
     orbit = replace(problem, second=index, scales=np.insert(problem.scales, -1, width),
-                    sizes=_sizes(point, problem.intervals))
+                    sizes=_sizes(point, problem.intervals), predictor=Trail())
     start = np.insert(u, -1, value)
     if kind == "period" and not orbit.autonomous:
         raise InputError(f"{point.place} has the period of the excitation, which keep='period' "

@@ -10,11 +10,11 @@ from fecontact.bifurcation.continuation.branch import Branch, BranchStatus
 from fecontact.bifurcation.continuation.newton import norm
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import details_of, with_details
-from fecontact.bifurcation.continuation.sharpening import LEAST_FALL, found_near, reach
 from fecontact.bifurcation.orbits.curves.codim2 import OrbitCurve
 from fecontact.bifurcation.orbits.curves.singularity import ContinuedSign
 from fecontact.bifurcation.orbits.mesh import equidistributed
 from fecontact.bifurcation.orbits.same_orbit import HALVING
+from fecontact.bifurcation.orbits.sharpening import LEAST_FALL, found_near, reach
 from fecontact.core.types import Array
 
 # Names of the coefficients of a normal form and of their errors.

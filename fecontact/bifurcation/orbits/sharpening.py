@@ -27,8 +27,8 @@ from fecontact.bifurcation.continuation.points import (
 )
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.continuation.pseudo_arclength import ContinuationOptions, continuation
+from fecontact.bifurcation.continuation.rounding import FLAT
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
-from fecontact.bifurcation.orbits.floquet import FLAT
 from fecontact.bifurcation.orbits.mesh import equidistributed
 from fecontact.bifurcation.orbits.normal_forms import verdict
 from fecontact.core.errors import FecontactError
@@ -128,7 +128,7 @@ def sharpened(
     best, error = located.best()
     result = unresolved(best) if judged is None else with_details(best, **judged)
     if not np.isnan(error):
-        if problem.lost(best.values):
+        if problem.rounding.lost(best.values):
             error = max(error, _HIDDEN * float(problem.scales[-1]))
         return with_details(result, parameter_error=error)
     if np.isnan(result.parameter_error) and not result.located:
