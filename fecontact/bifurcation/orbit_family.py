@@ -39,7 +39,7 @@ _GROWS, _MAY, _MUST = 1e-6, 1e-9, 1e-4
 
 
 class _FamilyRounding(MultiplierRounding):
-    """Turns of the unfolding parameter are rounding; where multipliers meet, so is its root."""
+    """No folds; multipliers that meet are known to the square root of rounding only."""
 
     def unstable(self, linearisation: Any, values: Any) -> tuple[int, int]:
         """Least and largest number of growing perturbations."""
@@ -47,7 +47,7 @@ class _FamilyRounding(MultiplierRounding):
         return _beyond(multipliers, _MUST), _beyond(multipliers, _MAY)
 
     def kinds(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """'fold'."""
+        """A fold, wherever the unfolding parameter turns."""
         return {"fold"}
 
 
@@ -63,7 +63,7 @@ class _FamilyTests:
 
     @cached_property
     def rounding(self) -> Rounding:
-        """That of families, with the Newton steps of other orbits."""
+        """No folds; small Newton steps are rounding as for other orbits."""
         known = super().rounding  # type: ignore[misc]
         return _FamilyRounding(known.width, known.steps)
 

@@ -1,12 +1,12 @@
 """Guesses of the next point of a branch from the last points and their tangents.
 
-A :class:`Bent` guess lies on a parabola by the last two points, a :class:`Trail` has more of them.
-There lengths along the branch are those of its projection on the last tangent t_0,
-x_j = <t_0, u_j - u_0> for the points u_0, u_1, ... backwards, with the slopes
-du/dx = t_j / <t_0, t_j>. A parabola, a cubic and a quartic have the slopes of the last two, three
-and four points (Adams and Bashforth); another cubic, of Hermite, those of two points and their
-places, too. That counts which was nearest at the last point. Rounding and a change of mesh tell
-against higher orders.
+Guesses of :class:`Bent` lie on a parabola through the last two points, those of :class:`Trail` on
+curves through up to four. There lengths along the branch are those of its projection on the last
+tangent t_0, x_j = <t_0, u_j - u_0> for the points u_0, u_1, ... backwards, with the slopes du/dx =
+t_j / <t_0, t_j>. A parabola, a cubic and a quartic have the slopes of the last two, three and four
+points (Adams and Bashforth); another cubic, of Hermite, those of two points and their places, too.
+That counts which was nearest at the last point. Rounding and a change of mesh tell against higher
+orders.
 """
 
 import math
@@ -54,8 +54,8 @@ class Predictor:
     Attributes
     ----------
     rows : (k, n) array
-        u and tangent of the last point, and what else is known of the branch behind it; empty
-        before the first step.
+        First u and tangent of the last point, then data of the branch behind it; empty before the
+        first step.
     """
 
     rows: Array = field(default_factory=lambda: np.empty((0, 0)))
@@ -148,7 +148,7 @@ class Trail(Predictor):
         return straight if bent else guess
 
     def off(self, step: float) -> float:
-        """As at the last points, for a step of this length."""
+        """Expected error of the guess, from those at the last points; infinite if unknown."""
         return max(min(_expected(self.misses, step), default=math.inf), self.misses.worst)
 
     def after(self, weights: Array, u: Array, tangent: Array) -> Self:

@@ -75,7 +75,7 @@ class Stride:
 
 
 class FastSteps(Protocol):
-    """Starts and plain steps of a branch that a problem makes in another way than others."""
+    """Compiled starts and steps of a problem."""
 
     def start(self, problem: Any, u: Array, row: Array) -> Any:
         """The :class:`~fecontact.bifurcation.continuation.newton.Solution` at right angles to a row
@@ -132,12 +132,12 @@ class Problem(Protocol):
 
     @property
     def predictor(self) -> Predictor:
-        """What guesses the next point."""
+        """Predictor of the next point."""
         return _TANGENT
 
     @property
     def rounding(self) -> Rounding:
-        """What rounding leaves open at points of the branch."""
+        """Uncertainty by rounding at points of the branch."""
         return _ROUNDING
 
     @property
@@ -226,7 +226,7 @@ class Problem(Protocol):
         return None
 
     def fast_steps(self, options: "ContinuationOptions") -> FastSteps | None:
-        """What makes plain steps at once; None for one by one."""
+        """Compiled starts and steps; None where points are made one by one."""
         return None
 
     def met_again(

@@ -1,16 +1,16 @@
-"""What rounding leaves open at the points of a branch, and what is told of it."""
+"""Uncertainty by rounding at the points of a branch."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from fecontact.core.types import Array
 
-# Change of the parameter along a branch, in widths of the diagram, below which it is rounding.
+# Slope of the parameter along a branch, in widths of the diagram, below which its sign is rounding.
 FLAT = 1e-8
 
 
 class Rounding:
-    """Rounding that leaves nothing open but the last steps of Newton's method.
+    """Stability and kinds of points are certain, and the last Newton steps alone are rounding.
 
     Parameters
     ----------
@@ -64,13 +64,13 @@ class RestingParameter(Rounding):
         return first, last
 
     def kinds(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """'fold' where the parameter rests at both points."""
+        """A fold where the parameter rests at both points."""
         return {"fold"} if all(abs(slope) < FLAT for slope in self.slopes(tangents)) else set()
 
 
 class NoFolds(Rounding):
-    """Turns of the parameter are rounding."""
+    """All turns of the parameter are rounding."""
 
     def kinds(self, tangents: Any, values: Any, tests: Any) -> set[str]:
-        """'fold'."""
+        """A fold, wherever the parameter turns."""
         return {"fold"}

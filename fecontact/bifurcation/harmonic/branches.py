@@ -9,7 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.predictor import Bent
+from fecontact.bifurcation.continuation.predictor import BENT
 from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
@@ -316,7 +316,7 @@ def sampling_error(
     to it; that of the parameter, in widths of the diagram.
     """
     samples = problem.samples * (4 if problem.samples % 2 else 2)
-    finer = replace(problem, samples=samples, predictor=Bent())
+    finer = replace(problem, samples=samples, predictor=BENT)
     try:
         linearised = finer.linearise(u)
         residual = linearised.residual - problem.evaluate(u).residual

@@ -10,7 +10,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.newton import damped_newton
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.predictor import Bent
+from fecontact.bifurcation.continuation.predictor import BENT
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.engine_order import WaveField, Waves
@@ -208,7 +208,7 @@ def doubled(problem: HarmonicProblem, u: Array) -> Start:
         periods *= 2
     result = replace(problem, harmonics=2 * problem.harmonics, samples=2 * problem.samples,
                      orders=None, reference=twice, periods=periods, scales=scales,
-                     predictor=Bent())
+                     predictor=BENT)
     start = np.append(twice.reshape(-1), common)
     odd = np.zeros(twice.shape, dtype=bool)
     odd[1::4] = odd[2::4] = True
@@ -240,7 +240,7 @@ def with_more(
     """Problem, unknowns and tangent with another number of harmonics and samples."""
     result = replace(problem, harmonics=method.highest, samples=method.count,
                      reference=with_harmonics(problem.coefficients(u), method.highest),
-                     orders=method.orders, stability=method.stability, predictor=Bent())
+                     orders=method.orders, stability=method.stability, predictor=BENT)
 
     def changed(vector: Array) -> Array:
         X = with_harmonics(problem.coefficients(vector), method.highest).reshape(-1)

@@ -69,7 +69,7 @@ class AlongMode(OrbitUnknowns):
 
     @property
     def rounding(self) -> Rounding:
-        """No folds, and no multipliers, that say anything of the mode."""
+        """No folds: neither turns of xi nor multipliers belong to the mode."""
         return NoFolds(super().rounding.steps)  # type: ignore[misc]
 
     def note(self, points: Any) -> str:
@@ -122,7 +122,7 @@ class ModeProblem(AlongMode, HarmonicProblem):
 
     @property
     def rounding(self) -> Rounding:
-        """As along other modes, with larger Newton steps where elements stick."""
+        """No folds; where elements stick, larger Newton steps than of other modes are rounding."""
         return NoFolds(_ROUNDING_OF_MEANS) if self.layout.memory else super().rounding
 
     def longest_step(self, tangent: Array, turn: float, options: ContinuationOptions) -> float:
@@ -134,6 +134,7 @@ class ModeProblem(AlongMode, HarmonicProblem):
         smooth = isinstance(self.field, ContactField) and not self.field.kinked
         if not (smooth and self.conservative):
             return options.largest_step
+        # At the start of the next step, and where one of the largest length ends.
         bend = self.predictor.bend
         rate = max(float(np.sqrt(self.weights()[-2:] @ way[-2:] ** 2)) for way in (
             tangent, tangent if bend is None else tangent + options.largest_step * bend))

@@ -31,7 +31,7 @@ from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.inner_product import weighted_norm
 from fecontact.bifurcation.continuation.newton import newton
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.predictor import Bent
+from fecontact.bifurcation.continuation.predictor import BENT
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem, width_of
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic import starts
@@ -132,7 +132,7 @@ class PeakProblem(Problem):
     def adapted(self, u: Array, tangent: Array) -> "tuple[PeakProblem, Array, Array]":
         """The problem for the next step: border along the response at u, scales of its orbit."""
         orbit, _, _ = self.at(u).adapted(u[:-1], tangent[:-1])
-        orbit = replace(orbit, predictor=Bent())
+        orbit = replace(orbit, predictor=BENT)
         along = self.linearise(u).along
         weights = orbit.weights()
         return replace(self, orbit=orbit,

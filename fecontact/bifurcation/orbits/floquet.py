@@ -231,7 +231,7 @@ class FloquetTests:
 
     @property
     def rounding(self) -> Rounding:
-        """What rounding leaves open of the multipliers."""
+        """Uncertainty of the multipliers by rounding."""
         return MultiplierRounding(float(self.scales[-1]))
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""What rounding leaves open of multipliers along a branch of orbits."""
+"""Uncertainty of multipliers by rounding along a branch of orbits."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -57,7 +57,7 @@ class MultiplierRounding(RestingParameter):
         return found
 
     def turns(self, tangents: tuple[Array, Array], values: Any) -> bool:
-        """Where multipliers are lost, tangents have errors that a small slope may not exceed."""
+        """Whether multipliers are lost, and a slope is below the errors of tangents there."""
         return (any(self.lost(stored) for stored in values)
                 and min(map(abs, self.slopes(tangents))) < _FLAT_LOST)
 

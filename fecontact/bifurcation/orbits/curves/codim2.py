@@ -104,7 +104,7 @@ class OrbitCurve(Problem):
 
     @property
     def predictor(self) -> Predictor:
-        """That of the orbits."""
+        """Predictor of the orbits on the curve."""
         return self.orbit.predictor
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[OrbitCurve, Array, Array]":
