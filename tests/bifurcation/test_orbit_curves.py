@@ -17,6 +17,7 @@ from fecontact.bifurcation import (
     orbit_branch,
     vector_field,
 )
+from fecontact.bifurcation.orbits.curves import errors
 from fecontact.bifurcation.orbits.curves.codim2 import OrbitCurve
 from fecontact.bifurcation.orbits.normal_forms import Expansion
 
@@ -247,6 +248,36 @@ def test_a_curve_of_tori_ends_where_neutral_saddles_begin():
     assert curve.of_kind("resonance 1:4")[0].values["shear"] == pytest.approx(0.25, abs=1e-8)
     end, = curve.of_kind("resonance 1:1")
     assert end in (curve.points[0], curve.points[-1])
+
+
+@pytest.mark.parametrize(("moves", "meshes"), [((1e-6, 0.0, 1e-6, 0.0), 2),
+                                               ((1e-6, 1.1e-6, 1.1001e-6), 3)])
+def test_a_point_that_rounding_moves_to_and_fro_needs_no_finer_mesh(moves, meshes, monkeypatch):
+    """It stays where it was, with the distance as its error; one that converges goes on."""
+    field, t, circle = circle_field(sheared, growth=-0.2, shear=0.1)
+    branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "growth",
+                          method=Collocation(intervals=16), bounds=(-0.3, 0.3), scales=np.ones(3))
+    found, own = [], errors.found_near
+
+    def moved(place, kind):
+        there = own(place, kind)
+        u = there.u.copy()
+        u[-1] += moves[len(found)]
+        found.append(place.problem.orbit.intervals)
+        return replace(there, u=u)
+
+    monkeypatch.setattr(errors, "found_near", moved)
+    curve = codim2_curve(field, branch.of_kind("Neimark-Sacker")[0], "shear", both=False,
+                         direction=1.0, bounds={"growth": (-0.3, 0.3), "shear": (-0.4, 0.4)})
+    point, = curve.special
+    assert point.kind == "resonance 1:4"
+    assert found == [32, 64, 128][:meshes]
+    if meshes == 2:
+        assert point.parameter == pytest.approx(0.0, abs=1e-10)
+        assert point.parameter_error == pytest.approx(1e-6, rel=1e-3)
+    else:
+        assert point.parameter == pytest.approx(1.1e-6, abs=1e-10)
+        assert point.parameter_error < 2e-8
 
 
 def ring(t, x, p, out):

@@ -17,6 +17,9 @@ from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.bifurcation.orbits.sharpening import LEAST_FALL, found_near, reach
 from fecontact.core.types import Array
 
+# Distance from the point before last, in the change from the last one, of a point that rounding
+# moves to and fro: finer meshes do not make it more accurate.
+_RETURNS = 0.1
 # Names of the coefficients of a normal form and of their errors.
 _FORM = ("normal_form", "normal_form_error")
 
@@ -59,7 +62,8 @@ def _sharpened(
 ) -> tuple[BranchPoint, bool]:
     """A special point on the first mesh that suffices, and whether twice the intervals have it.
 
-    Each mesh has twice the intervals of the one before, up to the most of the start's branch.
+    Each mesh has twice the intervals of the one before, up to the most of the start's branch, or
+    until rounding alone moves the point.
     """
     method, widths = known["method"], curve.orbit.scales[-2:]
     most, allowed = int(method.most_intervals), method.tolerance * widths
@@ -72,6 +76,9 @@ def _sharpened(
     while finer is not None:
         errors = np.maximum(np.abs(finer.u[-2:] - here.u[-2:]), LEAST_FALL * errors)
         form = _form(here, finer)
+        if np.linalg.norm((finer.u[-2:] - best.u[-2:]) / widths) < _RETURNS * np.linalg.norm(
+                errors / widths):
+            break
         best, here = here, finer
         if (errors <= allowed).all() or place.problem.orbit.intervals > most:
             break
