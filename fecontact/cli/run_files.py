@@ -93,6 +93,21 @@ def require_same_study(study: "Study", file: Path, *free: str) -> None:
                          f"leave out --resume.")
 
 
+def tell_replaced(study: "Study", file: Path, changes: Iterable[str] | None) -> None:
+    """Print a note before ``--set`` replaces results that the study has of other values."""
+    from fecontact.output.files.stored_system import read_study_text
+
+    if not changes or not file.exists():
+        return
+    try:
+        stored, _ = read_study_text(file)
+    except FecontactError:
+        return
+    if not _same_values(study, stored, False):
+        note(f"note: {file} has results of other values, which will be replaced; keep both by "
+             f"-o FOLDER.")
+
+
 def write_results_of_run(
     study: "Study", trajectory: "Trajectory", folder: Path
 ) -> list[Path]:

@@ -22,7 +22,7 @@ from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.forced_starts import rest_state
 from fecontact.bifurcation.harmonic.starts import problem_for
 from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem
-from fecontact.core.errors import AnalysisError, InputError
+from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.laws import Harmonic
 from fecontact.reduction import PolynomialSpring, point_masses
 
@@ -60,6 +60,25 @@ def test_resonances_do_not_depend_on_the_points_of_the_mode():
         assert one.amplitude == pytest.approx(other.amplitude, rel=1e-5)
         assert one.frequency_hz == pytest.approx(other.frequency_hz, rel=1e-6)
         assert one.damping_ratio == pytest.approx(other.damping_ratio, rel=1e-5)
+        assert one.solved
+        assert other.solved
+
+
+def test_a_resonance_that_is_interpolated_says_so(monkeypatch):
+    """Where no point of the mode is found beside it."""
+    def fails(*_):
+        raise FecontactError("no solution")
+
+    system = jenkins_system()
+    mode = nonlinear_mode(system, (1.0, 12.0), method=HarmonicBalance(3, 256),
+                          options=ContinuationOptions(step=0.3, largest_step=0.5))
+    right = mode_response(mode, system)
+    monkeypatch.setattr("fecontact.bifurcation.nonlinear_modes.mode_response.with_point", fails)
+    rough = mode_response(mode, system)
+    assert rough.peak().amplitude == pytest.approx(right.peak().amplitude, rel=1e-2)
+    assert not rough.peak().solved
+    assert "interpolated" in repr(rough)
+    assert "interpolated" not in repr(right)
 
 
 def test_response_of_a_mode_that_sticks_is_linear():

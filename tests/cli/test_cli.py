@@ -123,6 +123,17 @@ def test_results_go_to_the_folder_asked_for(cli, study, tmp_path):
     assert not (tmp_path / "results").exists()
 
 
+def test_a_changed_value_that_replaces_results_is_told(cli, study, tmp_path):
+    """Neither the first run nor one of the same values; another folder keeps both."""
+    steps = (((), ""), (("--set", "ground.speed=0.2"), "-o FOLDER"),
+             (("--set", "ground.speed=0.2"), ""), (("--set", "ground.speed=0.3", "-o", "b"), ""))
+    for changes, told in steps:
+        code, _, err = cli("run", study, *changes)
+        assert code == 0
+        assert told in err
+        assert bool(err) is bool(told), err
+
+
 @pytest.mark.slow
 def test_a_run_that_is_up_to_date_is_drawn_without_a_note(cli, study, tmp_path):
     assert cli("run", study)[0] == 0

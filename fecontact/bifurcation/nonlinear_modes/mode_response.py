@@ -40,11 +40,15 @@ class Resonance:
         Frequency of the mode at the resonance [Hz].
     damping_ratio : float
         Damping ratio of the mode at the resonance.
+    solved : bool
+        Whether the mode is solved within 1e-3 of this amplitude; where that cannot be done, the
+        resonance is interpolated between points of the mode.
     """
 
     amplitude: float
     frequency_hz: float
     damping_ratio: float
+    solved: bool = True
 
 
 @read_only_arrays
@@ -102,6 +106,7 @@ class ModeResponse(Summarised):
     def summary(self) -> list[tuple[str, str]]:
         """Mode, levels and resonances."""
         found = [f"{quantity(one.amplitude, 'm')} at {one.frequency_hz:.5g} Hz"
+                 + ("" if one.solved else ", interpolated")
                  for level in self.resonances for one in level]
         return [("mode", f"{self.mode.number}"), ("observed", self.mode.observed),
                 *([(self.level_name, listed([f"{level:.5g}" for level in self.levels], 6))]
@@ -125,8 +130,8 @@ def mode_response(
 
     exact for one linear mode, and for one harmonic of one coordinate. At the resonance,
     :math:`\Omega = \Omega_0`, the work of the force balances the losses of all harmonics; there the
-    mode is solved for, as far as it can be, and between its points interpolated. Other modes must
-    be far.
+    mode is solved for, as far as it can be (``solved``), and between its points interpolated. Other
+    modes must be far.
 
     Parameters
     ----------
@@ -173,13 +178,11 @@ def _refined(
 ) -> "_Along":
     """Quantities along a mode, which is solved near all resonances."""
     for _ in range(_ROUNDS):
-        along, amplitudes = along_of(mode), mode.amplitude
-        far = [(place, one.amplitude) for place, one in along.resonances().items()
-               if np.abs(amplitudes / one.amplitude - 1.0).min() > _NEAR]
+        far = [(place, one.amplitude) for place, one in along_of(mode).resonances().items()
+               if not one.solved]
         known = len(mode)
         # From the last one on, so that numbers of points before stay.
         for place, amplitude in far[::-1]:
-            # Where it cannot be found the interpolation stands.
             with suppress(FecontactError):
                 mode = with_point(mode, system, place, amplitude)
         if len(mode) == known:
@@ -257,7 +260,9 @@ class _Along:
         """All of them in their order, by the number of the point of the mode that is before it."""
         places = self._places()
         found = self.at(np.array([*places.values()]))
-        return {before: Resonance(float(a), float(w / (2.0 * np.pi)), float(ratio))
+        amplitudes = np.exp(self.known[2])
+        return {before: Resonance(float(a), float(w / (2.0 * np.pi)), float(ratio),
+                                  bool(np.abs(amplitudes / a - 1.0).min() <= _NEAR))
                 for before, (w, ratio, a) in zip(places, found[:3].T, strict=True)}
 
     def curve(self) -> Array:

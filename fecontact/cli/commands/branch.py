@@ -39,7 +39,7 @@ def branch(
     import numpy as np
 
     from fecontact.cli.console import INTERRUPTED, waiting
-    from fecontact.cli.run_files import read_study
+    from fecontact.cli.run_files import read_study, tell_replaced
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.core.progress import titled_bar
     from fecontact.core.tables import located
@@ -58,6 +58,7 @@ def branch(
 
     described.require_no_sector("`fecontact response` computes its waves")
     with output_folder(output or described.results) as folder:
+        tell_replaced(described, folder / f"{described.name}-branch.h5", set_)
         with waiting("Computing modes"):
             system, usable = described.system(), described.usable_hz
         with titled_bar() as progress:

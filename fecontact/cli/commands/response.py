@@ -61,7 +61,7 @@ def response(
     With [symmetry] and an engine_order the response is that of a whole wheel, from one sector, and
     no page is written.
     """
-    from fecontact.cli.run_files import read_study
+    from fecontact.cli.run_files import read_study, tell_replaced
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.core.files.locks import locked
     from fecontact.core.progress import titled_bar
@@ -92,6 +92,7 @@ def response(
           locked(folder / f".{described.name}-response.lock",
                  f"Another response is writing {folder / described.name}-response.h5; wait for "
                  f"it, or choose another folder with -o.")):
+        tell_replaced(described, response_file(described, folder), None if resume else set_)
         with waiting("Computing modes"):
             system, wave = described.system(), described.wave()
         if movie and wave is None:

@@ -294,7 +294,7 @@ def run(
     continues it. --overwrite starts again.
     """
     from fecontact.cli.console import waiting
-    from fecontact.cli.run_files import read_study, write_results_of_run
+    from fecontact.cli.run_files import read_study, tell_replaced, write_results_of_run
     from fecontact.cli.tables import key_table, run_table
     from fecontact.core.files.atomic_write import output_folder
     from fecontact.core.files.locks import locked
@@ -310,6 +310,7 @@ def run(
           locked(folder / f".{described.name}.lock",
                  f"Another run is writing {folder / described.name}.vtkhdf; wait for it, or choose "
                  f"another folder with -o.")):
+        tell_replaced(described, folder / f"{described.name}.vtkhdf", set_)
         with waiting("Computing modes"):
             described.system()
         checkpoint = folder / f"{described.name}.checkpoint"
