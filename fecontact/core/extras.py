@@ -26,13 +26,18 @@ def how_to_install(module: str) -> str:
 def optional(module: str, what: str) -> Any:
     """A module of an extra, without which ``what``, in words, cannot be done.
 
+    NumPy prints as before, whatever a module sets when it is imported.
+
     Raises
     ------
     MissingLibraryError
         If it is not installed, with the command that installs it.
     """
+    import numpy as np
+
     try:
-        return import_module(module)
+        with np.printoptions():
+            return import_module(module)
     except ImportError:
         raise MissingLibraryError(f"{what} needs {module}, which is not installed; install it "
                                   f"with: {how_to_install(module)}") from None

@@ -38,7 +38,7 @@ def test_a_load_beyond_the_limits_of_the_model_is_warned_of(cli, study):
     for command in (["plot", study, "history"], ["export", study, "--format", "csv"]):
         code, _, err = cli(*command)
         assert (code, err.count(words)) == (0, 1)
-    code, _, err = cli("run", study, "--set", "load.normal=100.0")
+    code, _, err = cli("run", study, "--set", "load.normal=100.0", "-o", "less")
     assert (code, err) == (0, "")
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from libraries import library
 from scipy.sparse.linalg import eigsh
 
 import fecontact as fc
@@ -23,7 +24,7 @@ MASS = np.diag(np.arange(1.0, SIZE + 1.0))
 EXTERNAL = ("BEGIN SUPER        7\n$ EXTRN DATA\n"
             "EXTRN          3     123      11     123 2995001       0 2995002       0\n")
 LABELS = [[3, 1], [3, 2], [3, 3], [11, 1], [11, 2], [11, 3], [2995001, 0], [2995002, 0]]
-op4 = pytest.importorskip("pyyeti.nastran.op4")
+op4 = library("pyyeti.nastran.op4")
 
 
 def superelement(path, **how):
