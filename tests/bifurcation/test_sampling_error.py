@@ -1,6 +1,7 @@
 """Errors that few samples a period make, against describing functions and finer sampling."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -255,8 +256,21 @@ def test_an_orbit_whose_friction_does_not_repeat_has_an_infinite_error(monkeypat
         raise AnalysisError("The internal variables do not come to repeat.")
 
     monkeypatch.setattr(branches, "replace", lambda problem, **changes: type(
-        "Failing", (), {"linearise": fails})())
+        "Failing", (), {"evaluate": fails})())
     assert sampling_error(problem, u, fixed(u)) == np.inf
+
+
+@pytest.mark.parametrize("count", [1, 23, 25, 47, 48, 1000])
+def test_some_points_of_a_branch_and_its_folds_are_examined(count):
+    """At most 24 from its begin on, and all folds."""
+    points = [SimpleNamespace(kind="fold" if number == count - 1 else None, number=number)
+              for number in range(count)]
+    found = [point.number for point in branches._some(points)]
+    assert found[0] == 0
+    assert found[-1] == count - 1
+    assert min(count, 12) <= len(found) <= 25
+    steps = np.diff(found[:-1])
+    assert (steps == steps[:1]).all()
 
 
 def test_study_files_have_the_same_key():

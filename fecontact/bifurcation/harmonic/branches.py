@@ -238,7 +238,7 @@ def _joined(*sentences: str) -> str:
 
 def _some(points: Sequence[BranchPoint]) -> Sequence[BranchPoint]:
     """Some points of a branch, evenly distributed, and its folds."""
-    step = max(1, len(points) // _LOOKED_AT)
+    step = -(-len(points) // _LOOKED_AT)
     return [point for k, point in enumerate(points) if k % step == 0 or point.kind == "fold"]
 
 
@@ -304,8 +304,8 @@ def sampling_error(
 ) -> float:
     """Estimate of the error of an orbit u relative to its size; infinite where there is none.
 
-    A step of Newton's method leads to the orbits of twice the samples, at right angles to the
-    tangent, so that at folds it is as long as elsewhere. The remaining residual with as many
+    A step with the matrix of the orbit leads to the orbits of twice the samples, at right angles to
+    the tangent, so that at folds it is as long as elsewhere. The remaining residual with as many
     samples as the problem has is no error of theirs, and taken off. Kinks of laws make errors of
     order 1 / N^2, of which a fourth is left there: the error is four thirds of that step. Forces
     whose second half of a period mirrors the first are the same at an odd number of samples and at
@@ -318,8 +318,8 @@ def sampling_error(
     samples = problem.samples * (4 if problem.samples % 2 else 2)
     finer = replace(problem, samples=samples, predictor=BENT)
     try:
-        linearised = finer.linearise(u)
-        residual = linearised.residual - problem.evaluate(u).residual
+        linearised = problem.linearise(u)
+        residual = finer.evaluate(u).residual - linearised.residual
         size = max(_size(problem, u, problem.reference.shape[1]), least)
         if not residual.any() or not size > 0.0:
             return np.inf if residual.any() else 0.0
