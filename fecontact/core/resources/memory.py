@@ -7,6 +7,8 @@ from pathlib import Path
 from fecontact.core.errors import InputError
 
 _LEAST, _LEAST_STACK = 1.0e9, 1 << 20  # [bytes]
+# Less than libraries take [bytes]: not worth to ask the system, which takes a tenth of a short run.
+_LITTLE = 1.0e7
 _UNITS = ((1e15, "PB"), (1e12, "TB"), (1e9, "GB"), (1e6, "MB"))
 
 
@@ -34,9 +36,11 @@ def require_memory(name: str, count: float, each: float, remedy: str = "") -> No
     remedy : str
         Alternative to taking fewer, for the end of the message.
     """
-    free = available_memory()
     # Whole numbers may be larger than any other.
     count = min(count, sys.float_info.max)
+    if count * each <= _LITTLE:
+        return
+    free = available_memory()
     if count * each <= free:
         return
     fits = int(float(f"{0.9 * free / each:.2g}"))
