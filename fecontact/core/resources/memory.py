@@ -7,7 +7,7 @@ from pathlib import Path
 from fecontact.core.errors import InputError
 
 _LEAST, _LEAST_STACK = 1.0e9, 1 << 20  # [bytes]
-# Less than libraries take [bytes]: not worth to ask the system, which takes a tenth of a short run.
+# Far less than libraries take [bytes]: not worth asking the system, some 0.1 ms.
 _LITTLE = 1.0e7
 _UNITS = ((1e15, "PB"), (1e12, "TB"), (1e9, "GB"), (1e6, "MB"))
 
