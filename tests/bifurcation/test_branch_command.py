@@ -43,6 +43,15 @@ def test_block_on_a_belt(study, capsys):
     assert (study.parent / "results" / "block-branch.png").stat().st_size > 10_000
 
 
+def test_a_changed_value_that_replaces_a_branch_is_told(study, capsys):
+    """Once: the same values again replace no others."""
+    short = ["branch", str(study), "ground.speed", "--bounds", "11e-3", "12e-3"]
+    for changes, told in (([], 0), (["--set", "load.normal=15.0"], 1),
+                          (["--set", "load.normal=15.0"], 0)):
+        assert execute([*short, *changes]) == 0
+        assert capsys.readouterr().err.count("block-branch.h5 has results of other val") == told
+
+
 @pytest.mark.parametrize(("arguments", "message"), [
     (["ground.sped", "--bounds", "1", "2"], "did you mean 'ground.speed'"),
     (["ground.speed", "--bounds", "1", "1"], "bounds = [1.0, 1.0] must be two values"),

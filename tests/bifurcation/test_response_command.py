@@ -208,9 +208,14 @@ def test_going_on_needs_the_same_values(cli, file):
                         "--resume")
     assert code == 1
     assert "was computed with other values" in said
+    assert "will be replaced" not in said
     code, _, said = cli("response", file, "--resume", "-o", "nowhere")
     assert code == 1
     assert "no interrupted response to go on with" in said
+    for told in (1, 0):
+        code, _, said = cli("response", file, "--bounds", 9, 9.5, "--set", "load.normal=15.0")
+        assert code == 0
+        assert said.count("-response.h5 has results of other values, which will") == told
 
 
 MESHED = STUDY.replace('shape = "block", contact_length = 0.08, element_size = 0.02',

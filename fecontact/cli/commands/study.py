@@ -310,7 +310,6 @@ def run(
           locked(folder / f".{described.name}.lock",
                  f"Another run is writing {folder / described.name}.vtkhdf; wait for it, or choose "
                  f"another folder with -o.")):
-        tell_replaced(described, folder / f"{described.name}.vtkhdf", set_)
         with waiting("Computing modes"):
             described.system()
         checkpoint = folder / f"{described.name}.checkpoint"
@@ -322,6 +321,7 @@ def run(
         elif resume and not checkpoint.exists():
             raise InputError(f"There is no interrupted run to go on with: {checkpoint} does not "
                              f"exist; run the study without --resume.")
+        tell_replaced(described, folder / f"{described.name}.vtkhdf", set_)
         trajectory = described.run(True, checkpoint)
         from fecontact.analysis.run_facts import notes
 
