@@ -261,16 +261,50 @@ def test_an_orbit_whose_friction_does_not_repeat_has_an_infinite_error(monkeypat
 
 
 @pytest.mark.parametrize("count", [1, 23, 25, 47, 48, 1000])
-def test_some_points_of_a_branch_and_its_folds_are_examined(count):
-    """At most 24 from its begin on, and all folds."""
+def test_some_points_of_a_branch_are_examined_first_and_up_to_24_in_doubt(count):
+    """Few from its begin on, the largest and all folds; then those between them."""
     points = [SimpleNamespace(kind="fold" if number == count - 1 else None, number=number)
               for number in range(count)]
-    found = [point.number for point in branches._some(points)]
-    assert found[0] == 0
-    assert found[-1] == count - 1
-    assert min(count, 12) <= len(found) <= 25
-    steps = np.diff(found[:-1])
+    first, others = ([point.number for point in some]
+                     for some in branches._examined(points, count // 3))
+    assert {0, count // 3, count - 1} <= set(first)
+    assert len(first) <= 6
+    assert not set(first) & set(others)
+    every = sorted({*first, *others} - {count // 3, count - 1})
+    assert min(count, 12) - 2 <= len(every) <= 24
+    steps = np.diff([number for number in every if number < count // 3])
     assert (steps == steps[:1]).all()
+
+
+def response_of_jenkins(lowest, highest, samples=None):
+    return frequency_response(
+        jenkins_system(), (lowest / TURN, highest / TURN),
+        method=HarmonicBalance(1, samples, stability=None),
+        options=ContinuationOptions(points=300, largest_step=0.1)).branches[0]
+
+
+def test_slip_near_a_resonance_alone_is_found():
+    """Far from the resonance the element sticks; samples grow as for the resonance by itself."""
+    whole, near = response_of_jenkins(0.3, 2.5), response_of_jenkins(1.05, 1.3)
+    sizes = np.array([np.abs(point.u[1:3]).max() for point in whole.points])
+    assert max(sizes[0], sizes[-1]) < 1.0 and sizes.max() > 10.0
+    assert whole.method.samples == near.method.samples > 32
+    assert whole.attributes["sampling_error"] == pytest.approx(
+        near.attributes["sampling_error"], rel=0.5)
+
+
+def test_fewer_points_are_examined_where_nothing_slips(monkeypatch):
+    """Errors at rounding need no more than a sixth of the points."""
+    examined = []
+    monkeypatch.setattr(branches, "sampling_error", lambda problem, u, tangent, least: (
+        examined.append(u[-1]) or sampling_error(problem, u, tangent, least)))
+    found = response_of_jenkins(2.5, 3.5)
+    assert found.attributes["sampling_error"] < 1e-10
+    few = len(examined)
+    assert 0 < few <= 6
+    examined.clear()
+    response_of_jenkins(1.05, 1.3)
+    assert len(examined) > 2 * few
 
 
 def test_study_files_have_the_same_key():

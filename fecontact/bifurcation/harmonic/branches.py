@@ -36,8 +36,9 @@ _MORE = 1.5
 # Size below which orbits are at rest, in that of the largest on the branch, means included.
 _AT_REST = 1e-8
 # Number of points at which the error from few samples is estimated by default, and the error above
-# which a branch carries a note.
-_LOOKED_AT, _NOTED = 24, 5e-3
+# which a branch carries a note. Every sixth of them and the largest orbit, which slips if any does,
+# is enough if their errors are so much smaller.
+_LOOKED_AT, _NOTED, _SIXTH, _FAR = 24, 5e-3, 6, 0.01
 _FEW = ("The error of the branch from its {} samples is {:.2g} of the orbit: folds may be those of "
         "kinks of the contact laws between samples; take more samples or smoother laws.")
 _CORNERS = ("The parameter turns at corners of the branch at {} folds: forces have kinks between "
@@ -155,23 +156,21 @@ def follow(
     AnalysisError
         If they do not with as many as the method allows.
     """
-    if problem.stability is None or problem.autonomous or not problem.kinked:
-        return _watched(*_refined(problem, u, tangent, method, options, further, how)[:2])
-    # Multipliers and special points take the time: they are computed once, on the final samples.
-    branch, plain, u, tangent = _refined(
-        replace(problem, stability=None), u, tangent, replace(method, stability=None), options,
-        further, how)
+    branch, final, u, tangent, notes = _refined(problem, u, tangent, method, options, further, how)
     if branch.status is BranchStatus.INTERRUPTED:
-        return branch
-    whole = replace(plain, stability=problem.stability)
-    wrong = _wrong_at_folds(whole, branch)
-    if wrong:
-        return replace(_watched(branch, whole), message=_joined(branch.message, wrong))
-    known = {name: branch.attributes[name] for name in ("sampling_error",)
-             if name in branch.attributes}
-    found = _followed(whole, u, tangent, options, {**(further or {}), **known}, how)
-    return replace(_watched(found, whole), message=_joined(found.message, branch.message)
-                   if _FEW[:20] in branch.message else found.message)
+        return _watched(branch, final)
+    judged = problem.stability is not None and _once(problem)
+    whole = replace(final, stability=problem.stability)
+    wrong = _wrong_at_folds(whole, branch) if judged else ""
+    if judged and (final.stability is None) != bool(wrong):
+        branch = _followed(replace(whole, stability=None) if wrong else whole, u, tangent, options,
+                           {**(further or {}), **_known(branch)}, how)
+    return replace(_watched(branch, final), message=_joined(branch.message, notes, wrong))
+
+
+def _once(problem: HarmonicProblem) -> bool:
+    """Whether samples are chosen by an estimate, and multipliers wait for the last of them."""
+    return problem.kinked and not problem.autonomous
 
 
 def _watched(branch: Branch, problem: HarmonicProblem) -> Branch:
@@ -203,43 +202,65 @@ def _followed(
 def _refined(
     problem: HarmonicProblem, u: Array, tangent: Array | None, method: HarmonicBalance,
     options: ContinuationOptions, further: Mapping[str, Any] | None, how: Mapping[str, Any],
-) -> tuple[Branch, HarmonicProblem, Array, Array | None]:
-    """A branch that meets the tolerances, with the problem, start and tangent that it has."""
+) -> tuple[Branch, HarmonicProblem, Array, Array | None, str]:
+    """A branch that meets the tolerances, with its problem, start, tangent and notes.
+
+    Multipliers and special points take the time: if it needs more samples, they are left out.
+    """
     explicit = method.sampling_tolerance is not None
     sampling = method.sampling_tolerance if problem.autonomous else method.sampling
-    most = MOST if explicit else max(MOST_SAMPLED, method.count)
+    most, error = MOST if explicit else max(MOST_SAMPLED, method.count), 0.0
     while True:
         branch = _followed(problem, u, tangent, options, further, how)
         if branch.status is BranchStatus.INTERRUPTED:
-            break
-        finer, error = _with_more_harmonics(method, branch), 0.0
-        if finer is None and (explicit or (problem.kinked and not problem.autonomous)):
-            # By default a part of the points is examined.
-            error = _largest_error(problem, branch.points if explicit else _some(branch.points))
+            return branch, problem, u, tangent, ""
+        finer = _with_more_harmonics(method, branch)
+        if finer is None and (explicit or _once(problem)):
+            error = (_largest_error(problem, branch.points, branch.points) if explicit
+                     else _error_of_some(problem, branch.points, sampling or _NOTED))
             if sampling is not None:
                 branch = replace(branch, attributes={**branch.attributes, "sampling_error": error})
                 finer = _with_more_samples(method, error, sampling, most)
         if finer is None:
-            if error > max(_NOTED, sampling or 0.0):
-                branch = replace(branch, message=_joined(
-                    branch.message, _FEW.format(method.count, error)))
-            corners = sum(point.kind == "fold" and not point.located for point in branch.points)
-            if corners and not problem.autonomous:
-                branch = replace(branch, message=_joined(branch.message, _CORNERS.format(corners)))
             break
-        method = finer
+        method = replace(finer, stability=None) if _once(problem) else finer
         problem, u, tangent = starts.with_more(problem, u, tangent, method)
-    return branch, problem, u, tangent
+    corners = sum(point.kind == "fold" and not point.located for point in branch.points)
+    return branch, problem, u, tangent, _joined(
+        _FEW.format(method.count, error) if error > max(_NOTED, sampling or 0.0) else "",
+        _CORNERS.format(corners) if corners and not problem.autonomous else "")
+
+
+def _known(branch: Branch) -> dict[str, Any]:
+    """Attributes of a branch that another one of the same orbits has as well."""
+    return {name: branch.attributes[name] for name in ("sampling_error",)
+            if name in branch.attributes}
 
 
 def _joined(*sentences: str) -> str:
     return " ".join(filter(None, sentences))
 
 
-def _some(points: Sequence[BranchPoint]) -> Sequence[BranchPoint]:
-    """Some points of a branch, evenly distributed, and its folds."""
+def _error_of_some(
+    problem: HarmonicProblem, points: Sequence[BranchPoint], allowed: float
+) -> float:
+    """The largest error from few samples at some points of a branch."""
+    largest = int(np.argmax([_size(problem, np.asarray(point.u)) for point in points]))
+    first, others = _examined(points, largest)
+    error = _largest_error(problem, first, points)
+    return error if error <= _FAR * allowed else max(
+        error, _largest_error(problem, others, points))
+
+
+def _examined(
+    points: Sequence[BranchPoint], largest: int
+) -> tuple[list[BranchPoint], list[BranchPoint]]:
+    """Few points, evenly distributed, with the largest and the folds; others between them."""
     step = -(-len(points) // _LOOKED_AT)
-    return [point for k, point in enumerate(points) if k % step == 0 or point.kind == "fold"]
+    first = {k for k, point in enumerate(points)
+             if k % (_SIXTH * step) == 0 or k == largest or point.kind == "fold"}
+    others = sorted(set(range(0, len(points), step)) - first)
+    return [points[k] for k in sorted(first)], [points[k] for k in others]
 
 
 def _wrong_at_folds(problem: HarmonicProblem, branch: Branch) -> str:
@@ -340,12 +361,13 @@ def _size(problem: HarmonicProblem, u: Array, first: int = 0) -> float:
     return float(np.sqrt(problem.weights()[first : problem.size] @ u[first : problem.size] ** 2))
 
 
-def _largest_error(problem: HarmonicProblem, points: Iterable[BranchPoint]) -> float:
-    """The largest such error of the points of a branch, but for those on two branches.
+def _largest_error(
+    problem: HarmonicProblem, examined: Iterable[BranchPoint], points: Iterable[BranchPoint]
+) -> float:
+    """The largest such error of points of a branch, but for those on two branches.
 
     There the equations are singular with any last row; the points beside them tell the same.
     """
-    found = [(np.asarray(point.u), np.asarray(point.tangent)) for point in points
-             if point.kind not in _ON_TWO]
-    least = _AT_REST * max(_size(problem, u) for u, _ in found)
-    return max(sampling_error(problem, u, tangent, least) for u, tangent in found)
+    least = _AT_REST * max(_size(problem, np.asarray(point.u)) for point in points)
+    return max((sampling_error(problem, np.asarray(point.u), np.asarray(point.tangent), least)
+                for point in examined if point.kind not in _ON_TWO), default=0.0)
