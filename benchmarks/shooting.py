@@ -3,10 +3,11 @@
     python benchmarks/shooting.py [repetitions] [--quick]
 
 A run over 50 ms, from the stuck state, and the same with derivatives to start and belt speed, for
-3, 5 and 20 modes. The problems (b), (b2), (c) and (d) of benchmarks/integrator.py, of 1, 2 and 3
-modes and one node, and 20 modes and 40 nodes: with derivatives to the start, and to the start and
-belt speed, at the steps of the run and at those that the derivatives ask for. Runs with and
-without derivatives are by the same integrator, small systems by collocation at this tolerance.
+3, 5 and 20 modes, without the check against differences of runs and with it. The problems (b),
+(b2), (c) and (d) of benchmarks/integrator.py, of 1, 2 and 3 modes and one node, and 20 modes and
+40 nodes: with derivatives to the start, and to the start and belt speed, at the steps of the run
+and at those that the derivatives ask for, and these last with the check. Runs with and without
+derivatives are by the same integrator, small systems by collocation at this tolerance.
 Then points of the stick-slip branch of 20 modes. CPU time, the least of the repetitions.
 """
 
@@ -50,34 +51,36 @@ def alone(system: ContactSystem, state: Array, end: float, rtol: float) -> None:
 
 
 def measure(modes: int, repetitions: int) -> list[float]:
-    """Times of a run, with derivatives, and with derivatives to 1e-2 only [s]."""
+    """Times of a run, with derivatives, with those to 1e-2 only, and with the check [s]."""
     system = example.beam(SPEED, modes=modes)
     start = example.stuck(system)
 
-    def derivatives(rtol: float | None) -> object:
+    def derivatives(rtol: float | None, check: bool = False) -> object:
         return sensitivity(system, DURATION, initial=start, parameter="ground.speed", rtol=RTOL,
-                           derivative_rtol=rtol)
+                           derivative_rtol=rtol, check=check)
 
     return [least(task, repetitions) for task in (
         lambda: alone(system, start, DURATION, RTOL),
-        lambda: derivatives(None), lambda: derivatives(1e-2))]
+        lambda: derivatives(None), lambda: derivatives(1e-2), lambda: derivatives(None, True))]
 
 
 def ratios(name: str, repetitions: int, part: float = 1.0) -> list[float]:
     """Time of a run [s]; that with derivatives to start, and to start and speed, relative to it.
 
-    At the steps of the run, then at those that the derivatives ask for.
+    At the steps of the run, then at those that the derivatives ask for, then these with the check.
     """
     problem = problems.shortened(problems.PROBLEMS[name](), PARTS[name] * part)
     system, end = problem.system, float(problem.times[-1])
     run = least(lambda: alone(system, problem.state, end, 1e-8), repetitions)
 
-    def cost(rtol: float | None, parameter: str | None) -> float:
+    def cost(rtol: float | None, check: bool, parameter: str | None) -> float:
         return least(lambda: sensitivity(system, end, initial=problem.state, rtol=1e-8,
-                                         derivative_rtol=rtol, parameter=parameter),
+                                         derivative_rtol=rtol, parameter=parameter,
+                                         check=check),
                      repetitions) / run
 
-    return [run, *(cost(rtol, parameter) for rtol in (1.0, None)
+    return [run, *(cost(rtol, check, parameter)
+                   for rtol, check in ((1.0, False), (None, False), (None, True))
                    for parameter in (None, "ground.speed"))]
 
 
@@ -85,16 +88,19 @@ def main(repetitions: int = 5, quick: bool = False) -> None:
     """Print the tables; quickly the first row, once, and no branch."""
     if quick:
         repetitions = 1
-    print("modes     run   with derivatives   ratio   derivatives to 1e-2   ratio")
+    print("modes     run   with derivatives   ratio   derivatives to 1e-2   ratio"
+          "   checked   ratio")
     for modes in (3,) if quick else (3, 5, 20):
-        run, tight, loose = measure(modes, repetitions)
+        run, tight, loose, checked = measure(modes, repetitions)
         print(f"{modes:5}  {1e3 * run:6.1f} ms  {1e3 * tight:9.1f} ms  {tight / run:12.1f}"
-              f"  {1e3 * loose:12.1f} ms  {loose / run:12.1f}")
-    print("problem     run   to start   to start and speed   to start*   to start and speed*")
+              f"  {1e3 * loose:12.1f} ms  {loose / run:12.1f}  {1e3 * checked:8.1f} ms"
+              f"  {checked / run:4.1f}")
+    print("problem     run   to start   to start and speed   to start*   to start and speed*"
+          "   checked: to start*   to start and speed*")
     for name in ("b2",) if quick else PARTS:
         run, *costs = ratios(name, repetitions, 0.2 if quick else 1.0)
         print(f"({name})".ljust(7) + f"{1e3 * run:6.1f} ms  {costs[0]:7.1f}  {costs[1]:19.1f}"
-              f"  {costs[2]:10.1f}  {costs[3]:20.1f}")
+              f"  {costs[2]:10.1f}  {costs[3]:20.1f}  {costs[4]:20.1f}  {costs[5]:20.1f}")
     print("* at the steps that the derivatives ask for")
     if quick:
         return

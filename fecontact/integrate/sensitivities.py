@@ -118,6 +118,7 @@ def sensitivity(
     rtol: float = 1e-8,
     derivative_rtol: float | None = None,
     max_step: float | None = None,
+    check: bool = True,
 ) -> Sensitivity:
     """Integrate a motion and its derivatives with respect to initial state and a parameter.
 
@@ -148,11 +149,12 @@ def sensitivity(
     derivative_rtol : float, optional
         Tolerance of the derivatives per step, relative to their largest values since the last
         output time; by default ten times ``rtol``, 200 times along the motion, relative to their
-        current values or a tenth of the largest. 1e-2 saves work that only fast disturbances
-        require. But along the motion, derivatives of small motions take steps that the run, whose
-        tolerance is then absolute, does not need.
+        current values or a tenth of the largest. 1e-2 saves work for fast disturbances. But along
+        the motion, derivatives of small motions take steps that the run does not need.
     max_step : float, optional
         Longest step [s]; see :func:`fecontact.simulate`.
+    check : bool
+        Compare one direction with differences of runs, for half of the time or more.
 
     Raises
     ------
@@ -171,7 +173,7 @@ def sensitivity(
     state = initial_state(system, initial, t_start)
     found = differentiated(system, times, state, parameter, solver, float(rtol), derivative_rtol,
                            max_step)
-    if isinstance(solver, CompiledSolver):
+    if check and isinstance(solver, CompiledSolver):
         at = None if parameter is None else _function_of(system, parameter)
         found = replace(found, note=doubts(system, times, found.states, found.transitions,
                                            found.forced, at, solver=solver, rtol=float(rtol),

@@ -276,19 +276,20 @@ def test_some_points_of_a_branch_are_examined_first_and_up_to_24_in_doubt(count)
     assert (steps == steps[:1]).all()
 
 
-def response_of_jenkins(lowest, highest, samples=None):
+def response_of_jenkins(lowest, highest):
     return frequency_response(
         jenkins_system(), (lowest / TURN, highest / TURN),
-        method=HarmonicBalance(1, samples, stability=None),
+        method=HarmonicBalance(3, stability=None),
         options=ContinuationOptions(points=300, largest_step=0.1)).branches[0]
 
 
 def test_slip_near_a_resonance_alone_is_found():
-    """Far from the resonance the element sticks; samples grow as for the resonance by itself."""
+    """Far from the resonance the element sticks; the error is that of the resonance by itself."""
     whole, near = response_of_jenkins(0.3, 2.5), response_of_jenkins(1.05, 1.3)
     sizes = np.array([np.abs(point.u[1:3]).max() for point in whole.points])
-    assert max(sizes[0], sizes[-1]) < 1.0 and sizes.max() > 10.0
-    assert whole.method.samples == near.method.samples > 32
+    assert max(sizes[0], sizes[-1]) < 1.0
+    assert sizes.max() > 4.0
+    assert near.attributes["sampling_error"] > 1e-5
     assert whole.attributes["sampling_error"] == pytest.approx(
         near.attributes["sampling_error"], rel=0.5)
 

@@ -26,6 +26,9 @@ def test_a_grazing_run_has_a_warning():
     with pytest.warns(ModelWarning, match=r"differ from differences of runs from t = 0 to 4 s"):
         found = sensitivity(system, 4.0, initial=start)
     assert "%" in found.note
+    unchecked = sensitivity(system, 4.0, initial=start, check=False)
+    assert not unchecked.note
+    assert (unchecked.monodromy == found.monodromy).all()
 
 
 def test_a_run_that_clears_the_ground_has_none():
