@@ -26,6 +26,7 @@ from usage import explain
 
 from fecontact import ContactSystem, sensitivity
 from fecontact.core.types import Array
+from fecontact.integrate.collocation.workspace import chosen_collocation
 from fecontact.integrate.rodas5p import driver
 
 SPEED, DURATION, RTOL = 0.05, 0.05, 1e-7
@@ -45,8 +46,9 @@ def least(task: Callable[[], object], repetitions: int) -> float:
 
 
 def alone(system: ContactSystem, state: Array, end: float, rtol: float) -> None:
-    """A run without derivatives, by itself."""
-    run = driver.start(system, state, np.array([0.0, end]), rtol=rtol, work=False, method="rodas5p")
+    """A run without derivatives, by itself, and by the integrator of runs with derivatives."""
+    method = "rodas5p" if chosen_collocation(system, rtol, (), False) is None else "radau"
+    run = driver.start(system, state, np.array([0.0, end]), rtol=rtol, work=False, method=method)
     run.advance(10**9)
 
 

@@ -240,33 +240,45 @@ def _presses(x, j, s, c):
     return _normal_force(x, j, s, c) != 0.0
 
 
+@helper
+def _least_force(left, right, j, s, c):
+    """Place between left and right where the force of node j is least, or one where it is zero."""
+    for _ in range(_SECTIONS):
+        a, b = right - _GOLDEN * (right - left), left + _GOLDEN * (right - left)
+        at_a, at_b = abs(_normal_force(a, j, s, c)), abs(_normal_force(b, j, s, c))
+        if at_a == 0.0:
+            return a
+        if at_b == 0.0:
+            return b
+        if at_a < at_b:
+            right = b
+        else:
+            left = a
+    return 0.5 * (left + right)
+
+
 @routine
 def _without_force(high, j, s, c):
     """First place x found up to ``high`` where node j, pressed at the start, has no force.
 
-    2 if the force lasts. Between looks the force is followed to its minima by golden sections.
+    2 if the force lasts. Between looks the force is followed to its minima by golden sections,
+    where it is less than its second difference: the parabola through three looks goes no further
+    below the least of them than an eighth of that.
     """
-    width = (high + 1.0) / _FORCE_LOOKS
-    before, now = np.inf, abs(_normal_force(-1.0, j, s, c))
-    for look in range(1, _FORCE_LOOKS + 1):
-        x = high if look == _FORCE_LOOKS else -1.0 + look * width
-        after = abs(_normal_force(x, j, s, c))
-        if now < before and now <= after:
-            left, right = max(x - 2.0 * width, -1.0), x
-            for _ in range(_SECTIONS):
-                a, b = right - _GOLDEN * (right - left), left + _GOLDEN * (right - left)
-                at_a, at_b = abs(_normal_force(a, j, s, c)), abs(_normal_force(b, j, s, c))
-                if at_a == 0.0:
-                    return a
-                if at_b == 0.0:
-                    return b
-                if at_a < at_b:
-                    right = b
-                else:
-                    left = a
+    width, forces = (high + 1.0) / _FORCE_LOOKS, c.line[1]
+    for look in range(_FORCE_LOOKS + 1):
+        forces[look] = abs(_normal_force(min(-1.0 + look * width, high), j, s, c))
+    for look in range(_FORCE_LOOKS):
+        now, after = forces[look], forces[look + 1]
+        centre = max(look, 1)
+        bent = forces[centre - 1] - 2.0 * forces[centre] + forces[centre + 1]
+        if now <= after and now < abs(bent) and (look == 0 or now < forces[look - 1]):
+            x = -1.0 + look * width
+            least = _least_force(max(x - width, -1.0), x + width, j, s, c)
+            if not _presses(least, j, s, c):
+                return least
         if after == 0.0:
-            return x
-        before, now = now, after
+            return min(-1.0 + (look + 1) * width, high)
     return 2.0
 
 
