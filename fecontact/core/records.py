@@ -18,7 +18,7 @@ import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
-from operator import add, mul, sub
+from operator import add, attrgetter, mul, sub
 from types import NoneType
 from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin
 
@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from typing_extensions import TypeAliasType
 
 from fecontact.core.references import Reference, reference_to
-from fecontact.core.simd.kinds import WIDTH, has_eight, lane_array, lanes
+from fecontact.core.simd.kinds import WIDTH, has_eight, lane_array, lanes, zeros_of_eight
 from fecontact.core.types import Array, ComplexArray, Integers
 
 Record = TypeVar("Record", bound=tuple[Any, ...])
@@ -223,7 +223,7 @@ def _maker(record: Any, name: str, kind: Any, sizes: Mapping[Size, int]) -> Call
         return partial(_refuse, f"the shape {axes} of {record.__name__}.{name} does not follow "
                                 f"from sizes")
     if entries is Eights:
-        return partial(np.zeros, [*shape, WIDTH])
+        return partial(zeros_of_eight, *(length for length in shape if length is not None))
     return partial(np.zeros, shape, _ENTRIES[entries].name)
 
 
@@ -269,6 +269,27 @@ def holds_arrays(kind: Any) -> bool:
     """Whether a type of numba is an array, or a tuple that has some."""
     return isinstance(kind, types.Array) or (
         isinstance(kind, types.BaseTuple) and any(map(holds_arrays, kind)))
+
+
+@cache
+def reader(record: Any, *entries: Any) -> Callable[[Any], tuple[Any, ...]]:
+    """Function that returns the numbers, or arrays, of these ``entries`` of a record, in order.
+
+    ``reader(record, float, Array)`` reads all numbers, those of records within it too. There must
+    be two at least.
+    """
+    return attrgetter(*_names(record, entries))
+
+
+def _names(record: Any, entries: tuple[Any, ...]) -> list[str]:
+    """Dotted names of the fields of these entries."""
+    found: list[str] = []
+    for name, kind in _fields(record).items():
+        if is_record(kind):
+            found += [f"{name}.{inner}" for inner in _names(kind, entries)]
+        elif (_entries_and_axes(kind)[0] if get_origin(kind) is Annotated else kind) in entries:
+            found.append(name)
+    return found
 
 
 @cache

@@ -1,6 +1,6 @@
 """The contact system: a modal basis, laws at its contact nodes, drive and load."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import InitVar, dataclass, field, fields
 from functools import cached_property
 from types import MappingProxyType
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fecontact.core.checks import merged
 from fecontact.core.dotted_parameters import parameters_of, with_parameters
 from fecontact.core.errors import InputError, choices, nearest, require_finite
+from fecontact.core.read_only import read_only
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, listed, quantity
 from fecontact.laws.base import FrictionLaw, NormalLaw
@@ -26,7 +27,7 @@ from fecontact.reduction.basis_parameters import basis_parameter, with_basis_par
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
-from fecontact.system.arrays import excited, groups_of_laws, system_arrays
+from fecontact.system.arrays import LawGroup, excited, groups_of_laws, system_arrays
 from fecontact.system.elastic_sliders import exact_arrays, slider_counts
 from fecontact.system.friction_memory import bristle_history, memory_scales, velocity_scale
 from fecontact.system.gap import Gap, gap_values
@@ -258,17 +259,24 @@ class ContactSystem(Summarised):
             ("load", load_summary(self.load)),
         ]
 
-    def law_groups(self, kind: Literal["normal", "friction"]) -> Iterator[tuple[slice, Array, Any]]:
+    def law_groups(self, kind: Literal["normal", "friction"]) -> Sequence[LawGroup]:
         """Groups of contact nodes with a common law: slice, share of each node, law.
 
         Extensive parameters are totals of the whole face for a single law, and totals of the group
         for the law of an interface.
         """
-        given, basis = getattr(self, kind), self.basis
-        groups = [(count, given[name]) for name, count in basis.groups] if isinstance(
-            given, Mapping) else [(basis.contact_nodes, given)]
-        return groups_of_laws(
-            [one for one in groups if one[0] or len(groups) == 1], basis.tributary)
+        return self._law_groups[kind]
+
+    @cached_property
+    def _law_groups(self) -> dict[str, Sequence[LawGroup]]:
+        found: dict[str, Sequence[LawGroup]] = {}
+        for kind in NO_LAWS:
+            given, basis = getattr(self, kind), self.basis
+            groups = [(count, given[name]) for name, count in basis.groups] if isinstance(
+                given, Mapping) else [(basis.contact_nodes, given)]
+            found[kind] = read_only(tuple(groups_of_laws(
+                [one for one in groups if one[0] or len(groups) == 1], basis.tributary)))
+        return found
 
     def require_compliance(self, what: str) -> None:
         """Raise InputError if some contacts are rigid stops, of which something needs a force."""

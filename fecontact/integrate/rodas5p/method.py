@@ -133,7 +133,7 @@ def _watched(watch):
     return watch.counts[NODES] != 0 or len(watch.own) > 0
 
 
-@routine
+@helper
 def _next_target(t, h, last, smallest, data):
     """The next step to try, of about the length h, or exactly that if the last one was cut.
 
@@ -302,7 +302,7 @@ def _refused(step, error, progress, workspace):
     return FAILED if error < np.inf else NOT_A_NUMBER, step.h * growth(root_of(error))
 
 
-@routine
+@helper
 def _attempt(step, last, smallest, data):
     """Try a step; its outcome, and the length of the next one."""
     problem, progress, workspace, vary, watch = (data.problem, data.progress, data.workspace,

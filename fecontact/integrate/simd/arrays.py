@@ -5,13 +5,21 @@ lie in one table (rows, 8), those that a run begins with in another, so that a r
 lane as one column.
 """
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 
-from fecontact.core.records import ANY, Eights, IntegerVector, Matrix, Vector, allocate, of_eight
-from fecontact.core.simd.kinds import WIDTH
+from fecontact.core.records import (
+    ANY,
+    Eights,
+    IntegerVector,
+    Matrix,
+    Vector,
+    allocate,
+    of_eight,
+    reader,
+)
+from fecontact.core.simd.kinds import WIDTH, zeros_of_eight
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.stage_solver import Reduced
 from fecontact.integrate.rodas5p.state import NUMBERS, Problem, Progress, Workspace
@@ -113,27 +121,11 @@ class Runs(NamedTuple):
     counts: Annotated[Integers, 4]
 
 
-def numbers_of(record: Any) -> Iterator[Array]:
-    """All numbers of a record, field by field; integers are left out."""
-    for value in record:
-        if isinstance(value, tuple):
-            yield from numbers_of(value)
-        elif isinstance(value, float) or (isinstance(value, np.ndarray) and value.dtype == float):
-            yield np.asarray(value)
-
-
-def integers_of(record: Any) -> Iterator[Integers]:
-    """All integers of a record, field by field."""
-    for value in record:
-        if isinstance(value, tuple):
-            yield from integers_of(value)
-        elif isinstance(value, int) or (isinstance(value, np.ndarray) and value.dtype != float):
-            yield np.asarray(value)
-
-
 def column_of(record: Any) -> Array:
     """All numbers of a record, one after the other."""
-    return np.concatenate([number.ravel() for number in numbers_of(record)])
+    kind: Any = type(record)
+    return np.concatenate([number.ravel() if isinstance(number, np.ndarray) else (number,)
+                           for number in reader(kind, float, Array)(record)])
 
 
 def seen_in(table: Array, record: Any) -> Any:
@@ -141,7 +133,8 @@ def seen_in(table: Array, record: Any) -> Any:
 
     Single numbers stay what they are in a table for one.
     """
-    made, _ = _seen_in(table, record, 0)
+    made, count = _seen_in(table, record, 0)
+    assert count == len(table)
     return made
 
 
@@ -170,13 +163,13 @@ def lanes_for(problem: Problem, eight: Problem, starts: int) -> Lanes:
     sizes = {MODES: modes, NODES: nodes, AXES: axes, COMBINATIONS: 0,
              MEMORY: len(problem.control.memory_scale) // nodes}
     column = column_of(problem)
-    parameters = np.repeat(column[:, np.newaxis], WIDTH, axis=1)
-    start = np.zeros((starts, WIDTH))
+    parameters, start = zeros_of_eight(len(column)), zeros_of_eight(starts)
+    parameters[:] = column[:, np.newaxis]
     limits, numbers, state, extremes = np.split(
         start, np.cumsum([LIMITS, NUMBERS, starts - LIMITS - NUMBERS - modes]))
     made = seen_in(parameters, eight)
     progress = allocate(EightProgress, sizes, numbers=numbers, state=state, extremes=extremes)
-    reduced = allocate(of_eight(Reduced), sizes, solver=np.zeros((modes, 2 * modes, WIDTH)))
+    reduced = allocate(of_eight(Reduced), sizes, solver=zeros_of_eight(modes, 2 * modes))
     workspace = allocate(EightWorkspace, sizes, near=made.blocks, reduced=reduced)
     return Lanes(parameters, start, column, made, progress, workspace, limits,
                  np.zeros((2, WIDTH), dtype=np.int64), np.full(WIDTH, -1, dtype=np.int64),

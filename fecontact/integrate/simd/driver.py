@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.core.checks import require_state
+from fecontact.core.records import reader
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.blocks import one_block
 from fecontact.integrate.rodas5p.driver import control_for, start
@@ -23,6 +24,7 @@ from fecontact.integrate.trajectory import Status
 from fecontact.laws.simd import simd_address
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import exact_arrays, slider_counts
+from fecontact.system.nodes import SystemArrays
 
 # Steps of a call, in all lanes; runs that a worker takes at once, at most.
 _STEPS, _DEALT = 20_000, 32
@@ -91,8 +93,9 @@ def kind_of(system: ContactSystem, begin: float, end: float) -> Kind | None:
     others = s._replace(**none)
     levels = max(len(law.onsets(nodes.stop - nodes.start))
                  for nodes, _, law in system.law_groups("normal"))
-    return Kind(tuple(laws), tuple(one.tobytes() for one in arrays.integers_of(others)),
-                tuple(one.shape for one in arrays.numbers_of(s)), levels, (m, n, states),
+    integers = reader(SystemArrays, int, Integers)(others)
+    return Kind(tuple(laws), tuple(np.asarray(one).tobytes() for one in integers),
+                tuple(one.shape for one in reader(SystemArrays, Array)(s)), levels, (m, n, states),
                 tuple(counts.tolist()))
 
 
