@@ -16,7 +16,7 @@ E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., secti
 import numpy as np
 from numpy.polynomial import polynomial
 
-from fecontact.core.compiled import helper
+from fecontact.core.compiled import routine
 from fecontact.core.dense_lu import factorise, solve_rows
 
 STAGES = 4
@@ -43,7 +43,7 @@ _ERROR = 144.0 / (5040.0 * 40320.0)
 _FILTER = 0.1
 
 
-@helper
+@routine
 def collocate(h, J, forced, x):
     """Carry the columns x (2 m, k) over the time h.
 
@@ -87,7 +87,7 @@ def collocate(h, J, forced, x):
                 speed[c] += once * acceleration[c]
 
 
-@helper
+@routine
 def _solve(system, out):
     """Fill out (4 m, k) with the solution of the linear system [K, b] (4 m, 4 m + k).
 
@@ -112,7 +112,7 @@ def _solve(system, out):
             system[first - m : first, first : STAGES * m].copy(), out[first:])
 
 
-@helper
+@routine
 def expected_error(h, J, x, rate, ahead, out):
     r"""Fill ``out`` (2 m, k) with the error of the columns x over the time h, for a constant J.
 

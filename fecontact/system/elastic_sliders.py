@@ -75,7 +75,7 @@ def return_deflection(z, i, size, target, s):
         z[k] *= target / size
 
 
-@helper
+@routine
 def set_sides(moved, y, s, counts, force, rates, sides):
     """Fill ``sides`` (n, elements): 1 for elements that slide in the state y, -1 that stick.
 
@@ -90,7 +90,7 @@ def set_sides(moved, y, s, counts, force, rates, sides):
                 sides[j, i] = 1 if size > limit else -1
 
 
-@helper
+@routine
 def keep_sides(moved, y, s, counts, force, rates, sides):
     """Move deflections of the state y that are beyond their limit to the other of its ``sides``.
 
@@ -106,7 +106,7 @@ def keep_sides(moved, y, s, counts, force, rates, sides):
                 return_deflection(z, i, size, target, s)
 
 
-@helper
+@routine
 def widen_scales(moved, y, s, counts, force, rates, scale):
     """Make ``scale`` (size,), what errors count relative to, larger for elements that slide at y.
 
@@ -124,7 +124,7 @@ def widen_scales(moved, y, s, counts, force, rates, scale):
                     scale[k] *= size / least * max(1.0, scale[k] / least)
 
 
-@helper
+@routine
 def return_to_limits(t, y, s, counts, force, rates):
     """Return all deflections of the state y at time t to their limits."""
     limits = limits_at(ground_motion(t, s), y, s, counts, force, rates)

@@ -266,7 +266,7 @@ def set_rate(y, s, blocks, given, load, w, scratch, rate):
         add_polynomial_forces(y, s, rate[len(load) : 2 * len(load)])
 
 
-@helper
+@routine
 def set_gradients(y, s, blocks, moved, w, out):
     """Fill the :class:`Gradients` ``out`` at the motion ``moved`` of the ground.
 

@@ -355,7 +355,7 @@ def _exchange(where, table, k, i):
 eliminate_modes = by_kind(_factorise, _invert)
 
 
-@helper
+@routine
 def set_solver(G, blocks, w, out):
     """Fill out (m, 2 m), which makes u_v of a right side: the factors' F^-1 [Jq, G I]."""
     m = len(w.pivots)

@@ -175,7 +175,7 @@ def _expand(side, step, y, s, blocks, v, g, time_rate):
     v.none[:] = 0.0
 
 
-@helper
+@routine
 def _begin_parameter(step, progress, blocks, vary):
     """Fill d2f/dt dp (v.vectors[6]) and v.between at the begin of a step."""
     v, y = vary.variation, progress.state
@@ -244,7 +244,7 @@ def _set_forced(part, Y, u, blocks, vary, out):
     add_matrices(u, blocks, vary, out)
 
 
-@helper
+@routine
 def _largest_error(scale, v):
     largest = 0.0
     for c in range(len(v.columns)):
@@ -264,7 +264,7 @@ def _largest_error(scale, v):
     return largest
 
 
-@helper
+@routine
 def _leave_turns(y, progress, s, counts, here, inside):
     """Let elastic elements of contacts that are open at the start y of a step turn as there.
 
@@ -272,8 +272,16 @@ def _leave_turns(y, progress, s, counts, here, inside):
     one sets their deflections.
     """
     for j in range(len(counts)):
-        if counts[j] > 0 and progress.signs[j] == 0 and np.any(memory_of(j, y, s) != 0.0):
-            inside.rates[j] = here.rates[j]
+        if counts[j] == 0 or progress.signs[j] != 0:
+            continue
+        deflected = False
+        for deflection in memory_of(j, y, s):
+            deflected |= deflection != 0.0
+        if deflected:
+            rates, there = inside.rates[j], here.rates[j]
+            for row in range(rates.shape[0]):
+                for column in range(rates.shape[1]):
+                    rates[row, column] = there[row, column]
 
 
 @kernel(by_address=True)
@@ -340,7 +348,7 @@ def propagate(
     return _largest_error(workspace.right, v)
 
 
-@helper
+@routine
 def _parts(step, scale, x, forced, J, v):
     """In how many parts the columns x go over the step, and the error that is expected of them.
 
@@ -373,7 +381,7 @@ def _parts(step, scale, x, forced, J, v):
     return parts, expected
 
 
-@helper
+@routine
 def _set_accelerations(t, Y, blocks, vary, out):
     """Fill out (m,) with the derivatives of the accelerations to the parameter, at Y and time t.
 

@@ -52,7 +52,7 @@ def learn(here, usual):
                 usual.rates[j, row, k] = max(usual.rates[j, row, k], abs(here.rates[j, row, k]))
 
 
-@helper
+@routine
 def set_paths(step, acceleration, s, blocks, stages, v):
     """Fill v.paths (STAGES, D, n) with what each stage moves the nodes against the other side.
 
@@ -217,7 +217,7 @@ def set_second_derivatives(step, acceleration, problem, progress, workspace, v):
             _set_bend(j, direction * n + j, 1.0 / reach, forward, progress.gradients, v)
 
 
-@helper
+@routine
 def set_ahead(i, y, s, stages, v):
     """Fill v.ahead with the change of the gradients along stage i of a step from y."""
     g, second_derivatives, paths = v.ahead, v.second_derivatives, v.paths
@@ -284,7 +284,7 @@ def _products(a, b, out):
         stage_solver.products(a, b, out)
 
 
-@helper
+@routine
 def set_derivatives(s, blocks, g, reduced, force_jacobian, out):
     """Fill out (m, 2 m) with [Jq, Jv], the derivatives of the accelerations, by gradients g.
 
@@ -301,7 +301,7 @@ def set_derivatives(s, blocks, g, reduced, force_jacobian, out):
         add_polynomial_stiffness(-1.0, g.polynomial, s, out)
 
 
-@helper
+@routine
 def all_at_once(i, h, problem, workspace, vary):
     """Solve stage i of all columns; systems without internal variables and polynomial forces.
 
@@ -377,7 +377,7 @@ def add_node_forces(g, s, blocks, x, w, rate):
             rate[first + k] += total
 
 
-@helper
+@routine
 def one_by_one(i, h, problem, progress, workspace, vary):
     """Solve stage i of all columns; with v.vectors[3] as in :func:`all_at_once`."""
     s, blocks, v = problem.system, problem.blocks, vary.variation
