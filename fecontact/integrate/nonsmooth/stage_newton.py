@@ -28,7 +28,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from fecontact.core.compiled import helper
+from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import Vector
 from fecontact.core.types import Array, Integers
@@ -201,7 +201,7 @@ def _set_friction(j, node, g, p, hold, turning, partial, force):
     return creep
 
 
-@helper
+@routine
 def _linearise(stage, moved, p, hold, turning, workspace, force):
     """Contact of one stage: accelerations, friction forces and their derivatives.
 
@@ -260,7 +260,7 @@ def _set_gradients(count, s, workspace):
                 workspace.gradients[at, axis, i] = total
 
 
-@helper
+@routine
 def _set_matrix(count, s, workspace):
     """Fill ``workspace.matrix`` by the ``linear`` one and the ``jacobians`` of so many nodes."""
     _, d, m = s.rows.shape
@@ -281,7 +281,7 @@ def _set_matrix(count, s, workspace):
                     whole[i, k] += active[at, axis, i] * gradients[at, axis, k]
 
 
-@helper
+@routine
 def _evaluate(stage, moved, p, hold, turning, workspace, force):
     """Fill ``residual`` and ``balance`` of the workspace for the velocities Y, and the places.
 
@@ -300,7 +300,7 @@ def _evaluate(stage, moved, p, hold, turning, workspace, force):
     return count, creep
 
 
-@helper
+@routine
 def _shorten(stage, moved, p, hold, downhill, workspace, force):
     """Shorten a Newton step to where the minimum along it lies; ``downhill`` is its slope."""
     m, change = len(stage.start), workspace.change
@@ -322,7 +322,7 @@ def _shorten(stage, moved, p, hold, downhill, workspace, force):
         part = middle
 
 
-@helper
+@routine
 def solve_stage(stage, p, hold, limits, finest, workspace, force):
     """Solve one stage for the velocities, Y[m : 2 m]; returns whether that succeeded.
 

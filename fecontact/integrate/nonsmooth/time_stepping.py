@@ -99,7 +99,7 @@ def _fastest_side(moved, p):
     return fastest
 
 
-@helper
+@routine
 def _slips_back(j, step, p, w, tolerance, workspace):
     """Part of a step at which node j slips back between ends with slip of one sense; or 1.
 
@@ -135,7 +135,7 @@ def _slips_back(j, step, p, w, tolerance, workspace):
     return 0.5 * (back + 1.0 - first_below(b, workspace.halves))
 
 
-@helper
+@routine
 def _touches(j, h, p, w, limits, workspace):
     """Part of a step at which node j touches between ends that do not feel it; or 1."""
     s, b = p.system, workspace.cubic
@@ -151,7 +151,7 @@ def _touches(j, h, p, w, limits, workspace):
     return 1.0
 
 
-@helper
+@routine
 def _passed_over(step, p, limits, tolerance, w, workspace):
     """Part of a step at which a node slips back, or touches, between ends that show neither; or 1.
 
@@ -206,7 +206,7 @@ def _fill(row, output, step, data):
                                    + x * workspace.forces[STAGES - 1, j])
 
 
-@helper
+@routine
 def _set_inertia(p, limits, workspace):
     """Fill ``workspace.inertia``; returns the largest floor of the slip velocities."""
     s = p.system
@@ -224,7 +224,7 @@ def _set_inertia(p, limits, workspace):
     return slowest
 
 
-@helper
+@routine
 def _prepare(step, quick, p, progress, w, workspace):
     """Set the linear matrix of a step, and the parameters r of the nodes in stick."""
     s, hold, inertia, linear = p.system, workspace.hold, workspace.inertia, workspace.newton.linear
@@ -243,7 +243,7 @@ def _prepare(step, quick, p, progress, w, workspace):
     hold.multiplier[:] = progress.carried
 
 
-@helper
+@routine
 def _solve_stages(step, finest, p, limits, progress, workspace):
     """Solve the stages of a step; returns how many succeeded."""
     m = p.system.rows.shape[2]
@@ -271,7 +271,7 @@ def _solve_stages(step, finest, p, limits, progress, workspace):
     return STAGES
 
 
-@helper
+@routine
 def _error(step, p, limits, Y, workspace):
     """Error of the state in units of what is allowed, filtered by the matrix of the last stage."""
     s, start, known, floor = p.system, workspace.start, workspace.known, limits.floor
@@ -296,7 +296,7 @@ def _error(step, p, limits, Y, workspace):
     return worst
 
 
-@helper
+@routine
 def _set_rates(step, p, w, workspace):
     """Fill ``workspace.rates`` with the powers at the stages, and w with the nodes at the end."""
     for k in range(STAGES):
@@ -307,7 +307,7 @@ def _set_rates(step, p, w, workspace):
         contact_powers(moved, p.system, w.nodes, workspace.forces[k], True, workspace.rates[k])
 
 
-@helper
+@routine
 def _set_end(h, m, progress, workspace):
     """Fill ``workspace.new`` and ``workspace.after`` from the stages of an accepted step."""
     Y, rates = progress.state, workspace.rates
