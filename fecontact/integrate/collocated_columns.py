@@ -17,6 +17,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from fecontact.core.compiled import routine
+from fecontact.core.copies import put_rows
 from fecontact.core.dense_lu import factorise, solve_rows
 
 STAGES = 4
@@ -73,7 +74,7 @@ def collocate(h, J, forced, x):
     for i in range(len(forced)):
         for row in range(m):
             right[i * m + row, count - 1] += forced[i, row]
-    system[:, STAGES * m :] = right
+    put_rows(right, system[:, STAGES * m :])
     _solve(system, right)
     for row in range(m):
         place, speed = x[row], x[m + row]
@@ -102,14 +103,16 @@ def _solve(system, out):
         own, ahead = rest[:m, :m].copy(), rest[:m, m:].copy()
         factorise(own, m, pivots)
         solve_rows(own, pivots, ahead)
-        system[stage * m : (stage + 1) * m, (stage + 1) * m :] = ahead
+        put_rows(ahead, system[stage * m : (stage + 1) * m, (stage + 1) * m :])
         if stage < STAGES - 1:
             rest = rest[m:, m:] - np.dot(rest[m:, :m].copy(), ahead)
-    out[:] = system[:, STAGES * m :]
+    put_rows(system[:, STAGES * m :], out)
     for stage in range(STAGES - 2, -1, -1):
         first = (stage + 1) * m
-        out[first - m : first] -= np.dot(
-            system[first - m : first, first : STAGES * m].copy(), out[first:])
+        later = np.dot(system[first - m : first, first : STAGES * m].copy(), out[first:])
+        for row in range(m):
+            for c in range(out.shape[1]):
+                out[first - m + row, c] -= later[row, c]
 
 
 @routine

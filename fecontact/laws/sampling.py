@@ -3,6 +3,7 @@
 import numpy as np
 
 from fecontact.core.compiled import kernel
+from fecontact.core.copies import put
 from fecontact.core.records import Block, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.laws.signatures import friction_at, memory_at, normal_at
@@ -106,7 +107,7 @@ def _cycles(
     for k in range(len(work)):
         moved = travel[k + 1] - travel[k]
         v = moved / step
-        after[:] = z
+        put(z, after)
         for _ in range(30):
             memory_at(address)(v, F, after, p, force, rates)
             for i in range(s):
@@ -125,7 +126,7 @@ def _cycles(
             residual[i] = 0.5 * (z[i] + after[i])
         memory_at(address)(v, F, residual, p, force, rates)
         work[k] = force[0] * moved
-        z[:] = after
+        put(after, z)
 
 
 def cycle_work(

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import borrowing, helper, kernel
+from fecontact.core.copies import put
 from fecontact.core.records import Block, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.system.kernels import linear_rates, prescribed_at, rates_under
@@ -217,7 +218,7 @@ def _fill_derivatives(t, x, s, r, laws, workspace, found):
                 linear_rates(load_p, y, r, P[c])
                 P[c, :m] = 0.0
             else:
-                P[c, m : 2 * m] = load_p
+                put(load_p, P[c, m : 2 * m])
         for j in range(n):
             z = memory_of(j, y, s)
             node = node_gradients(j, node_motion(j, y, s), moved, z, s, force, rates, partial)

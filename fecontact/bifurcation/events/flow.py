@@ -16,6 +16,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
+from fecontact.core.copies import put
 from fecontact.core.records import ANY, Matrix, Size, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.nonsmooth.dop853 import ERROR_3, ERROR_5, STAGES, A, B, C
@@ -212,7 +213,7 @@ def _add_differences(t, y, given, workspace):
             weight = _BOTH[k] if side == 0 else _ONE[k] * side
             if weight == 0.0:
                 continue
-            around[:] = y
+            put(y, around)
             around[i] += step * (k - 2 if side == 0 else k * side)
             _rates(t, around, p, contact, work, near)
             for j in range(d):
@@ -331,13 +332,13 @@ def _close(step, writes, data):
 @helper
 def _fill(row, output, step, data):
     """Fill a row of the output, which is at the end of the step."""
-    output.states[row] = data.workspace.places[STAGES]
+    put(data.workspace.places[STAGES], output.states[row])
 
 
 @helper
 def _go_on(step, h, data):
     """Make the end of the step the state of the motion."""
-    data.progress.state[:] = data.workspace.places[STAGES]
+    put(data.workspace.places[STAGES], data.progress.state)
     return RUNNING, h
 
 

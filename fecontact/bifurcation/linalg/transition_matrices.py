@@ -6,6 +6,7 @@ import numpy as np
 
 from fecontact.bifurcation.linalg.condensation import CondensedFactors
 from fecontact.core.compiled import kernel
+from fecontact.core.copies import put_rows
 from fecontact.core.dense_lu import factorise, solve_rows
 from fecontact.core.records import Block
 
@@ -58,10 +59,10 @@ def condense_products(M: Block) -> int:
                     for k in range(d):
                         value += M[j, i, k] * M[count - 1, k, c]
                     total[i, c] = value
-            M[count - 1] = total
+            put_rows(total, M[count - 1])
         else:
             if j > count:
-                M[count] = M[j]
+                put_rows(M[j], M[count])
             count += 1
             bound = condition
     return count

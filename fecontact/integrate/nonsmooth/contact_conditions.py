@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.copies import put
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.nonsmooth.problem import OPEN, STICK
@@ -287,10 +288,10 @@ def _set_case(index, c, case):
 
 @helper
 def _copy(case, other):
-    other.pressed[:] = case.pressed
-    other.mode[:] = case.mode
-    other.x[:] = case.x
-    other.y[:] = case.y
+    put(case.pressed, other.pressed)
+    put(case.mode, other.mode)
+    put(case.x, other.x)
+    put(case.y, other.y)
 
 
 @routine

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.copies import put
 from fecontact.integrate.nonsmooth.dop853 import STAGES, error, interpolate, prepare_dense, take
 from fecontact.integrate.nonsmooth.equations import derivative, place_size
 from fecontact.integrate.nonsmooth.event_log import BEGIN, CHANGED, WITHIN, full, note_at
@@ -167,8 +168,9 @@ def _show(t, progress, output, w):
     """Let the outputs at the time t that are filled show what comes after, of which w knows."""
     row = progress.counts[OUTPUTS] - 1
     while row >= 0 and output.times[row] >= t:
-        output.states[row], output.friction[row] = progress.state, w.friction
-        output.normal[row] = w.nodes[:, FORCE]
+        put(progress.state, output.states[row])
+        put(w.friction, output.friction[row])
+        put(w.nodes[:, FORCE], output.normal[row])
         row -= 1
 
 
@@ -433,7 +435,7 @@ def _close(step, writes, data):
 def _stop_at(part, step, data):
     """End the run at a part of the step."""
     interpolate(part, data.progress.state, data.workspace.parts, data.workspace.state)
-    data.progress.state[:] = data.workspace.state
+    put(data.workspace.state, data.progress.state)
 
 
 @routine
@@ -443,7 +445,7 @@ def _go_on(step, h, data):
     if progress.counts[AT_EVENT] != 0:
         return _change(step, h, data)
     _accept(step, data.problem, progress, data.output, data.evaluation, workspace)
-    workspace.ends[0] = workspace.ends[1]
+    put(workspace.ends[1], workspace.ends[0])
     progress.counts[IDLE] = 0
     if step.at_break:
         progress.counts[KNOWN] = 0

@@ -37,6 +37,7 @@ import math
 from typing import NamedTuple
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.copies import put
 from fecontact.core.dense_lu import solve
 from fecontact.integrate.nonsmooth.equations import stick_limit
 from fecontact.integrate.nonsmooth.problem import (
@@ -164,7 +165,7 @@ def _observe_nodes(t, Y, closed, quick, p, workspace):
         workspace.sticking[j] = max(stick_limit(j, workspace.grip[j], p), workspace.slipping[j])
         workspace.weights[j] = 1.0 if slip > _STILL * quick else 0.0
     if struck:
-        workspace.weights[:] = p.tangential
+        put(p.tangential, workspace.weights)
     return struck
 
 
@@ -362,8 +363,8 @@ def _attempt(step, last, smallest, data):
 def _go_on(step, h, data):
     """Make the end of the step the state of the run."""
     p, progress, workspace = data.problem, data.progress, data.workspace
-    progress.state[:] = workspace.end
-    progress.closed[:] = workspace.closed[2]
+    put(workspace.end, progress.state)
+    put(workspace.closed[2], progress.closed)
     put_on_ground(step.target, progress.state, progress.closed, p, workspace)
     if step.at_break:
         pass_break(step, p, progress, data.output)

@@ -30,6 +30,7 @@ import numpy as np
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law, routine
+from fecontact.core.copies import put
 from fecontact.core.records import Vector
 from fecontact.integrate.nonsmooth.contact_conditions import (
     Conditions,
@@ -258,7 +259,7 @@ def _strike(t, touching, p, progress, w):
     _omit_fixed(progress.status, conditions)
     given, x = conditions.given, np.zeros(n + k)
     # An impact knows one coefficient, whether its contact sticks or slips.
-    conditions.sticking[:] = conditions.slipping
+    put(conditions.slipping, conditions.sticking)
     poisson = p.poisson != 0
     for j in range(n):
         rate = w.nodes[j, RATE]
@@ -267,10 +268,11 @@ def _strike(t, touching, p, progress, w):
         given[n + c] = -w.slip[c] if poisson else -(1.0 + p.tangential[c]) * w.slip[c]
     if not solve_conditions(conditions, case):
         return False
-    x[:] = case.x
+    put(case.x, x)
     if poisson:
-        given[:] = case.y
-        conditions.least[:] = p.restitution * case.x[:n]
+        put(case.y, given)
+        for j in range(n):
+            conditions.least[j] = p.restitution[j] * case.x[j]
         if not solve_conditions(conditions, case):
             return False
         x += case.x
@@ -382,8 +384,8 @@ def _decide(touching, rebound, moment):
         if status[c] != FIXED:
             status[c] = OPEN
     derivative(t, Y, p, status, closed, w, out)
-    workspace.rate[:m] = out[m : 2 * m]
-    status[:] = before
+    put(out[m : 2 * m], workspace.rate[:m])
+    put(before, status)
     ground = speed_rate(t, p)
     fall, resting = np.empty(n), np.zeros(n, np.bool_)
     w.friction[:] = 0.0

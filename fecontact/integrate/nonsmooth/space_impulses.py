@@ -25,6 +25,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.copies import put
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.nonsmooth.problem import WITH_WORK
@@ -211,7 +212,7 @@ def put_on_ground(t, Y, closed, p, workspace):
     for i in range(m):
         for j in range(n):
             margin = max(margin, _MARGIN * abs(s.rows[j, 1, i]) * workspace.largest[i])
-    middle[:] = Y[: 2 * m]
+    put(Y[: 2 * m], middle)
     workspace.matrix[:] = 0.0
     for i in range(m):
         workspace.matrix[i, i] = 1.0

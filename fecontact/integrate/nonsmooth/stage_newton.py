@@ -29,6 +29,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.copies import put, put_rows
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import Vector
 from fecontact.core.types import Array, Integers
@@ -268,7 +269,7 @@ def _set_matrix(count, s, workspace):
     # Twice, because loops over axes are written out where their number is known.
     if d == 2 or d == 3:
         _set_gradients(count, s, workspace)
-    whole[:] = workspace.linear
+    put_rows(workspace.linear, whole)
     if m > _FEW and count > 0:
         size = count * d
         whole += np.dot(active[:count].reshape((size, m)).T,
@@ -358,7 +359,7 @@ def solve_stage(stage, p, hold, limits, finest, workspace, force):
                 return True
             if creep < math.inf:
                 # The creep belongs to the old multiplier and must not count again with the new.
-                hold.multiplier[:] = force
+                put(force, hold.multiplier)
                 turning = KEPT
         elif turning == FREE:
             _shorten(stage, moved, p, hold, downhill, workspace, force)

@@ -13,6 +13,7 @@ import math
 from typing import NamedTuple
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.copies import put, put_rows
 from fecontact.core.dense_lu import solve
 from fecontact.integrate.bernstein import NOWHERE, first_below
 from fecontact.integrate.nonsmooth.equations import contact_powers, observe
@@ -200,7 +201,7 @@ def _fill(row, output, step, data):
         states[row, i] = (early * ((1.0 + 2.0 * x) * Y[i] + x * h * before[i - m])
                           + late * ((3.0 - 2.0 * x) * new[i] + (x - 1.0) * h * after[i - m]))
     observe(ground_motion(time, p.system), states[row], p, w.nodes)
-    output.normal[row] = w.nodes[:, FORCE]
+    put(w.nodes[:, FORCE], output.normal[row])
     for j in range(len(progress.carried)):
         output.friction[row, j] = ((1.0 - x) * progress.carried[j]
                                    + x * workspace.forces[STAGES - 1, j])
@@ -240,7 +241,7 @@ def _prepare(step, quick, p, progress, w, workspace):
         if w.nodes[j, LIMIT] > 0.0:
             softest += ROUNDING * quick / w.nodes[j, LIMIT]
         hold.grip[j] = 1.0 / softest if inertia[j] > 0.0 else 0.0
-    hold.multiplier[:] = progress.carried
+    put(progress.carried, hold.multiplier)
 
 
 @routine
@@ -267,7 +268,7 @@ def _solve_stages(step, finest, p, limits, progress, workspace):
             return k
         for i in range(m):
             accelerations[k, i] = (state[m + i] - known[i]) / g
-        workspace.hold.multiplier[:] = workspace.forces[k]
+        put(workspace.forces[k], workspace.hold.multiplier)
     return STAGES
 
 
@@ -311,12 +312,12 @@ def _set_rates(step, p, w, workspace):
 def _set_end(h, m, progress, workspace):
     """Fill ``workspace.new`` and ``workspace.after`` from the stages of an accepted step."""
     Y, rates = progress.state, workspace.rates
-    workspace.new[: 2 * m] = workspace.states[STAGES - 1]
+    put(workspace.states[STAGES - 1], workspace.new[: 2 * m])
     for i in range(rates.shape[1]):
         workspace.new[2 * m + i] = Y[2 * m + i] + h * (
             B1 * rates[0, i] + B2 * rates[1, i] + GAMMA * rates[2, i])
-    workspace.after[:m] = workspace.accelerations[STAGES - 1]
-    workspace.after[m:] = rates[STAGES - 1]
+    put(workspace.accelerations[STAGES - 1], workspace.after[:m])
+    put(rates[STAGES - 1], workspace.after[m:])
 
 
 @routine
@@ -337,7 +338,7 @@ def _attempt(step, last, smallest, data):
     length, slowest = step.h, tries[SLOWEST]
     moved = ground_motion(step.t, p.system)
     observe(moved, Y, p, w.nodes)
-    workspace.old[:] = w.nodes
+    put_rows(w.nodes, workspace.old)
     quick = largest[SLIP_SIZE] + _fastest_side(moved, p)
     _prepare(step, quick, p, progress, w, workspace)
     finest = (1e-2 * limits.rtol + 1e-11) * max(slowest, quick)
@@ -357,8 +358,8 @@ def _attempt(step, last, smallest, data):
         return FAILED, length * max(factor, 0.02)
     _set_rates(step, p, w, workspace)
     if counts[KNOWN] == 0:
-        workspace.before[:m] = workspace.accelerations[0]
-        workspace.before[m:] = workspace.rates[0]
+        put(workspace.accelerations[0], workspace.before[:m])
+        put(workspace.rates[0], workspace.before[m:])
     if counts[CUTS] < MOST_CUTS:
         part = _passed_over(step, p, limits, limits.rtol * (slowest + quick), w, workspace)
         if part * length > smallest and part < 1.0:
@@ -376,7 +377,7 @@ def _attempt(step, last, smallest, data):
         largest[SLIP_SIZE] = max(largest[SLIP_SIZE], slip)
     _set_end(length, m, progress, workspace)
     if counts[STEPS] == 0:
-        progress.carried[:] = workspace.forces[0]
+        put(workspace.forces[0], progress.carried)
     tries[IN_A_ROW], counts[CUTS] = 0.0, 0
     if length > _SHORT * limits.longest:
         tries[UNSOLVED] = 0.0
@@ -390,10 +391,10 @@ def _attempt(step, last, smallest, data):
 def _go_on(step, h, data):
     """Make the end of the step the state of the run."""
     progress, workspace = data.progress, data.workspace
-    progress.state[:] = workspace.new
-    workspace.before[:] = workspace.after
-    progress.carried[:] = workspace.forces[STAGES - 1]
-    workspace.sides[:] = workspace.hold.side
+    put(workspace.new, progress.state)
+    put(workspace.after, workspace.before)
+    put(workspace.forces[STAGES - 1], progress.carried)
+    put(workspace.hold.side, workspace.sides)
     progress.counts[KNOWN] = 0 if step.at_break else 1
     if step.at_break:
         pass_break(step, data.problem, progress, data.output)

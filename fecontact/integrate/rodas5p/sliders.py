@@ -17,6 +17,7 @@ import numpy as np
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law, helper, routine
+from fecontact.core.copies import put
 from fecontact.core.records import Matrix, Vector
 from fecontact.core.simd.vectors import opposite, select
 from fecontact.integrate.brackets import Bracket, between, narrowed
@@ -476,7 +477,7 @@ def _switch(step, problem, progress, workspace, vary):
         now, last, older = found[look % 3], found[(look + 2) % 3], found[(look + 1) % 3]
         _examine(look, near, view, now)
         if look == 0:
-            starts[:] = now
+            put(now, starts)
             continue
         for j in range(n):
             if control.slider_counts[j] > 0 and _begins(last[j], now[j]):

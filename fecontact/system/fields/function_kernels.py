@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, kernel
+from fecontact.core.copies import put
 from fecontact.core.records import (
     Block,
     ComplexMatrix,
@@ -315,7 +316,7 @@ def complex_steps(
     d, k = x.shape[1], len(p)
     y, q = workspace.y, workspace.q
     z, w, out = complex_workspace[0, :d], complex_workspace[1, :k], complex_workspace[2, :d]
-    q[:] = p
+    put(p, q)
     for a in range(k):
         w[a] = p[a]
     wrong[:] = 0
@@ -347,7 +348,7 @@ def differences(address: int, places: Places, workspace: Workspace, J: Block, P:
     t, x, p, active, best = places.t, places.x, places.p, places.active, workspace.best
     d = x.shape[1]
     y, q = workspace.y, workspace.q
-    q[:] = p
+    put(p, q)
     for n in range(len(t)):
         place = Place(t[n], y, q, places.f[n])
         for i in range(d):
@@ -374,7 +375,7 @@ def central_differences(
     t, x, p, active = places.t, places.x, places.p, places.active
     d = x.shape[1]
     y, above, below = beside[0], beside[1], beside[2]
-    q[:] = p
+    put(p, q)
     for n in range(len(t)):
         for i in range(d):
             y[i] = x[n, i]

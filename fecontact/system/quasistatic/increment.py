@@ -21,6 +21,7 @@ import math
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel
+from fecontact.core.copies import put, put_rows
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import Vector
 from fecontact.system.node_forces import normal_gradients, tangent_force
@@ -208,11 +209,12 @@ def evaluate(
     for i in range(m):
         terms += workspace.before[i] ** 2 / workspace.scale[i]
     if derive:
-        workspace.matrix[:] = s.stiffness
+        put_rows(s.stiffness, workspace.matrix)
         if has_polynomial(s):
             add_polynomial_stiffness(1.0, gradient, s, workspace.matrix)
-        workspace.matrix[:] += np.dot(s.rows.reshape((n * d, m)).T,
-                                      workspace.flexibility.reshape((n * d, m)))
+        matrix = workspace.matrix
+        matrix += np.dot(s.rows.reshape((n * d, m)).T,
+                         workspace.flexibility.reshape((n * d, m)))
     return np.sqrt(terms)
 
 
@@ -238,7 +240,7 @@ def _balanced(size, terms, part, workspace):
 def _step(q, workspace):
     """Take the Newton step of the matrix, in place; False where nothing resists some motion."""
     m = len(q)
-    workspace.step[:] = workspace.residual
+    put(workspace.residual, workspace.step)
     factorise(workspace.matrix, m, workspace.pivots)
     for i in range(m):
         # The diagonal holds the inverse pivots.
@@ -258,7 +260,7 @@ def _hasty_newton(load, moved, sliders, s, pose, workspace):
     reversal all of them are at their limits, and rounding decides which of them count as sliding.
     """
     q, last = pose.q, np.inf
-    workspace.start[:] = q
+    put(q, workspace.start)
     for _ in range(_HASTY):
         terms = evaluate(load, moved, sliders, s, pose, workspace, 1)
         size = _size(workspace)
@@ -268,7 +270,7 @@ def _hasty_newton(load, moved, sliders, s, pose, workspace):
         if not np.isfinite(size) or not _step(q, workspace):
             break
         last = size
-    q[:] = workspace.start
+    put(workspace.start, q)
     return False
 
 

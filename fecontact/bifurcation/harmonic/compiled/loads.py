@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import kernel
+from fecontact.core.copies import put, put_rows
 from fecontact.core.records import Array4, Block, Matrix, Vector
 from fecontact.system.kernels import prescribed_at
 from fecontact.system.node_forces import axis_force, force_workspace, node_forces
@@ -40,10 +41,10 @@ def forces_at_rest(
             affine.flat[k] = affine.base[k] + places[place] * affine.slope[k]
         for c in range(len(tau)):
             moved = prescribed_at(tau[c] * periods[place], s, load)
-            loads[place, c] = load
+            put(load, loads[place, c])
             if place + 1 < len(places):
                 continue
-            rest[c] = load
+            put(load, rest[c])
             for j in range(n):
                 node = node_forces(j, node_motion(j, still, s), moved, memory_of(j, still, s), s,
                                    force, rates)
@@ -51,4 +52,5 @@ def forces_at_rest(
                     push = axis_force(axis, node, force, rates, s)
                     for i in range(m):
                         rest[c, i] += s.rows[j, axis, i] * push
-        matrices[place, 0], matrices[place, 1] = s.stiffness, s.damping
+        put_rows(s.stiffness, matrices[place, 0])
+        put_rows(s.damping, matrices[place, 1])

@@ -8,6 +8,7 @@ searched again, and finally examined where the margin is smallest.
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.copies import put
 from fecontact.integrate.bernstein import NOWHERE, fit
 from fecontact.integrate.nonsmooth.dop853 import interpolate
 from fecontact.integrate.nonsmooth.equations import set_limits
@@ -161,7 +162,7 @@ def first_let_go(end, step, p, progress, w, workspace):
         for i in range(QUARTERS + 1):
             here = begin + width * i / QUARTERS
             if known and (here == 0.0 or here == 1.0):
-                left[i, :] = workspace.ends[int(here)]
+                put(workspace.ends[int(here)], left[i])
             else:
                 _forces(here, step, p, progress, w, workspace, left[i])
             for r in range(len(size)):
