@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from fecontact.core.compiled import helper, kernel
+from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.copies import put, put_rows
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import Vector
@@ -236,7 +236,7 @@ def _balanced(size, terms, part, workspace):
     return size <= part * terms and size <= _WRONG * np.sqrt(acting)
 
 
-@helper
+@routine
 def _step(q, workspace):
     """Take the Newton step of the matrix, in place; False where nothing resists some motion."""
     m = len(q)
@@ -252,7 +252,7 @@ def _step(q, workspace):
     return True
 
 
-@helper
+@routine
 def _hasty_newton(load, moved, sliders, s, pose, workspace):
     """Newton's method in full steps; whether it succeeded, else the pose is as before.
 
@@ -274,7 +274,7 @@ def _hasty_newton(load, moved, sliders, s, pose, workspace):
     return False
 
 
-@helper
+@routine
 def _newton(load, moved, sliders, s, pose, workspace):
     """Newton's method with a shift that grows after failed steps; whether it succeeded."""
     if _hasty_newton(load, moved, sliders, s, pose, workspace):

@@ -30,7 +30,7 @@ from fecontact.bifurcation.harmonic.elements import (
 from fecontact.bifurcation.harmonic.memory import LEAK, difference, march, solve_around
 from fecontact.bifurcation.harmonic.series import fill_blocks
 from fecontact.core.addresses import function_at
-from fecontact.core.compiled import helper, kernel
+from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.records import Vector
 from fecontact.system.jacobian import batch_derivatives, batch_rates
 
@@ -173,7 +173,7 @@ def _add_friction(e):
                     workspace.f[n, m + i] -= factor * friction[n]
 
 
-@helper
+@routine
 def _friction_of_elements(u, T, derivatives, e):
     """Find and add the friction of elements; 0 if they do not repeat."""
     e.numbers[TIMED] = _follow(u, T, derivatives, e, e.workspace.friction[0], e.workspace.z)
@@ -245,7 +245,7 @@ def _take_rows(s, e):
                     row[n] = workspace.J[n, m + workspace.order[i], part * m + workspace.order[j]]
 
 
-@helper
+@routine
 def _harmonics_of_derivatives(T, s, e):
     """Fill the derivatives of the balance of s coupled modes to their coefficients, z held.
 
@@ -285,7 +285,7 @@ def _harmonics_of_derivatives(T, s, e):
                     square[k + 1, i, k, j] -= turn * workspace.linear[1, a, b]
 
 
-@helper
+@routine
 def _by_parameter(u, T, e):
     """Fill as :func:`_by_differences`, if forces depend on the parameter by speeds alone."""
     workspace = e.workspace
@@ -338,7 +338,7 @@ def _step_of(p, central):
     return h, 2.0 * h if central else h
 
 
-@helper
+@routine
 def _by_differences(u, central, e, followed):
     """Fill ``column``, and the last columns of ``followed``, by differences.
 
@@ -378,7 +378,7 @@ def _by_differences(u, central, e, followed):
     take_parameter(p, e)
 
 
-@helper
+@routine
 def _add_memory(T, e):
     """Add what internal variables contribute to ``condensed`` (n, n + 1) and ``column``.
 
@@ -431,7 +431,7 @@ def _add_memory(T, e):
                 workspace.column[q * m + j] -= e.projection[q, k] * workspace.forces[k, j, n]
 
 
-@helper
+@routine
 def _add_by_elements(u, T, central, e):
     """Add what elements that are followed one by one contribute to ``square`` and ``column``.
 
