@@ -229,10 +229,12 @@ class _Part(CPUDispatcher):
         """Compile for a signature, unless that is done.
 
         Numba does the same, and tells each function under way, of which there are many at a time,
-        about every lock: a part takes no time of its own that anybody asks for.
+        about every lock: a part takes no time of its own that anybody asks for. A constant that is
+        given has the type of other numbers here, so that nothing is compiled for it alone.
         """
-        arguments, result = sigutils.normalize_signature(sig)
-        found = self.overloads.get(tuple(arguments))
+        given, result = sigutils.normalize_signature(sig)
+        arguments = tuple(map(types.unliteral, given))
+        found = self.overloads.get(arguments)
         if found is None:
             found = self._compiler.compile(arguments, result)
             self.add_overload(found)
