@@ -6,8 +6,6 @@ A method is a list of compiled functions of its own data. The loop is compiled f
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from fecontact.core.compiled import helper, kernel
 
 # How a call of the loop ended.
@@ -184,8 +182,7 @@ def step_loop(method: Method, constants: str = "") -> Any:
                 return status
         t, h = numbers[TIME], numbers[STEP]
         resume(t, data)
-        # A literal would be a type of its own, for which attempts would be compiled again.
-        last, attempts = np.int64(TAKEN), 0
+        last, attempts = TAKEN, 0
         while counts[OUTPUTS] < len(times):
             # A step that failed is repeated before the call returns: derivatives are not kept.
             if last == TAKEN and (attempts >= most or full(data) or crowded(data)):

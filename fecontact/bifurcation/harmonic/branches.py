@@ -245,7 +245,9 @@ def _error_of_some(
     problem: HarmonicProblem, points: Sequence[BranchPoint], allowed: float
 ) -> float:
     """The largest error from few samples at some points of a branch."""
-    largest = int(np.argmax([_size(problem, np.asarray(point.u)) for point in points]))
+    # Static deflections do not slip.
+    moving = problem.reference.shape[1]
+    largest = int(np.argmax([_size(problem, np.asarray(point.u), moving) for point in points]))
     first, others = _examined(points, largest)
     error = _largest_error(problem, first, points)
     return error if error <= _FAR * allowed else max(
