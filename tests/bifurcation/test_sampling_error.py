@@ -276,6 +276,18 @@ def test_some_points_of_a_branch_are_examined_first_and_up_to_24_in_doubt(count)
     assert (steps == steps[:1]).all()
 
 
+def test_the_largest_motion_is_examined_not_the_largest_deflection(monkeypatch):
+    problem, u = orbit(jenkins(1.1), 1, 64)
+    deflected, moving = u.copy(), 1.01 * u
+    deflected[0] += 100.0 * np.abs(u).max()
+    points = [SimpleNamespace(kind=None, u=at) for at in [u] * 6 + [deflected, moving] + [u] * 16]
+    examined = []
+    monkeypatch.setattr(branches, "_largest_error", lambda problem, some, points: (
+        examined.extend(some) or 0.0))
+    branches._error_of_some(problem, points, 1.0)
+    assert any(point.u is moving for point in examined)
+
+
 def response_of_jenkins(lowest, highest):
     return frequency_response(
         jenkins_system(), (lowest / TURN, highest / TURN),

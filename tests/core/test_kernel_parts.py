@@ -338,3 +338,21 @@ def test_flags_are_equal_where_numba_says_so():
     plain.fastmath = False
     assert own == plain
     assert plain == own
+
+
+def test_a_part_is_compiled_once_for_constants_and_other_numbers():
+    """A constant, another one and a counter are the same type of argument."""
+
+    @routine
+    def scaled(x, k):
+        return (k + 2) * x
+
+    def summed(x):
+        total = scaled(x, 0) + scaled(x, 1)
+        for k in range(2):
+            total += scaled(x, k)
+        return total
+
+    summed.__annotations__ = {"x": float, "return": float}
+    assert kernel(summed)(1.5) == 2.0 * (2 + 3) * 1.5
+    assert len(scaled.overloads) == 1
