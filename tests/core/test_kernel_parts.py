@@ -347,6 +347,10 @@ def test_a_part_is_compiled_once_for_constants_and_other_numbers():
     def scaled(x, k):
         return (k + 2) * x
 
+    for k in (types.literal(0), types.literal(1), types.int64):
+        scaled.compile((types.float64, k))
+    assert list(scaled.overloads) == [(types.float64, types.int64)]
+
     def summed(x):
         total = scaled(x, 0) + scaled(x, 1)
         for k in range(2):
@@ -355,4 +359,3 @@ def test_a_part_is_compiled_once_for_constants_and_other_numbers():
 
     summed.__annotations__ = {"x": float, "return": float}
     assert kernel(summed)(1.5) == 2.0 * (2 + 3) * 1.5
-    assert len(scaled.overloads) == 1
