@@ -10,8 +10,7 @@ import fecontact as fc
 from fecontact.bifurcation import HarmonicBalance, contact_field, frequency_response
 from fecontact.bifurcation.fields.contact_field import field_between
 from fecontact.bifurcation.harmonic.compiled.arrays import RESTS
-from fecontact.bifurcation.harmonic.starts import problem_for
-from fecontact.bifurcation.harmonic.timing import timing_of
+from fecontact.bifurcation.harmonic.starts import problem_for, timing_of
 from fecontact.laws import (
     BilateralPolynomial,
     ConstantFriction,

@@ -22,8 +22,7 @@ from fecontact.bifurcation.harmonic.compiled.arrays import RESTS
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.compiled.step_batches import StepBatches
 from fecontact.bifurcation.harmonic.problem import CompiledLinearisation, HarmonicProblem
-from fecontact.bifurcation.harmonic.starts import problem_for, restored
-from fecontact.bifurcation.harmonic.timing import timing_of
+from fecontact.bifurcation.harmonic.starts import problem_for, restored, timing_of
 from fecontact.laws import (
     ConstantFriction,
     JenkinsFriction,

@@ -76,7 +76,7 @@ class Balance(OrbitUnknowns):
         Product of the period of the forcing and the parameter, where this is a frequency.
     fixed : float, optional
         Period of the forcing [s] where the parameter does not change it; see
-        :func:`fecontact.bifurcation.harmonic.timing.timing_of`.
+        :func:`fecontact.bifurcation.harmonic.starts.timing_of`.
     kept : Kept
         Deflections of elements that never slide.
     compiled : CompiledBalance, optional

@@ -1,4 +1,4 @@
-"""Forced orbits to start responses from: from rest, at a raised level, from a run."""
+"""Forces that excite systems, and orbits from which responses start: from rest or a run."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -19,13 +19,15 @@ from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.stalled import NO_WAVE
 from fecontact.bifurcation.orbits.from_run import periodic_motion
 from fecontact.core.errors import AnalysisError, FecontactError, InputError
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ComplexArray
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.model_limits import unresisted_motion
 from fecontact.system.statics.equilibrium import equilibrium_coordinates
 
 # Part of a level, or of the excitation, from which it is raised.
 _FIRST = 1e-3
+# Samples a period of given forces.
+_SAMPLES = 32
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,3 +225,26 @@ def _taken(wanted: Forced, states: Array) -> tuple[HarmonicProblem, Array]:
     sampled = np.stack([np.interp(problem.series.times, phases, column) for column in states.T],
                        axis=1)
     return _scaled(*starts.converged_orbit(problem, starts.unknowns(problem, sampled, 0.0)))
+
+
+def given_force(field: ContactField, values: Array, state: Array, period: float) -> ComplexArray:
+    """Harmonic P (m,) of the modal forces in time, ``f = Re(P exp(i w t))``, at a state (d,)."""
+    m = field.system().basis.modes
+    phases = np.arange(_SAMPLES) / _SAMPLES
+    rates = field.rates(phases * period, np.tile(state, (_SAMPLES, 1)), values)[:, m : 2 * m]
+    return np.asarray(2.0 / _SAMPLES * np.exp(-2.0j * np.pi * phases) @ rates)
+
+
+def require_excitation(field: ContactField, values: Array) -> float:
+    """Period [s] of the excitation.
+
+    Raises
+    ------
+    InputError
+        If nothing excites the system with a period.
+    """
+    period = field.forcing_period(values)
+    if period is None or not np.isfinite(period):
+        raise InputError("Nothing excites the system with a period; give it a harmonic drive or "
+                         "load.")
+    return period

@@ -261,14 +261,18 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
         """Period, stability, the errors of the truncation and the extremes of the states."""
-        known = {} if self.stability is None else {
-            name: [value] for name, value in linearisation.floquet.stored.items()}
+        known = dict(self._stability(linearisation))
         if self.waves is not None:
-            known |= {name: [error] for name, error in zip(
-                ERRORS, linearisation.neglected, strict=True)}
+            known |= zip(ERRORS, linearisation.neglected, strict=True)
         forces, mean = linearisation._samples()
         return self.stored(u[None], linearisation.memory[None], forces[None], mean[None],
-                           self.scales[None, self.layout.columns], known)[0]
+                           self.scales[None, self.layout.columns],
+                           {name: [value] for name, value in known.items()})[0]
+
+    def _stability(self, linearisation: Any) -> dict[str, Any]:
+        """Values of stability to store, if it is known."""
+        found: dict[str, Any] = {} if self.stability is None else linearisation.floquet.stored
+        return found
 
     def stored(
         self, u: Array, z: Array, forces: Array, mean: Array, sizes: Array, known: dict[str, Any]

@@ -29,12 +29,12 @@ from fecontact.bifurcation.fields.contact_field import (
 from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches
 from fecontact.bifurcation.harmonic.engine_order import WaveField
+from fecontact.bifurcation.harmonic.estimates import (
+    observed_of_series,
+)
 from fecontact.bifurcation.harmonic.forced_starts import Forced, start_of
 from fecontact.bifurcation.harmonic.layout import Layout, layout_from, layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
-from fecontact.bifurcation.harmonic.observed import (
-    observed_of_series,
-)
 from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.orbit_methods import Method
 from fecontact.bifurcation.orbits.branches import orbit_branch

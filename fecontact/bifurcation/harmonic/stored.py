@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.harmonic import estimates
+from fecontact.bifurcation.harmonic.estimates import OBSERVED, observed_of_orbits
 from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients
-from fecontact.bifurcation.harmonic.observed import OBSERVED, observed_of_orbits
 from fecontact.core.read_only import read_only
 from fecontact.core.types import Array
 

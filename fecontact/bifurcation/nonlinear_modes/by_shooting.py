@@ -10,13 +10,14 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.harmonic.estimates import observed_values
 from fecontact.bifurcation.harmonic.layout import Layout
 from fecontact.bifurcation.harmonic.series import real_coefficients
 from fecontact.bifurcation.nonlinear_modes.linear_start import XI, LinearStart
 from fecontact.bifurcation.nonlinear_modes.mode_problem import (
     AlongMode,
-    motion_values,
-    none_grows,
+    known_stability,
+    mean_square_velocity,
 )
 from fecontact.bifurcation.orbit_methods import Shooting
 from fecontact.bifurcation.orbits.shooting import ShootingProblem
@@ -55,12 +56,11 @@ class ShootingMode(AlongMode, ShootingProblem):
         H = min(_HARMONICS, len(samples) // 2 - 1)
         waves = 2.0 / len(samples) * np.fft.rfft(samples[:, :m], axis=0)[: H + 1]
         waves[0] *= 0.5
-        kept = {name: found[name] for name in ("mesh", "minimum", "maximum")}
-        if self.conservative:
-            multipliers = found["multipliers"]
-            kept |= {"multipliers": multipliers, "stable": none_grows(multipliers, 1),
-                     "trivial_error": found["trivial_error"]}
-        return kept | motion_values(Layout(d, m), real_coefficients(waves), T, self.row)
+        layout, X = Layout(d, m), real_coefficients(waves)
+        return {**{name: found[name] for name in ("mesh", "minimum", "maximum")},
+                **(known_stability(found, 1) if self.conservative else {}), "period": T,
+                "mean_square_velocity": mean_square_velocity(layout, X, T),
+                **observed_values(layout, X, T, self.row)}
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """None."""

@@ -1,5 +1,6 @@
 """Continuation problem of a nonlinear mode: periodic motion under negative damping."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -10,13 +11,11 @@ from fecontact.bifurcation.continuation.problem import ContinuationOptions
 from fecontact.bifurcation.continuation.rounding import NoFolds, Rounding
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.layout import Layout
-from fecontact.bifurcation.harmonic.observed import observed_values
 from fecontact.bifurcation.harmonic.problem import HarmonicLinearisation, HarmonicProblem
 from fecontact.bifurcation.harmonic.series import differentiated
-from fecontact.bifurcation.harmonic.stored import ERRORS
 from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns
 from fecontact.core.errors import AnalysisError
-from fecontact.core.types import Array, ComplexArray
+from fecontact.core.types import Array
 
 # Relative size of Newton steps that is rounding where elements stick: only the leak of memory holds
 # their mean deflection, and so the mean of bodies that little else holds.
@@ -94,8 +93,6 @@ class ModeProblem(AlongMode, HarmonicProblem):
 
     Attributes
     ----------
-    row : (d,) array
-        Row of the observed displacement.
     conservative : bool
         Whether xi is zero within rounding where the mode begins, and no friction has memory.
     loose : (r, m) array
@@ -104,7 +101,6 @@ class ModeProblem(AlongMode, HarmonicProblem):
         Displacements at rest, where the means of these stay.
     """
 
-    row: Array = field(default_factory=lambda: np.zeros(0))
     conservative: bool = False
     loose: Array = field(default_factory=lambda: np.zeros((0, 0)))
     home: Array = field(default_factory=lambda: np.zeros(0))
@@ -155,20 +151,18 @@ class ModeProblem(AlongMode, HarmonicProblem):
         return guess
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
-        """Period, velocities, truncation errors, and what is observed."""
+        """Values of an orbit, and the mean square of the velocities."""
         T, X = self.period(u), self.coefficients(u)
-        found = motion_values(self.layout, X, T, self.row)
-        if self.waves is not None:
-            found["mean_square_velocity"] = self.waves.mean_square_velocity(
-                X, linearisation.free_balance, T, float(u[-1]), self.harmonics_kept)
-        found |= dict(zip(ERRORS, linearisation.neglected, strict=True))
-        if self.conservative and self.stability is not None:
-            floquet = linearisation.floquet
-            found |= {"multipliers": floquet.multipliers, "stable": none_grows(
-                floquet.multipliers, 1 + len(self.loose)), "trivial_error": floquet.trivial_error}
-        if self.layout.memory:
-            found["memory"] = linearisation.memory
-        return found
+        square = (mean_square_velocity(self.layout, X, T) if self.waves is None
+                  else self.waves.mean_square_velocity(
+                      X, linearisation.free_balance, T, float(u[-1]), self.harmonics_kept))
+        return {**super().point(u, linearisation, tangent), "mean_square_velocity": square}
+
+    def _stability(self, linearisation: Any) -> dict[str, Any]:
+        """Stability of conservative motions alone, for which multipliers of one count as stable."""
+        if not self.conservative or self.stability is None:
+            return {}
+        return known_stability(linearisation.floquet.stored, 1 + len(self.loose))
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """A function that is zero at branch points, 1 / |M^-1 b| with the sign of det M.
@@ -194,22 +188,22 @@ class ModeProblem(AlongMode, HarmonicProblem):
         return {}
 
 
-def motion_values(layout: Layout, X: Array, period: float, row: Array) -> dict[str, Any]:
-    """Values to store of a motion with coefficients X (2 H + 1, b).
+def mean_square_velocity(layout: Layout, X: Array, period: float) -> float:
+    """Mean of q'^T q' over a period from coefficients X (2 H + 1, b); NaN without displacements.
 
-    'period', 'mean_square_velocity' of the displacements (NaN without any), and what is observed.
+    Of mass-normalised modes it is twice the mean kinetic energy.
     """
     m = layout.displacements
-    # Of mass-normalised modes: twice the mean kinetic energy.
-    square = 0.5 * float((differentiated(X[:, :m] / period) ** 2).sum()) if m else np.nan
-    return {"period": period, "mean_square_velocity": square,
-            **observed_values(layout, X, period, row)}
+    return 0.5 * float((differentiated(X[:, :m] / period) ** 2).sum()) if m else np.nan
 
 
-def none_grows(multipliers: ComplexArray, pairs: int) -> bool:
-    """Whether no multiplier (d,) lies outside the unit circle, except double ones at one.
+def known_stability(stored: Mapping[str, Any], pairs: int) -> dict[str, Any]:
+    """Stability to store of a conservative motion, from what an orbit stores.
 
+    It is stable if no multiplier lies outside the unit circle, except so many ``pairs`` at one.
     They belong to phase and amplitude, and to rigid motions; rounding parts them.
     """
+    multipliers = stored["multipliers"]
     rest = multipliers[np.argsort(np.abs(multipliers - 1.0))[2 * pairs :]]
-    return bool(np.abs(rest).max(initial=0.0) <= 1.0 + _GROWS)
+    return {"multipliers": multipliers, "trivial_error": stored["trivial_error"],
+            "stable": bool(np.abs(rest).max(initial=0.0) <= 1.0 + _GROWS)}

@@ -35,8 +35,8 @@ from fecontact.bifurcation.continuation.predictor import BENT
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem, width_of
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic import starts
-from fecontact.bifurcation.harmonic.forced_starts import Forced, rest_state
-from fecontact.bifurcation.harmonic.observed import observed_values
+from fecontact.bifurcation.harmonic.estimates import observed_values
+from fecontact.bifurcation.harmonic.forced_starts import Forced, given_force, rest_state
 from fecontact.bifurcation.harmonic.problem import (
     HarmonicLinearisation,
     HarmonicProblem,
@@ -44,7 +44,6 @@ from fecontact.bifurcation.harmonic.problem import (
 )
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated, uniform_basis
 from fecontact.bifurcation.harmonic.woodbury import BorderedEquations
-from fecontact.bifurcation.nonlinear_modes.given_force import given_force
 from fecontact.bifurcation.orbits.unknowns import by_differences
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
@@ -65,13 +64,11 @@ class PeakProblem(Problem):
     Attributes
     ----------
     orbit : HarmonicProblem
-        Orbits over the frequency, or another parameter p.
+        Orbits over the frequency, or another parameter p, with the row of what is observed.
     second : int
         Index of the parameter.
     width : float
         Its scale in the step length.
-    row : (d,) array
-        Row of the observed displacement.
     condition : str
         'amplitude', 'phase' or 'held'.
     border : (n + 1,) array
@@ -89,7 +86,6 @@ class PeakProblem(Problem):
     orbit: HarmonicProblem
     second: int
     width: float
-    row: Array
     condition: str
     border: Array
     rest: Array
@@ -141,29 +137,19 @@ class PeakProblem(Problem):
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, truncation error, what is observed, and its change along the curve."""
         orbit, inner = linearisation.orbit, linearisation.inner
-        X, T = orbit.coefficients(u[:-1]), orbit.period(u[:-1])
-        error, residual = inner.neglected
-        found = observed_values(orbit.layout, X, T, self.row)
-        low, high = orbit.extremes(u[:-1], inner.memory)
-        known: dict[str, Any] = {"period": T}
+        found = {**orbit.point(u[:-1], inner, tangent[:-1])}
+        # Steps need not explain its changes: multipliers that pass one are no folds of the curve.
+        found.pop("unstable", None)
         if self.condition == HELD:
-            known[list(orbit.field.parameters)[orbit.free]] = float(u[-2])
-        else:
-            rate = float(linearisation.gradient @ tangent[:-1]) / found["observed_amplitude"]
-            known |= {"frequency_hz": orbit.periods / T, "amplitude_rate": rate}
-        if orbit.stability is not None:
-            known |= {"stable": inner.floquet.stable, "multipliers": inner.floquet.multipliers}
-        return {**known, "truncation_error": error, "residual": residual, "minimum": low,
-                "maximum": high, **found,
-                **({"memory": inner.memory} if orbit.layout.memory else {})}
+            return found | {list(orbit.field.parameters)[orbit.free]: float(u[-2])}
+        return found | {"frequency_hz": orbit.periods / inner.period,
+                        "amplitude_rate": linearisation.amplitude_rate(tangent)}
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """The change of the amplitude along the curve, zero at extrema, unless it is held."""
         if self.condition == HELD:
             return {}
-        X, T = self.orbit.coefficients(u[:-1]), linearisation.inner.period
-        amplitude = observed_values(self.orbit.layout, X, T, self.row)["observed_amplitude"]
-        return {"extremum": float(linearisation.gradient @ tangent[:-1]) / amplitude}
+        return {"extremum": linearisation.amplitude_rate(tangent)}
 
 
 def problem_at(
@@ -172,9 +158,9 @@ def problem_at(
 ) -> tuple[PeakProblem, Array]:
     """Problem and unknowns at a point of a response; see :class:`PeakProblem`."""
     orbit, u, tangent = starts.restored(wanted.field, point)
-    orbit = replace(orbit, stability=wanted.method.stability)
+    orbit = replace(orbit, stability=wanted.method.stability, row=row)
     value = float(wanted.values[second])
-    problem = PeakProblem(orbit, second, width_of(None, wanted.options, value), row, condition,
+    problem = PeakProblem(orbit, second, width_of(None, wanted.options, value), condition,
                           orbit.weights() * tangent, rest_state(wanted.field, wanted.values),
                           amplitude, lag=lag)
     return problem, np.append(u, value)
@@ -211,23 +197,19 @@ class PeakLinearised(BorderedEquations):
         return self._gradient(self.u[:-1])
 
     def _gradient(self, y: Array) -> Array:
-        orbit, row = self.orbit, self.problem.row
-        X, by_column = orbit.coefficients(y), row[orbit.layout.columns]
+        orbit = self.orbit
+        X, by_column = orbit.coefficients(y), self._row[orbit.layout.columns]
         x = X @ by_column
         ends = np.array([_extreme(-x), _extreme(x)])
         low, high = basis_at(ends, orbit.harmonics)
         return np.append(np.outer(0.5 * (high - low), by_column).reshape(-1), 0.0)
 
     @cached_property
-    def _bordered(self) -> Array:
-        return np.vstack([self.inner.condensed, self.problem.border])
-
-    @cached_property
     def along(self) -> Array:
         """Direction (n + 1,) of the response."""
-        unit = np.zeros(len(self._bordered))
+        unit = np.zeros(len(self.u) - 1)
         unit[-1] = 1.0
-        return np.asarray(np.linalg.solve(self._bordered, unit))
+        return self.inner.solve(self.problem.border, unit)
 
     @cached_property
     def force_row(self) -> Array:
@@ -258,9 +240,18 @@ class PeakLinearised(BorderedEquations):
 
     def _amplitude(self, y: Array) -> float:
         orbit = self.orbit
-        found = observed_values(orbit.layout, orbit.coefficients(y), orbit.period(y),
-                                self.problem.row)
+        found = observed_values(orbit.layout, orbit.coefficients(y), orbit.period(y), self._row)
         return float(found["observed_amplitude"])
+
+    def amplitude_rate(self, tangent: Array) -> float:
+        """Relative change of the observed amplitude along a direction (n + 2,)."""
+        return float(self.gradient @ tangent[:-1]) / self._amplitude(self.u[:-1])
+
+    @property
+    def _row(self) -> Array:
+        """Row (d,) of the observed displacement."""
+        assert self.orbit.row is not None
+        return self.orbit.row
 
     @cached_property
     def _sides(self) -> list[Array]:
@@ -279,13 +270,10 @@ class PeakLinearised(BorderedEquations):
         """Derivative (n + 2,) of the condition by both sides, whose orbits follow the border."""
         slopes = []
         for y in self._sides:
-            gradient = self._gradient(y)
-            right = np.zeros((len(y), 2))
-            right[-1, 0], right[:-1, 1] = 1.0, -self._by_parameter(y)
-            moved = np.linalg.solve(
-                np.vstack([self.orbit.linearise(y).condensed, self.problem.border]), right)
-            slopes.append(gradient @ moved)
-        along, by_parameter = (slopes[1] - slopes[0]) / (2.0 * self.problem.window)
+            gradient, at = self._gradient(y), self.orbit.linearise(y)
+            right = np.eye(len(y))[-1], np.append(-self._by_parameter(y), 0.0)
+            slopes.append([gradient @ at.solve(self.problem.border, one) for one in right])
+        along, by_parameter = np.diff(slopes, axis=0)[0] / (2.0 * self.problem.window)
         return np.append(along * self.problem.border, by_parameter) / self.problem.size
 
     def _by_parameter(self, y: Array) -> Array:
@@ -305,7 +293,8 @@ class PeakLinearised(BorderedEquations):
         if self.problem.window:
             return self._compared()
         y, v = self.u[:-1], self.along
-        z = np.linalg.solve(self._bordered.T, self.gradient)[:-1]
+        bordered = np.vstack([self.inner.condensed, self.problem.border])
+        z = np.linalg.solve(bordered.T, self.gradient)[:-1]
         h = _ALONG_STEP / weighted_norm(self.orbit.weights(), v)
         sides = [(self._gradient(end), self.orbit.linearise(end).condensed,
                   self._by_parameter(end)) for end in (y + h * v, y - h * v)]

@@ -12,7 +12,7 @@ from fecontact.bifurcation.continuation.problem import ContinuationOptions, opti
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
 from fecontact.bifurcation.fields.observed_row import observed_row
-from fecontact.bifurcation.harmonic.forced_starts import Forced, rest_state
+from fecontact.bifurcation.harmonic.forced_starts import Forced, given_force, rest_state
 from fecontact.bifurcation.harmonic.layout import layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.response import (
@@ -21,7 +21,6 @@ from fecontact.bifurcation.harmonic.response import (
     observed_amplitudes,
     preloaded,
 )
-from fecontact.bifurcation.nonlinear_modes.given_force import given_force
 from fecontact.bifurcation.nonlinear_modes.peak_problem import PeakProblem, followed, problem_at
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError, require_choice

@@ -7,15 +7,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.harmonic.estimates import peaks
-from fecontact.bifurcation.harmonic.layout import balanced
-from fecontact.bifurcation.harmonic.method import HarmonicBalance
-from fecontact.bifurcation.harmonic.observed import (
+from fecontact.bifurcation.harmonic.estimates import (
     OBSERVED,
     OBSERVED_HARMONICS,
     OBSERVED_SAMPLES,
     observed_of_series,
+    peaks,
 )
+from fecontact.bifurcation.harmonic.layout import balanced
+from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.orbit_methods import Collocation, Shooting
 from fecontact.bifurcation.orbits.mesh import extremes, interpolate
 from fecontact.bifurcation.orbits.motions import (
