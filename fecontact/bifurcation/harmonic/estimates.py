@@ -12,7 +12,7 @@ from fecontact.bifurcation.harmonic.series import (
     differentiated,
     uniform_basis,
 )
-from fecontact.core.types import Array
+from fecontact.core.types import Array, ComplexArray
 
 # Points per harmonic, and at least, among which extremes are sought.
 _FINE, _LEAST_FINE = 12, 96
@@ -22,7 +22,7 @@ OBSERVED = ("observed_minimum", "observed_maximum", "observed_amplitude", "obser
 
 
 def neglected(
-    X: Array, forces: Array, mean: Array, periods: Array, sizes: Array, displacements: int,
+    X: Array, forces: Array, mean: Array, periods: Array, sizes: Array,
     orders: tuple[int, ...] | None = None,
 ) -> tuple[Array, Array]:
     """Estimates (K,) of the errors of K orbits, and of those of their equations.
@@ -45,8 +45,6 @@ def neglected(
         T [s].
     sizes : (b,) or (K, b) array
         Scales.
-    displacements : int
-        b or 0: whether X holds displacements.
     orders : tuple of int, optional
         Harmonics of the orbits where some of 0 to H are left out.
     """
@@ -60,18 +58,8 @@ def neglected(
     numbers = (np.arange(H + 1, most + 1) if orders is None
                else np.delete(np.arange(most + 1), orders))
     left = spectrum[:, numbers]
-    turns = 2.0j * np.pi / periods[:, None] * numbers
-    turned = turns[:, :, None, None]
-    mean = mean[:, None]
-    matrix = (turned**2 * np.eye(b) - mean[..., :b] - turned * mean[..., b:] if displacements
-              else turned * np.eye(b) - mean)
-    if b == 1:
-        added = left / matrix[:, :, 0]
-    else:
-        try:
-            added = np.linalg.solve(matrix, left[..., None])[..., 0]
-        except np.linalg.LinAlgError:
-            return np.full(count, np.nan), np.full(count, np.nan)
+    added = responses(left, 2.0j * np.pi / periods[:, None] * numbers, mean[:, None, :, :b],
+                      mean[:, None, :, b:])
     sizes = np.broadcast_to(sizes, (count, b))[:, None]
     kept = _norm(X[:, 1:] / sizes)
     rate_sizes = np.abs(spectrum[:, 1:]).max(axis=1, keepdims=True) + 1e-300
@@ -79,7 +67,28 @@ def neglected(
             _norm(left / rate_sizes) / _norm(spectrum[:, 1 : H + 1] / rate_sizes))
 
 
-def _norm(x: Array) -> Array:
+def responses(
+    f: ComplexArray, turns: ComplexArray, by_state: Array, by_velocity: Array
+) -> ComplexArray:
+    """Responses (..., b) of linear systems to forces f (..., b) in time; NaN at a resonance.
+
+    They are ``(D - by_state - i w by_velocity)^-1 f`` with ``turns`` (...) = i w. D is (i w)^2 for
+    the first m functions, the displacements with derivatives ``by_velocity`` (..., b, m), and i w
+    for the others.
+    """
+    b, m = by_velocity.shape[-2:]
+    turned = turns[..., None, None]
+    matrix = turned * np.eye(b) - by_state
+    matrix[..., :m] += turned * ((turned - 1.0) * np.eye(b)[:, :m] - by_velocity)
+    if b == 1:
+        return np.asarray(f / matrix[..., 0])
+    try:
+        return np.asarray(np.linalg.solve(matrix, f[..., None])[..., 0])
+    except np.linalg.LinAlgError:
+        return np.full_like(f, np.nan)
+
+
+def _norm(x: Array | ComplexArray) -> Array:
     """Norms (K,) of arrays (K, ...)."""
     return np.sqrt((np.abs(x) ** 2).sum(axis=(1, 2)))
 

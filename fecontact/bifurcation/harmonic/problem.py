@@ -88,7 +88,7 @@ class HarmonicLinearisation(Linearised):
                                            problem.harmonics_kept), np.nan
         error, residual = estimates.neglected(
             X[None], forces[None], mean[None], np.array([self.period]), sizes,
-            layout.displacements, problem.orders)
+            problem.orders)
         return float(error[0]), float(residual[0])
 
     def _samples(self) -> tuple[Array, Array]:

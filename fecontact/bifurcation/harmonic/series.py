@@ -84,17 +84,22 @@ def uniform_basis(count: int, harmonics: int) -> Array:
 
 def differentiated(X: Array) -> Array:
     """Coefficients (..., 2 H + 1, b) of dx/dtau."""
-    out, turns = np.empty_like(X), _turns(X.shape[-2] // 2)
-    out[..., 0, :] = 0.0
-    np.multiply(turns, X[..., 2::2, :], out=out[..., 1::2, :])
-    np.multiply(-turns, X[..., 1::2, :], out=out[..., 2::2, :])
-    return out
+    return turned(X, _turns(X.shape[-2] // 2))
 
 
 @cache
 def _turns(harmonics: int) -> Array:
-    """2 pi k (H, 1) of the harmonics."""
-    return np.asarray(2.0 * np.pi * np.arange(1, harmonics + 1)[:, None])
+    """2 pi k (H + 1,) of the harmonics."""
+    return np.asarray(2.0 * np.pi * np.arange(harmonics + 1))
+
+
+def turned(X: Array, turns: Array) -> Array:
+    """Coefficients (..., L, b) of sum_k turns_k (B_k cos - A_k sin); turns (K,), the mean first."""
+    out, rates = np.empty_like(X), turns[1:, None]
+    out[..., 0, :] = 0.0
+    np.multiply(rates, X[..., 2::2, :], out=out[..., 1::2, :])
+    np.multiply(-rates, X[..., 1::2, :], out=out[..., 2::2, :])
+    return out
 
 
 def rows_of(orders: tuple[int, ...] | None, harmonics: int) -> Integers:

@@ -1,6 +1,6 @@
 """Floquet multipliers of orbits by harmonic balance."""
 
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -126,10 +126,19 @@ def _floquet(problem: Balance, T: float, J: Array) -> Floquet:
         return _of_transitions(problem, T, M, J)
     for k in range(layout.states - layout.memory, layout.states):
         J[:, k, k] -= LEAK / T
-    factors, rates, nothing, widths = _workspace(N, len(points), layout.states)
-    condensation.condense(J, rates, nothing, widths, T, basis, slopes, 0, factors)
-    transitions(factors, M)
+    set_transitions(J, T, basis, slopes, M)
     return _of_transitions(problem, T, M, J)
+
+
+def set_transitions(J: Array, period: float, values: Array, slopes: Array, M: Array) -> None:
+    """Fill M (N, d, d) with the transition matrices of x' = J x over N equal parts of a period.
+
+    J (N s, d, d) is given at collocation points, where the basis has ``values`` and ``slopes``
+    (s, s + 1).
+    """
+    factors, rates, nothing, widths = _workspace(len(M), len(values), M.shape[1])
+    condensation.condense(J, rates, nothing, widths, period, values, slopes, 0, factors)
+    transitions(factors, M)
 
 
 def _of_transitions(problem: Balance, T: float, M: Array, J: Array) -> Floquet:
@@ -150,7 +159,7 @@ def _of_transitions(problem: Balance, T: float, M: Array, J: Array) -> Floquet:
     return Floquet(by_falling_modulus(found), None)
 
 
-@cache
+@lru_cache(maxsize=8)
 def _workspace(
     intervals: int, points: int, states: int
 ) -> tuple[condensation.CondensedFactors, Array, Array, Array]:

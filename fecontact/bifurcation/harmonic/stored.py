@@ -82,7 +82,7 @@ class StoredOrbits:
             return dict(zip(_EXTREMES, estimates.extremes(whole, self.z), strict=True))
         if name in ERRORS:
             found = estimates.neglected(X, self.forces, self.mean, self.periods, self.sizes,
-                                        layout.displacements, self.orders)
+                                        self.orders)
             return {each: values.tolist() for each, values in zip(ERRORS, found, strict=True)}
         if name in OBSERVED and self.row is not None:
             return observed_of_orbits(layout, X, self.periods, self.row)

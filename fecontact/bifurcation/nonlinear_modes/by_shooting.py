@@ -72,8 +72,7 @@ class ShootingMode(AlongMode, ShootingProblem):
 
 
 def leaving_by_shooting(
-    start: LinearStart, shape: ComplexArray, scales: Array, row: Array, conservative: bool,
-    method: Shooting,
+    start: LinearStart, shape: ComplexArray, scales: Array, row: Array, method: Shooting
 ) -> tuple[ShootingMode, Array, Array]:
     """Problem, unknowns and direction of the linear mode of a shape (d,), at its amplitude.
 
@@ -103,7 +102,7 @@ def leaving_by_shooting(
     problem = ShootingMode(
         known, start.values, start.free, mesh, first[0].copy(), scales, rtol=method.rtol,
         derivative_rtol=method.derivative_rtol, solver=method.solver,
-        limits=np.full(known.dimension, np.inf), row=row, conservative=conservative)
+        limits=np.full(known.dimension, np.inf), row=row, conservative=start.lossless)
     u = np.concatenate([first.reshape(-1), [2.0 * np.pi / start.angular_frequency, start.xi]])
     leaving = np.append(waves.reshape(-1), [0.0, 0.0])
     return problem, u, leaving / np.sqrt(problem.weights() @ leaving**2)

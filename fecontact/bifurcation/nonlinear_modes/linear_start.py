@@ -20,6 +20,8 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.vector_field import VectorField
 
 XI = "xi"
+# Largest |xi| of a conservative system, relative to the frequency.
+CONSERVATIVE = 1e-8
 # Part of the largest eigenvalue up to which eigenvalues count as zero, those of rigid modes.
 _ZERO = 1e-7
 # Part of the largest stiffness that is rounding.
@@ -71,6 +73,11 @@ class LinearStart:
         """Number m of displacements, the first states; all d states of a user's field."""
         found = self.field
         return found.system().basis.modes if isinstance(found, ContactField) else found.dimension
+
+    @property
+    def lossless(self) -> bool:
+        """Whether nothing is lost in the linear mode."""
+        return abs(self.xi) <= CONSERVATIVE * self.angular_frequency
 
 
 def unforced(system: ContactSystem) -> ContactSystem:

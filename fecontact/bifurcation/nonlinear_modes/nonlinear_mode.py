@@ -25,11 +25,11 @@ from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.series import complex_harmonics
 from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.nonlinear_modes.by_shooting import (
-    ShootingMode,
     followed_by_shooting,
     leaving_by_shooting,
 )
 from fecontact.bifurcation.nonlinear_modes.linear_start import (
+    CONSERVATIVE,
     LinearStart,
     field_over_xi,
     linear_start,
@@ -55,8 +55,6 @@ from fecontact.system.quasistatic.rest_state import RestState
 # parts of frequency and damping below.
 _POINTS, _STEP, _LARGEST = 2000, 0.02, 0.1
 _XI_SCALE = 0.2
-# Largest |xi| of a conservative system, relative to the frequency.
-_CONSERVATIVE = 1e-8
 # Smallest scale of a coordinate relative to the largest one, and part of the linear mode that the
 # observed point must have.
 _LEAST_SCALE, _LEAST_SEEN = 1e-3, 1e-4
@@ -124,7 +122,7 @@ class NonlinearMode(Summarised):
     @property
     def conservative(self) -> bool:
         """Whether no energy is lost: xi is zero within rounding throughout."""
-        return bool((np.abs(self.xi) <= _CONSERVATIVE * self.angular_frequency).all())
+        return bool((np.abs(self.xi) <= CONSERVATIVE * self.angular_frequency).all())
 
     @property
     def loss(self) -> Array:
@@ -323,8 +321,9 @@ def nonlinear_mode(
     ends = _between(given, low, high)
     further = {"observed": observed, "mode_number": int(mode), "rest": start.state[
         : start.displacements]}
+    shape, scales = _first_motion(start, row, observed, low)
     leave, follow = _WAYS[type(chosen)]
-    begin = leave(start, row, observed, low, chosen)
+    begin = leave(start, shape, scales, row, chosen)
     try:
         branch = follow(start, begin, chosen, ends)
     except FecontactError as error:
@@ -505,30 +504,22 @@ def _amplitudes(bounds: tuple[float, float]) -> tuple[float, float]:
 
 
 def _leaving(
-    start: LinearStart, row: Array, observed: str, amplitude: float, method: HarmonicBalance
+    start: LinearStart, shape: ComplexArray, scales: Array, row: Array, method: HarmonicBalance
 ) -> tuple[ModeProblem, Array, Array]:
-    """Problem, unknowns and direction of the linear mode at a small amplitude."""
+    """Problem, unknowns and direction of the linear mode at its amplitude."""
     d, m, T = start.field.dimension, start.displacements, 2.0 * np.pi / start.angular_frequency
     starts.require_mean(method, start.state[:m])
-    shape, scales = _first_motion(start, row, observed, amplitude)
     plain = starts.problem_for(start.field, start.values, start.free, method, scales)
     waves = np.exp(2.0j * np.pi * plain.series.times)[:, None]
     leaving = starts.unknowns(plain, (waves * shape).real, 0.0)
     leaving[-2:] = 0.0
     u = starts.unknowns(plain, np.tile(start.state, (plain.samples, 1)), T) + leaving
-    lossless = _lossless(start) and not plain.layout.memory
     problem = _mode_problem(
         plain, reference=plain.coefficients(leaving).copy(), limits=np.full(d, np.inf), row=row,
-        conservative=lossless, loose=start.loose, home=start.state[:m],
+        conservative=start.lossless and not plain.layout.memory, loose=start.loose,
+        home=start.state[:m],
         kept=plain.kept.left_by(start.state[None]) if plain.layout.memory else plain.kept)
     return problem, u, leaving / np.sqrt(problem.weights() @ leaving**2)
-
-
-def _leaving_by_shooting(
-    start: LinearStart, row: Array, observed: str, amplitude: float, method: Shooting
-) -> tuple[ShootingMode, Array, Array]:
-    return leaving_by_shooting(start, *_first_motion(start, row, observed, amplitude), row,
-                               _lossless(start), method)
 
 
 def _first_motion(
@@ -547,11 +538,6 @@ def _first_motion(
     sizes = np.abs(shape)
     sizes = np.maximum(sizes, _LEAST_SCALE * sizes[:m].max())
     return shape, np.concatenate([sizes, [PERIOD_SCALE * 2.0 * np.pi / w, _XI_SCALE * w]])
-
-
-def _lossless(start: LinearStart) -> bool:
-    """Whether nothing is lost in the linear mode."""
-    return abs(start.xi) <= _CONSERVATIVE * start.angular_frequency
 
 
 def _mode_problem(plain: HarmonicProblem, **changes: Any) -> ModeProblem:
@@ -611,4 +597,4 @@ def _integral(rate: Array, over: Array) -> Array:
 
 # How each method leaves the linear mode, and follows it.
 _WAYS: Mapping[type, tuple[Callable[..., Any], Callable[..., Branch]]] = {
-    HarmonicBalance: (_leaving, _followed), Shooting: (_leaving_by_shooting, followed_by_shooting)}
+    HarmonicBalance: (_leaving, _followed), Shooting: (leaving_by_shooting, followed_by_shooting)}

@@ -17,8 +17,8 @@ import numpy as np
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.layout import Layout, kept_by
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept
-from fecontact.bifurcation.harmonic.series import functions_at
-from fecontact.bifurcation.tori.series import complex_coefficients, on_lines, orders, turned
+from fecontact.bifurcation.harmonic.series import functions_at, turned
+from fecontact.bifurcation.tori.series import complex_coefficients, on_lines, orders
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.records import Array4, Block, Matrix, Vector

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.harmonic.series import functions_at
-from fecontact.bifurcation.tori.series import complex_coefficients, on_lines, orders, turned
+from fecontact.bifurcation.harmonic.series import functions_at, turned
+from fecontact.bifurcation.tori.series import complex_coefficients, on_lines, orders
 from fecontact.core.checks import as_count, as_floats, require_kind
 from fecontact.core.errors import InputError
 from fecontact.core.read_only import read_only_arrays

@@ -8,7 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
+from fecontact.bifurcation.harmonic.estimates import responses
 from fecontact.bifurcation.harmonic.layout import Layout, grown, orbit_weights
+from fecontact.bifurcation.harmonic.series import turned
 from fecontact.bifurcation.harmonic.woodbury import BorderedEquations
 from fecontact.bifurcation.orbits.same_orbit import shrunk
 from fecontact.bifurcation.orbits.unknowns import FreeParameters, beside, by_differences
@@ -21,7 +23,6 @@ from fecontact.bifurcation.tori.series import (
     orders,
     products,
     projected,
-    turned,
 )
 from fecontact.bifurcation.tori.stability import (
     RESOLVED,
@@ -447,7 +448,7 @@ class TorusLinearisation(BorderedEquations):
         They are x_k = (i k.w - J_0)^-1 f_k, with the harmonics f_k of the rates that the series
         leaves out, up to the samples, and the mean derivative J_0.
         """
-        problem, m = self.problem, self.problem.layout.displacements
+        problem = self.problem
         (H1, H2), (N1, N2) = problem.orders, problem.samples
         K1, K2 = (N1 - 1) // 2, (N2 - 1) // 2
         f = means(self.rates, K1, K2, self.ratio)
@@ -455,18 +456,10 @@ class TorusLinearisation(BorderedEquations):
         k1, k2 = np.meshgrid(np.arange(-K1, K1 + 1), np.arange(-K2, K2 + 1), indexing="ij")
         turns = 2.0j * np.pi * (k1 * self.frequencies[0] + k2 * self.frequencies[1])
         by_state, by_velocity, _ = (part.mean(axis=(0, 1)) for part in self._blocks)
-        turns = turns[:, :, None, None]
         if problem.elements is not None:
             by_state = by_state - np.einsum("jt,jti,jtm->im", self._friction.stiffness,
                                             self._tangents, self._tangents)
-        b = by_state.shape[0]
-        power = np.ones(b) + (np.arange(b) < m)
-        matrix = turns ** power * np.eye(b) - by_state
-        matrix[..., :m] -= turns * by_velocity
-        try:
-            added = np.linalg.solve(matrix, f[..., None])[..., 0] / self._scales
-        except np.linalg.LinAlgError:
-            return np.nan
+        added = responses(f, turns, by_state, by_velocity) / self._scales
         return float(np.sqrt(2.0 * (np.abs(added) ** 2).sum())) / self._size
 
     @cached_property

@@ -71,13 +71,6 @@ def projected(values: Array, first: int, second: int, ratio: float) -> Array:
     return real_coefficients(found)
 
 
-def turned(X: Array, turns: Array) -> Array:
-    """Coefficients (L, b) of sum_k turns_k (B_k cos k.theta - A_k sin k.theta), turns (K,)."""
-    out = np.zeros_like(X)
-    out[1::2], out[2::2] = turns[1:, None] * X[2::2], -turns[1:, None] * X[1::2]
-    return out
-
-
 def products(hat: Complex, k: Integers) -> tuple[Array, Array, Array, Array]:
     """Coefficients (K, K, ...) of J cos q.theta and J sin q.theta: cc, cs, sc, ss.
 

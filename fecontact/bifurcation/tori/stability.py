@@ -12,9 +12,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from fecontact.bifurcation.harmonic.stability import radau_rule
-from fecontact.bifurcation.linalg import condensation
-from fecontact.bifurcation.linalg.transition_matrices import transitions
+from fecontact.bifurcation.harmonic.stability import radau_rule, set_transitions
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array, Integers
 
@@ -108,13 +106,9 @@ def transition_matrices(
     points, basis, slopes = radau_rule(_DEGREE)
     J = jacobians(((np.arange(N)[:, None] + points) / N).reshape(-1), lines)
     d = J.shape[-1]
-    factors = condensation.factors_for(N, _DEGREE, d, 1)
-    nothing = np.zeros((N * _DEGREE, d))
     M, steps = np.empty((lines, d, d)), np.empty((N, d, d))
     for along, whole in zip(J, M, strict=True):
-        condensation.condense(np.ascontiguousarray(along), nothing, nothing[:, :, None],
-                              np.full(N, 1.0 / N), 1.0 / frequency, basis, slopes, 0, factors)
-        transitions(factors, steps)
+        set_transitions(np.ascontiguousarray(along), 1.0 / frequency, basis, slopes, steps)
         whole[:] = np.eye(d)
         for step in steps:
             whole[:] = step @ whole
