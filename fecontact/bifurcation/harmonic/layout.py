@@ -140,11 +140,13 @@ def series_states(layout: Layout, X: Array, z: Array, period: float, times: Arra
 
 
 def around(samples: Array, times: Array) -> Array:
-    """Values (k, c) at times tau of a periodic function, linear between its samples (N, c)."""
-    place = np.mod(times, 1.0) * len(samples)
-    first = place.astype(int) % len(samples)
+    """Values (..., k, c) at times tau (k,), linear between periodic samples (..., N, c)."""
+    N = samples.shape[-2]
+    place = np.mod(times, 1.0) * N
+    first = place.astype(int) % N
     part = (place - np.floor(place))[:, None]
-    return np.asarray((1.0 - part) * samples[first] + part * samples[(first + 1) % len(samples)])
+    return np.asarray((1.0 - part) * samples[..., first, :]
+                      + part * samples[..., (first + 1) % N, :])
 
 
 def layout_from(attributes: Mapping[str, Any]) -> Layout:

@@ -28,7 +28,7 @@ from fecontact.bifurcation.harmonic.balance import (
 )
 from fecontact.bifurcation.harmonic.compiled.arrays import TOLERANCE, Equations
 from fecontact.bifurcation.harmonic.compiled.balance import MOST_UNKNOWNS
-from fecontact.bifurcation.harmonic.compiled.orbit import (
+from fecontact.bifurcation.harmonic.compiled.orbits import (
     DERIVATIVES,
     ORBIT,
     RESIDUAL,

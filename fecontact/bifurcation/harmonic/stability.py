@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.linalg import eigvals, expm
 
 from fecontact.bifurcation.harmonic.balance import Balance
-from fecontact.bifurcation.harmonic.compiled.along_orbits import derivatives_along
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
-from fecontact.bifurcation.harmonic.layout import around
+from fecontact.bifurcation.harmonic.compiled.orbits import derivatives_along
+from fecontact.bifurcation.harmonic.layout import all_coefficients, around
 from fecontact.bifurcation.harmonic.memory import LEAK
 from fecontact.bifurcation.harmonic.series import basis_at
 from fecontact.bifurcation.linalg import condensation
@@ -89,15 +89,19 @@ def along_orbits(
     """Stability by :func:`by_transitions` of K forced orbits us (K, n + 1) with zs (K, N, c)."""
     intervals, radau = _intervals(problem)
     tau, series = _grid(intervals, radau, problem.harmonics)
-    d = problem.layout.states
+    layout, d = problem.layout, problem.layout.states
+    periods = np.array([problem.period(u) for u in us])
+    X = all_coefficients(layout, us[:, : problem.size].reshape(len(us), -1, layout.harmonic),
+                         periods[:, None, None])
     found: list[Floquet] = []
-    most = min(len(us), max(1, _NUMBERS // (len(tau) * d * d)))
-    J, functions = np.empty((most, len(tau), d, d)), np.ascontiguousarray(series.T)
+    most = max(1, _NUMBERS // (len(tau) * d * d))
     for first in range(0, len(us), most):
-        some = us[first : first + most]
-        derivatives_along(some, zs[first : first + most], tau, functions, e, J[: len(some)])
-        found += [_floquet(problem, problem.period(u), each)
-                  for u, each in zip(some, J[: len(some)], strict=True)]
+        some = slice(first, first + most)
+        x = np.concatenate([series @ X[some], around(zs[some], tau)], axis=2)
+        J = np.empty((*x.shape, d))
+        derivatives_along(us[some, -1].copy(), x, tau, e, J)
+        found += [_floquet(problem, T, each)
+                  for T, each in zip(periods[some].tolist(), J, strict=True)]
     return found
 
 

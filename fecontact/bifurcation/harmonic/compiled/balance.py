@@ -14,10 +14,10 @@ from fecontact.bifurcation.harmonic.compiled.evaluation import (
     evaluate_plain,
     evaluate_sampled,
 )
-from fecontact.bifurcation.harmonic.compiled.loads import AffineSystem, forces_at_rest
 from fecontact.bifurcation.harmonic.elements import element_forces
 from fecontact.core.types import Array
 from fecontact.system.elastic_sliders import without_elements
+from fecontact.system.jacobian import batch_rates
 from fecontact.system.nodes import SystemArrays
 
 # Most unknowns that compiled code without LAPACK solves for together.
@@ -147,14 +147,19 @@ class CompiledBalance:
         The latter holds for all values of the parameter if contact forces do not depend on it. None
         where loads are not affine.
         """
-        m, N = problem.layout.displacements, problem.samples
+        m, system = problem.layout.displacements, near.arrays
         places = near.low + (near.high - near.low) * _PLACES
-        periods = np.array([problem.period(np.array([place])) for place in places])
-        P = len(places)
-        loads, rest, matrices = np.empty((P, N, m)), np.empty((N, m)), np.empty((P, 2, m, m))
-        forces_at_rest(places, periods, problem.series.times,
-                       AffineSystem(near.flat, near.base, near.slope, near.arrays), loads, rest,
-                       matrices)
+        still = np.zeros((problem.samples, self.contact_field.dimension))
+        rates, free = np.empty_like(still), system._replace(rows=system.rows[:0])
+        times, found, bodies = still[:, 0], [], []
+        for place in places:
+            near.flat[:] = near.base + place * near.slope
+            times = problem.series.times * problem.period(np.array([place]))
+            batch_rates(times, still, free, rates)
+            found.append(rates[:, m : 2 * m].copy())
+            bodies.append([system.stiffness.copy(), system.damping.copy()])
+        batch_rates(times, still, system, rates)
+        loads, matrices, rest = np.array(found), np.array(bodies), rates[:, m : 2 * m]
         body, given = (np.array(_line(places, values)) for values in (matrices, loads))
         off = np.abs(given[0] + np.multiply.outer(places, given[1]) - loads).max(axis=(1, 2))
         if (off > _AFFINE * np.abs(given).max() * np.maximum(np.abs(places), 1.0)).any():

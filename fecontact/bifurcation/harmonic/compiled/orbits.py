@@ -1,4 +1,6 @@
-"""Equations of harmonic balance at one orbit, and the orbit nearby, in compiled code."""
+"""Equations of harmonic balance at one orbit, and derivatives along several, in compiled code."""
+
+import numpy as np
 
 from fecontact.bifurcation.harmonic.compiled.arrays import STEADY, TOLERANCE, Equations
 from fecontact.bifurcation.harmonic.compiled.evaluation import (
@@ -6,7 +8,9 @@ from fecontact.bifurcation.harmonic.compiled.evaluation import (
     evaluation_at,
     take_forces,
     take_mean,
+    take_parameter,
 )
+from fecontact.bifurcation.harmonic.compiled.kinks import SampledRates, add_kinks
 from fecontact.bifurcation.harmonic.compiled.linear_systems import (
     PRECISE,
     choose_coupled,
@@ -15,7 +19,8 @@ from fecontact.bifurcation.harmonic.compiled.linear_systems import (
 )
 from fecontact.bifurcation.harmonic.compiled.newton import damped_newton
 from fecontact.core.compiled import kernel
-from fecontact.core.records import Matrix, Vector
+from fecontact.core.records import Array4, Block, Matrix, Vector
+from fecontact.system.jacobian import batch_derivatives
 
 # Kinds of results at an orbit.
 RESIDUAL, DERIVATIVES, SOLUTION, ORBIT = range(4)
@@ -58,3 +63,26 @@ def evaluate(
         factorise_with(row, T, e)
         return solve_with(row, weights, T, PRECISE, e, x)
     return 1
+
+
+@kernel
+def derivatives_along(p: Vector, x: Block, tau: Vector, e: Equations, J: Array4) -> None:
+    """Fill J (K, P, d, d) with the derivatives of the rates of K orbits at parameters p (K,).
+
+    Their states x (K, P, d) are those at times tau (P,). Kinks of normal forces are means over
+    samples, as in the equations of the orbits.
+    """
+    m, linear = e.springs.shape[1], e.workspace.linear
+    P, d = x.shape[1], x.shape[2]
+    t, f, widths = np.empty(P), np.empty((P, d)), np.empty((m, P))
+    for k in range(len(p)):
+        T = take_parameter(p[k], e)
+        for n in range(P):
+            t[n] = tau[n] * T
+        batch_derivatives(t, x[k], e.whole, e.whole, 0.0, f, J[k], np.empty((0, 0)))
+        add_kinks(t, x[k], e.whole, e.onsets, T / len(e.tau), 1, SampledRates(f, J[k], widths))
+        for n in range(P):
+            for i in range(m):
+                for j in range(m):
+                    J[k, n, m + i, j] -= linear[0, i, j]
+                    J[k, n, m + i, m + j] -= linear[1, i, j]
