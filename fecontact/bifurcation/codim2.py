@@ -219,9 +219,8 @@ def _followed(
         raise InputError(f"The start lies at {names[1]} = {value:.6g}, outside its bounds, "
                          f"{second[0]:g} to {second[1]:g}.")
     u[-2] = min(max(value, second[0]), second[1])
-    stops = [options.stop_at] if isinstance(options.stop_at, str) else [*options.stop_at]
     ends = _ENDS.get(attributes["kind"], ())
-    chosen = replace(options, stop_at=(*stops, *ends), second_bounds=second)
+    chosen = replace(options, stop_at=(*options.stop_at, *ends), second_bounds=second)
     if isinstance(problem, OrbitCurve) and problem.orbit.sizes is not None:
         chosen = replace(chosen, tolerance=problem.orbit.sizes.newton(chosen.tolerance))
     tangent = tangent_at(problem, u, direction)

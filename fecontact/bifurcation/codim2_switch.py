@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.inner_product import unit
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import DoubleHopfPoint, ZeroHopfPoint
 from fecontact.bifurcation.continuation.problem import Problem
@@ -72,10 +73,8 @@ def tangent_at(problem: Problem, u: Array, direction: float) -> Array:
     linearised, weights = problem.linearise(u), problem.weights()
     found: list[Array] = []
     for place in (-1, -2):
-        row, rhs = np.zeros(len(u)), np.zeros(len(u))
-        row[place] = rhs[-1] = 1.0
         try:
-            tangent = linearised.solve(row, rhs)
+            tangent = linearised.solve(unit(len(u), place), unit(len(u)))
         except FecontactError:
             continue
         size = float(np.sqrt(weights @ tangent**2))

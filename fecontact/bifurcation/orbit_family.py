@@ -9,6 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.attempts import first_that_goes
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.inner_product import unit
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of, sizes_of
 from fecontact.bifurcation.continuation.rounding import Rounding
@@ -193,9 +194,7 @@ def orbit_family(
     if not low <= problem.period(u) <= high:
         raise InputError(f"The start has the period {problem.period(u):.6g} s, outside the bounds "
                          f"{low:g} to {high:g} s.")
-    unit = np.zeros_like(u)
-    unit[-1] = 1.0
-    tangent = problem.linearise(u).solve(starts.size_row(problem, u), unit)
+    tangent = problem.linearise(u).solve(starts.size_row(problem, u), unit(len(u)))
     tangent = np.copysign(1.0, direction) * tangent / np.sqrt(problem.weights() @ tangent**2)
     return _stays(field, free, _followed((problem, u, tangent), chosen, how, limits, both))
 
@@ -211,8 +210,8 @@ def _followed(
         kept["precision"] = _PRECISION
     kind: Any = type(problem)
     family = _family_of(kind)(**kept)
-    return continue_branch(family, u, options, name=list(problem.field.parameters)[problem.free],
-                           tangent=tangent, both=both,
+    return continue_branch(family, u, options, name=problem.parameter_name, tangent=tangent,
+                           both=both,
                            attributes=problem.attributes() | {"family": True})
 
 

@@ -8,7 +8,8 @@ their points, meet.
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import Solution, finished, newton, norm
+from fecontact.bifurcation.continuation.inner_product import unit
+from fecontact.bifurcation.continuation.newton import Solution, norm, reached
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.special_points import located_on
@@ -54,12 +55,10 @@ def round_corner(
     weights, side = problem.weights(), problem.orientation(here.linearisation, here.tangent)
     if side == 0.0:
         return None
-    unit = np.zeros(len(here.u))
-    unit[-1] = 1.0
     ahead = here.u + step * here.tangent
     try:
         beyond = problem.linearise(ahead)
-        leaving = beyond.solve(weights * here.tangent, unit)
+        leaving = beyond.solve(weights * here.tangent, unit(len(here.u)))
     except FecontactError:
         return None
     size = norm(problem, leaving)
@@ -80,9 +79,9 @@ def round_corner(
             row = weights * (here.tangent + there.tangent)
             if float(row @ (there.u - here.u)) <= 0.0:
                 continue
-            reached = located_on(Step(problem, here, there, options, row), strict=strict)
-            if reached is not None:
-                return [reached]
+            found = located_on(Step(problem, here, there, options, row), strict=strict)
+            if found is not None:
+                return [found]
     return None
 
 
@@ -91,15 +90,10 @@ def _found(
 ) -> Solution | None:
     """The solution at a distance from u along a direction, which its tangent must have."""
     row = np.sign(length) * problem.weights() * leaving
-    try:
-        found = newton(problem, u + length * leaving, row, options.tolerance,
-                          2 * options.iterations)
-        if found is None:
-            return None
-        there = finished(problem, *found, row, options)
-    except FecontactError:
+    there = reached(problem, u + length * leaving, row, options)
+    if there is None or float(row @ there.tangent) < np.cos(options.largest_turn):
         return None
-    return there if float(row @ there.tangent) >= np.cos(options.largest_turn) else None
+    return there
 
 
 def _meet(problem: Problem, here: Solution, there: Solution, step: float) -> bool:

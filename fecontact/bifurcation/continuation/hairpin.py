@@ -8,13 +8,11 @@ the whole hairpin, and the branch is nearly a parabola over it.
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import Solution, finished, newton, norm
+from fecontact.bifurcation.continuation.newton import Solution, norm, reached
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.special_points import located_on
 from fecontact.bifurcation.continuation.step import Step
-from fecontact.core.errors import FecontactError
-from fecontact.core.types import Array
 
 _TOLERANCE = 1e-9  # of Newton's method: both sheets are close to each other
 _LEAST_TURN = 1e-5  # between the last two tangents, to define the plane of the hairpin [rad]
@@ -57,19 +55,20 @@ def round_hairpin(
     at, slope, length = here, first, step / first
     found: list[tuple[Solution, list[BranchPoint]]] = []
     for _ in range(_STEPS):
-        there = _next(problem, at, row, length, options)
+        guess = at.u + length / float(row @ at.tangent) * at.tangent
+        there = reached(problem, guess, row, options, tolerance=_TOLERANCE)
         change = np.inf if there is None else float(along @ there.tangent / (row @ there.tangent))
         change = abs(change - slope) / abs(first)
-        reached = None
+        piece = None
         if there is not None and change <= _SLOPE_CHANGE:
-            reached = located_on(Step(problem, at, there, options, row))
-        if reached is None:
+            piece = located_on(Step(problem, at, there, options, row))
+        if piece is None:
             length *= 0.5
             if length * first < 0.05 * step:
                 return None
             continue
-        there, special = reached
-        found.append(reached)
+        there, special = piece
+        found.append(piece)
         if any(point.kind is None for point in special):
             return found
         turn = float(weights * at.tangent @ there.tangent)
@@ -80,15 +79,3 @@ def round_hairpin(
         at, slope = there, float(along @ there.tangent / (row @ there.tangent))
         length *= min(2.0, 0.7 * _SLOPE_CHANGE / max(change, 1e-3))
     return None
-
-
-def _next(
-    problem: Problem, at: Solution, row: Array, length: float, options: ContinuationOptions
-) -> Solution | None:
-    """The solution at a distance along the row; None if Newton's method fails."""
-    guess = at.u + length / float(row @ at.tangent) * at.tangent
-    try:
-        found = newton(problem, guess, row, _TOLERANCE, 2 * options.iterations)
-        return None if found is None else finished(problem, *found, row, options)
-    except FecontactError:
-        return None

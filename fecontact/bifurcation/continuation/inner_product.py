@@ -2,8 +2,11 @@
 
 import math
 
+import numpy as np
+
 from fecontact.core.compiled import kernel
 from fecontact.core.records import Vector
+from fecontact.core.types import Array
 
 
 @kernel
@@ -19,3 +22,10 @@ def weighted_product(weights: Vector, a: Vector, b: Vector) -> float:
 def weighted_norm(weights: Vector, x: Vector) -> float:
     """Square root of sum w x x."""
     return math.sqrt(weighted_product(weights, x, x))
+
+
+def unit(size: int, place: int = -1) -> Array:
+    """Row (size,) of one unknown, by default of the last one, the parameter."""
+    row = np.zeros(size)
+    row[place] = 1.0
+    return row

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.inner_product import weighted_norm, weighted_product
+from fecontact.bifurcation.continuation.inner_product import unit, weighted_norm, weighted_product
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Linearisation, Problem
 from fecontact.core.compiled import kernel
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, choices
@@ -211,6 +211,23 @@ def damped_newton(
     return u, left, False
 
 
+def reached(
+    problem: Problem, guess: Array, row: Array, options: ContinuationOptions, *,
+    tolerance: float | None = None, known: Linearisation | None = None, exact: bool = False,
+    stored: bool = True,
+) -> Solution | None:
+    """The solution by :func:`newton`, in twice the usual steps, and :func:`finished`.
+
+    None if either fails. The tolerance is by default that of the options.
+    """
+    try:
+        found = newton(problem, guess, row, tolerance or options.tolerance,
+                       2 * options.iterations, known=known, exact=exact)
+        return None if found is None else finished(problem, *found, row, options, stored=stored)
+    except FecontactError:
+        return None
+
+
 def finished(
     problem: Problem, u: Array, linearisation: Linearisation, iterations: int, row: Array,
     options: ContinuationOptions, *, stored: bool = True,
@@ -224,9 +241,7 @@ def finished(
     AnalysisError
         If there is no finite tangent.
     """
-    unit = np.zeros(len(u))
-    unit[-1] = 1.0
-    tangent = linearisation.solve(row, unit)
+    tangent = linearisation.solve(row, unit(len(u)))
     size = norm(problem, tangent)
     if not (np.isfinite(size) and size > 0.0):
         raise AnalysisError("The branch has no direction there: its equations grow beyond all "

@@ -320,9 +320,8 @@ class ContinuationOptions:
         for name in ("points", "iterations"):
             as_count(getattr(self, name), f"ContinuationOptions: {name}")
         require_flags("ContinuationOptions", locate=self.locate)
-        kinds = as_texts(self.stop_at, "ContinuationOptions: stop_at")
-        if not isinstance(self.stop_at, str):
-            object.__setattr__(self, "stop_at", kinds)  # an iterator gives them once
+        # An iterator gives them once.
+        object.__setattr__(self, "stop_at", as_texts(self.stop_at, "ContinuationOptions: stop_at"))
         require_kind("ContinuationOptions", Mapping, events=self.events)
         for name, event in self.events.items():
             require_kind("ContinuationOptions: events", str, name=name)
@@ -358,7 +357,7 @@ def options_of(
     require_kind("A branch", (ContinuationOptions, type(None)), options=options)
     chosen = options or ContinuationOptions()
     known = (*KINDS, *chosen.events)
-    for kind in as_texts(chosen.stop_at, "stop_at"):
+    for kind in chosen.stop_at:
         if kind not in known:
             raise InputError(f"ContinuationOptions: stop_at = {kind!r} is no kind of special point "
                              f"and no name of an event{nearest(kind, known)}; known are: "

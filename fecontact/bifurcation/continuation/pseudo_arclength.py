@@ -12,6 +12,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.corner import round_corner
 from fecontact.bifurcation.continuation.hairpin import round_hairpin
+from fecontact.bifurcation.continuation.inner_product import unit
 from fecontact.bifurcation.continuation.newton import Solution, finished, newton, norm
 from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
 from fecontact.bifurcation.continuation.points import UNRESOLVED
@@ -98,7 +99,6 @@ def continuation(
     if _leaves(start, options):
         return End(BranchStatus.BOUND)
     here, step, count, message, origin = start, options.step, 1, "", problem
-    stops = {options.stop_at} if isinstance(options.stop_at, str) else set(options.stop_at)
     before: Solution | None = None
     halved, whole = 0, step
     fast = problem.fast_steps(options)
@@ -148,10 +148,10 @@ def continuation(
                     yield replace(located, kind=None)
                     return End(ended)
                 yield located
-                if located.kind in stops:
-                    return End(BranchStatus.STOPPED)
                 if located.kind is None:
                     return End(BranchStatus.BOUND)
+                if located.kind in options.stop_at:
+                    return End(BranchStatus.STOPPED)
             if count > 2 and _passes(problem, here, there, origin, start, options):
                 yield BranchPoint(start.u, start.tangent, start.values)
                 return End(BranchStatus.CLOSED)
@@ -230,9 +230,8 @@ def start_of(
     direction: float
 ) -> Solution:
     """The solution near u, with its tangent."""
-    row = np.zeros(len(u))
     if tangent is None:
-        row[-1] = 1.0 if direction >= 0.0 else -1.0
+        row = unit(len(u)) if direction >= 0.0 else -unit(len(u))
     else:
         row = problem.weights() * tangent / norm(problem, tangent)
     fast = problem.fast_steps(options)

@@ -5,8 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.inner_product import weighted_norm, weighted_product
-from fecontact.bifurcation.continuation.newton import Solution, finished, newton, with_values
+from fecontact.bifurcation.continuation.inner_product import unit, weighted_norm, weighted_product
+from fecontact.bifurcation.continuation.newton import (
+    Solution,
+    finished,
+    newton,
+    reached,
+    with_values,
+)
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
 from fecontact.core.errors import FecontactError
 from fecontact.core.types import Array
@@ -91,13 +97,7 @@ class Step:
 
     def solution(self, along: float) -> Solution | None:
         """The solution at a length along the row; None if Newton's method fails."""
-        try:
-            found = newton(self.problem, self.cubic(along), self.row, self.options.tolerance,
-                              2 * self.options.iterations)
-            return None if found is None else finished(self.problem, *found, self.row,
-                                                       self.options)
-        except FecontactError:
-            return None
+        return reached(self.problem, self.cubic(along), self.row, self.options)
 
     def meeting(self, place: int, value: float) -> Solution | None:
         """The solution on the step at which an unknown has a value, by Newton's method.
@@ -111,11 +111,11 @@ class Step:
                 high = middle
             else:
                 low = middle
-        guess, row = self.cubic(low), np.zeros(len(self.here.u))
-        guess[place], row[place] = value, 1.0
+        guess = self.cubic(low)
+        guess[place] = value
         try:
-            found = newton(self.problem, guess, row, _EXACT, 2 * self.options.iterations,
-                              known=self.there.linearisation, exact=True)
+            found = newton(self.problem, guess, unit(len(guess), place), _EXACT,
+                           2 * self.options.iterations, known=self.there.linearisation, exact=True)
             if found is None or not self._holds(found[0], guess):
                 return None
             found[0][place] = value
@@ -214,16 +214,13 @@ class _Search:
 
     def _solution(self, along: float) -> Solution:
         """The solution at a length, linearised there and not at the last Newton step."""
-        step, options = self.step, self.step.options
-        exact = max(_EXACT, 1e-2 * self.precision)
+        step = self.step
         for guess, beside in self._guesses(along):
-            try:
-                found = newton(step.problem, guess, step.row, exact, 2 * options.iterations,
-                                  exact=True, known=beside.linearisation)
-                if found is not None:
-                    return finished(step.problem, *found, step.row, options, stored=False)
-            except FecontactError:
-                continue
+            found = reached(step.problem, guess, step.row, step.options, exact=True, stored=False,
+                            tolerance=max(_EXACT, 1e-2 * self.precision),
+                            known=beside.linearisation)
+            if found is not None:
+                return found
         raise _LostError
 
     def _guesses(self, along: float) -> Iterator[tuple[Array, Solution]]:

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.predictor import BENT
 from fecontact.bifurcation.continuation.problem import (
@@ -19,9 +18,13 @@ from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.method import MOST, MOST_SAMPLED, HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.orbits import starts as orbit_starts
-from fecontact.bifurcation.orbits.discretisation import Discretisation, Request, stepped_off
+from fecontact.bifurcation.orbits.discretisation import (
+    Discretisation,
+    Request,
+    follow_orbits,
+    stepped_off,
+)
 from fecontact.bifurcation.orbits.orbit_points import BalancedPoints
-from fecontact.bifurcation.orbits.restored import rescaled
 from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.bifurcation.orbits.starts import Begun
 from fecontact.core.errors import AnalysisError, InputError
@@ -84,7 +87,7 @@ class ByHarmonics(BalancedPoints, Discretisation):
 
     def goes_on(self, point: BranchPoint, request: Request) -> Branch:
         """Branch that continues from one of its own points."""
-        problem, u, tangent = self._rescaled(point, request)
+        problem, u, tangent = request.restored(point)
         method = request.method
         if method is None:
             method = problem.method
@@ -95,7 +98,7 @@ class ByHarmonics(BalancedPoints, Discretisation):
 
     def beyond(self, point: BranchPoint, request: Request) -> Branch:
         """The other orbits at one of its points; doubled ones have 2 H harmonics."""
-        problem, u, tangent = self._rescaled(point, request)
+        problem, u, tangent = request.restored(point)
         if problem.orders is not None:
             # The other orbits may have harmonics that these leave out.
             every = replace(problem.method, harmonics=problem.harmonics)
@@ -135,13 +138,6 @@ class ByHarmonics(BalancedPoints, Discretisation):
             raise AnalysisError(f"{point.place} is none with {how.highest} harmonics; take more.")
         return min(found, key=lambda one: abs(one.parameter - point.parameter))
 
-    def _rescaled(self, point: BranchPoint, request: Request) -> starts.Start:
-        """A point with other scales and width, if given; given scales no longer grow."""
-        problem, u, tangent = starts.restored(request.field, point)
-        limits = problem.limits if request.scales is None else None
-        return (replace(rescaled(problem, request.scales, request.width), limits=limits), u,
-                tangent)
-
 
 def follow(
     problem: HarmonicProblem, u: Array, tangent: Array | None, method: HarmonicBalance,
@@ -163,8 +159,9 @@ def follow(
     whole = replace(final, stability=problem.stability)
     wrong = _wrong_at_folds(whole, branch) if judged else ""
     if judged and (final.stability is None) != bool(wrong):
-        branch = _followed(replace(whole, stability=None) if wrong else whole, u, tangent, options,
-                           {**(further or {}), **_known(branch)}, how)
+        branch = follow_orbits(
+            replace(whole, stability=None) if wrong else whole, u, options,
+            {**(further or {}), **_known(branch)}, tangent=tangent, **how)
     return replace(_watched(branch, final), message=_joined(branch.message, notes, wrong))
 
 
@@ -184,21 +181,6 @@ def _watched(branch: Branch, problem: HarmonicProblem) -> Branch:
     return branch
 
 
-def _followed(
-    problem: HarmonicProblem, u: Array, tangent: Array | None, options: ContinuationOptions,
-    further: Mapping[str, Any] | None, how: Mapping[str, Any],
-) -> Branch:
-    """Follow a branch with the harmonics and samples of a problem."""
-    name = list(problem.field.parameters)[problem.free]
-    stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
-    branch = continue_branch(
-        problem, u, replace(options, stop_at=[*stops, HALVING]), name=name, tangent=tangent,
-        attributes={**problem.attributes(), **(further or {})}, **how)
-    if branch.points[-1].kind == HALVING and HALVING not in stops:
-        branch = replace(branch, status=BranchStatus.CLOSED)
-    return branch
-
-
 def _refined(
     problem: HarmonicProblem, u: Array, tangent: Array | None, method: HarmonicBalance,
     options: ContinuationOptions, further: Mapping[str, Any] | None, how: Mapping[str, Any],
@@ -211,7 +193,7 @@ def _refined(
     sampling = method.sampling_tolerance if problem.autonomous else method.sampling
     most, error = MOST if explicit else max(MOST_SAMPLED, method.count), 0.0
     while True:
-        branch = _followed(problem, u, tangent, options, further, how)
+        branch = follow_orbits(problem, u, options, further, tangent=tangent, **how)
         if branch.status is BranchStatus.INTERRUPTED:
             return branch, problem, u, tangent, ""
         finer = _with_more_harmonics(method, branch)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.inner_product import unit
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import sizes_of
 from fecontact.bifurcation.equilibria.equilibrium import newton
@@ -131,8 +132,7 @@ def _converged(
 
 
 def _newton(problem: HomoclinicProblem, u: Array, point: BranchPoint) -> Array:
-    row = np.zeros_like(u)
-    row[-2] = 1.0
+    row = unit(len(u), -2)
     weights, amplitude = problem.weights(), problem.amplitude(u)
     for _ in range(_CORRECTIONS):
         linearised = problem.linearise(u)

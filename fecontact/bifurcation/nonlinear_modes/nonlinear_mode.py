@@ -548,9 +548,8 @@ def _mode_problem(plain: HarmonicProblem, **changes: Any) -> ModeProblem:
 
 def _between(options: ContinuationOptions, low: float, high: float) -> ContinuationOptions:
     """The options with ends at two amplitudes."""
-    stops = [options.stop_at] if isinstance(options.stop_at, str) else options.stop_at
     return replace(
-        options, bounds=(-np.inf, np.inf), locate=True, stop_at=[*stops, *_ENDS],
+        options, bounds=(-np.inf, np.inf), locate=True, stop_at=(*options.stop_at, *_ENDS),
         events={**options.events, _ENDS[0]: _beyond(high), _ENDS[1]: _beyond(_BELOW * low)})
 
 

@@ -4,17 +4,15 @@ from dataclasses import replace
 from typing import Any
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.fields.jumps import require_smooth_friction
 from fecontact.bifurcation.orbit_methods import Collocation
 from fecontact.bifurcation.orbits import starts
 from fecontact.bifurcation.orbits.collocation import Intervals
-from fecontact.bifurcation.orbits.discretisation import Discretisation, Request
+from fecontact.bifurcation.orbits.discretisation import Discretisation, Request, follow_orbits
 from fecontact.bifurcation.orbits.orbit_points import CollocatedPoints
-from fecontact.bifurcation.orbits.restored import rescaled, restored
-from fecontact.bifurcation.orbits.same_orbit import HALVING
+from fecontact.bifurcation.orbits.restored import restored
 from fecontact.bifurcation.orbits.sharpening import ROUGHLY, SHARPENED, Accuracy, sharpened
 from fecontact.bifurcation.orbits.state_error import state_error
 from fecontact.core.types import Array
@@ -67,13 +65,10 @@ class ByCollocation(CollocatedPoints, Discretisation):
 
     def goes_on(self, point: BranchPoint, request: Request) -> Branch:
         """Branch that continues from one of its own points."""
-        limits = None if request.scales is not None else point.branch.attributes.get("limits")
-        problem, u, tangent = restored(request.field, point)
-        problem = replace(rescaled(problem, request.scales, request.width), limits=limits)
         method = request.method or point.branch.method
-        problem, u, tangent = _on_own_intervals((problem, u, tangent), method)
+        problem, u, tangent = _on_own_intervals(request.restored(point), method)
         start = problem.adapted(u, request.sign * tangent)
-        return self.followed(start, method, request.options, limits, both=request.both)
+        return self.followed(start, method, request.options, problem.limits, both=request.both)
 
     def followed(
         self, start: starts.Begun, method: Collocation, options: ContinuationOptions,
@@ -81,19 +76,13 @@ class ByCollocation(CollocatedPoints, Discretisation):
     ) -> Branch:
         """Follow a branch and refine its special points."""
         problem, u, tangent = self.projected(start, method, limits)
-        attributes = problem.attributes() | {"method": replace(method, degree=problem.degree)}
-        sizes, newton = _sizes(method), options.tolerance
+        sizes = Intervals.of(method)
         if sizes is not None:
-            newton = sizes.newton(newton)
-        name = list(problem.field.parameters)[problem.free]
-        stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
-        ended = replace(options, stop_at=[*stops, HALVING], tolerance=newton)
+            options = replace(options, tolerance=sizes.newton(options.tolerance))
         # Locate special points coarsely here; they are refined below on meshes of their own.
         problem = replace(problem, precision=ROUGHLY, sizes=sizes)
-        branch = continue_branch(problem, u, ended, name=name, tangent=tangent,
-                                 attributes=attributes, **how)
-        if branch.points[-1].kind == HALVING and HALVING not in stops:
-            branch = replace(branch, status=BranchStatus.CLOSED)
+        branch = follow_orbits(problem, u, options, tangent=tangent, attributes={
+            "method": replace(method, degree=problem.degree)}, **how)
         points = list(branch.points)
         accuracy = Accuracy(method.tolerance, int(method.intervals), int(method.most_intervals))
         try:
@@ -110,18 +99,11 @@ class ByCollocation(CollocatedPoints, Discretisation):
 def _on_own_intervals(start: starts.Start, method: Collocation) -> starts.Start:
     """The start on the intervals of the method, or on more where its orbit needs them."""
     problem, u, _ = start
-    count, sizes = method.intervals, _sizes(method)
+    count, sizes = method.intervals, Intervals.of(method)
     if sizes is not None:
         error = state_error(problem, u)
         count = sizes.at_start(problem.intervals, error, problem.degree)
     return starts.on_intervals(start, count)
-
-
-def _sizes(method: Collocation) -> Intervals | None:
-    """Numbers of intervals along a branch; None where they are kept."""
-    if method.state_tolerance is None:
-        return None
-    return Intervals(int(method.intervals), int(method.most_intervals), method.state_tolerance)
 
 
 def _sharpened(

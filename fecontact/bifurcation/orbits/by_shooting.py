@@ -12,7 +12,7 @@ from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbit_methods import Shooting
-from fecontact.bifurcation.orbits.discretisation import Discretisation, Request
+from fecontact.bifurcation.orbits.discretisation import Discretisation, Request, follow_orbits
 from fecontact.bifurcation.orbits.mesh import interpolate
 from fecontact.bifurcation.orbits.orbit_points import ShotPoints
 from fecontact.bifurcation.orbits.restored import rescaled, restored_shooting
@@ -33,10 +33,6 @@ from fecontact.system.fields.vector_field import VectorField
 # orbits ends. Single orbits solve the equations too: closer to them the corrector may find either,
 # so the end is located on the branch of single orbits.
 _CLOSE = 0.1
-
-
-def _name(problem: ShootingProblem) -> str:
-    return list(problem.field.parameters)[problem.free]
 
 
 class ByShooting(ShotPoints, Discretisation):
@@ -74,8 +70,7 @@ class ByShooting(ShotPoints, Discretisation):
     ) -> Branch:
         """Branch from a start on a mesh."""
         problem, first, tangent = self.projected(start, method, limits)
-        return continue_branch(problem, first, options, name=_name(problem), tangent=tangent,
-                               attributes=problem.attributes(), **how)
+        return follow_orbits(problem, first, options, tangent=tangent, **how)
 
     def from_motion(self, start: MotionStart, request: Request, method: Shooting) -> Branch:
         """Branch through the orbit to which a motion of a contact system has settled.
@@ -97,12 +92,11 @@ class ByShooting(ShotPoints, Discretisation):
             return branch
         stepping = _of_stepping(problem, start.values)
         try:
-            branch = continue_branch(problem, u, request.options, name=_name(problem),
-                                     attributes=problem.attributes(), **how)
+            branch = follow_orbits(problem, u, request.options, **how)
         except (AnalysisError, InputError) as error:
             remedy = stepping or (f"run it longer until it has settled, or take more than "
                                   f"{method.segments} segments.")
-            raise AnalysisError(f"No periodic orbit was found at {_name(problem)} = "
+            raise AnalysisError(f"No periodic orbit was found at {problem.parameter_name} = "
                                 f"{start.values[start.free]:.6g} near the motion: Newton's method "
                                 f"does not converge; {remedy}") from error
         if stepping and branch.status is BranchStatus.STALLED:
@@ -111,9 +105,7 @@ class ByShooting(ShotPoints, Discretisation):
 
     def goes_on(self, point: BranchPoint, request: Request) -> Branch:
         """Branch that continues from one of its own points."""
-        problem, u, tangent = restored_shooting(request.field, point)
-        limits = None if request.scales is not None else point.branch.attributes.get("limits")
-        problem = replace(rescaled(problem, request.scales, request.width), limits=limits)
+        problem, u, tangent = request.restored(point)
         if request.method is not None:
             problem = replace(problem, rtol=request.method.rtol)
         ahead = float(np.copysign(1.0, request.sign * tangent[-1]))
@@ -121,9 +113,8 @@ class ByShooting(ShotPoints, Discretisation):
                                            both=request.both)
         if branch is not None:
             return branch
-        return _noted(why, continue_branch(
-            problem, u, request.options, name=_name(problem), tangent=request.sign * tangent,
-            both=request.both, attributes=problem.attributes()))
+        return _noted(why, follow_orbits(problem, u, request.options, both=request.both,
+                                         tangent=request.sign * tangent))
 
     def beyond(self, point: BranchPoint, request: Request) -> Branch:
         """The orbits of twice the period that begin at a period doubling found by shooting.
@@ -210,11 +201,11 @@ def _from_event_to_event(
     whole = replace(problem, limits=None).attributes()
     whole |= {"scales": found[0].scales, "method": replace(whole["method"], segments=1)}
     try:
-        return followed(*found, options, name=_name(problem), attributes=whole, **how), ""
+        return followed(*found, options, name=problem.parameter_name, attributes=whole, **how), ""
     except InputError as error:
-        raise AnalysisError(f"No periodic orbit was found at {_name(problem)} = {u[-1]:.6g} near "
-                            f"the motion: Newton's method does not converge; run it longer until "
-                            f"it has settled.") from error
+        raise AnalysisError(f"No periodic orbit was found at {problem.parameter_name} = "
+                            f"{u[-1]:.6g} near the motion: Newton's method does not converge; run "
+                            f"it longer until it has settled.") from error
 
 
 def _noted(why: str, branch: Branch) -> Branch:
@@ -253,11 +244,8 @@ def doubled(problem: ShootingProblem, u: Array, request: Request) -> Branch:
     options = request.options
     twice, start, tangent = _doubled(problem, u)
     tangent = request.sign * heading(tangent, twice.weights())
-    stops = [options.stop_at] if isinstance(options.stop_at, str) else list(options.stop_at)
     twice, start, tangent = twice.adapted(start + options.step * tangent, tangent)
-    found = continue_branch(twice, start, replace(options, stop_at=[*stops, HALVING]),
-                            name=_name(twice),
-                            tangent=tangent, attributes=twice.attributes())
+    found = follow_orbits(twice, start, options, tangent=tangent)
     return _ended(found, problem, options)
 
 

@@ -65,6 +65,14 @@ class Intervals:
     most: int
     tolerance: float
 
+    @classmethod
+    def of(cls, method: Collocation, least: int = 0) -> "Intervals | None":
+        """The rule of a method, with no fewer than ``least``; None where their number is kept."""
+        if method.state_tolerance is None:
+            return None
+        fewest = least or int(method.intervals)
+        return cls(fewest, max(fewest, int(method.most_intervals)), method.state_tolerance)
+
     def after(self, given: int, error: float, degree: int) -> int:
         """Number of intervals for orbits like one that has this error on so many.
 

@@ -16,7 +16,7 @@ from fecontact.bifurcation.orbits.collocation_kernels import (
 )
 from fecontact.bifurcation.orbits.floquet import Floquet, floquet_of
 from fecontact.bifurcation.orbits.mesh import Rule, rule
-from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns
+from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns, beside, by_differences
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
 
@@ -134,7 +134,6 @@ class CollocationEquations(OrbitUnknowns):
         return self._on_mesh[2]
 
 
-_DIFFERENCE = 1e-5  # relative parameter step for the derivative of the forcing period
 # Part of the parameter in the tangent of a branch below which orbits are compared with the nearest
 # one instead of that at the same parameter.
 _LEAST_SHARE = 0.05
@@ -236,7 +235,7 @@ class CollocationLinearisation:
                 return J, P, known
             known = here[1]
         if not problem.autonomous:
-            self._add_forcing(times / self.period, x, values, rough[2])
+            self._add_forcing(times / self.period, x, rough[2])
         _, J, P = self._apart(rough, len(shifts))
         return J, P, known
 
@@ -254,26 +253,20 @@ class CollocationLinearisation:
         problem, values = self.problem, self.problem.parameters(self.u)
         f, J, P = problem.field.derivatives(times, x, values, problem.active)
         if not problem.autonomous:
-            self._add_forcing(times / self.period, x, values, P)
+            self._add_forcing(times / self.period, x, P)
         return f, J, P
 
-    def _add_forcing(self, phases: Array, x: Array, values: Array, P: Array) -> None:
+    def _add_forcing(self, phases: Array, x: Array, P: Array) -> None:
         """Add the dependence of T on the parameter to P, the derivative of T f(T tau, x, p) / T."""
         problem, T = self.problem, self.period
-        for place, index in enumerate(problem.active):
-            h = _DIFFERENCE * max(abs(values[index]), 1e-3)
-            sides = []
-            for sign in (1.0, -1.0):
-                beside = values.copy()
-                beside[index] += sign * h
-                period = problem.field.forcing_period(beside)
-                assert period is not None
-                sides.append((beside, problem.periods * period))
-            if sides[0][1] == T == sides[1][1]:
-                continue
-            up, down = (period * problem.field.rates(period * phases, x, beside)
-                        for beside, period in sides)
-            P[:, :, place] = (up - down) / (2.0 * h * T)
+
+        def rates(u: Array) -> Array:
+            period = problem.period(u)
+            return period * problem.field.rates(period * phases, x, problem.parameters(u))
+
+        for place in range(-len(problem.active), 0):
+            if any(problem.period(u) != T for u in beside(self.u, place)):
+                P[:, :, place] = by_differences(rates, self.u, place) / T
 
     @cached_property
     def factors(self) -> condensation.CondensedFactors:

@@ -6,7 +6,7 @@ of them; :mod:`fecontact.bifurcation.orbits.discretisations` lists the methods.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -14,11 +14,14 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.attempts import first_that_goes
 from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.problem import ContinuationOptions
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.orbits import starts
 from fecontact.bifurcation.orbits.orbit_points import OrbitPoints
+from fecontact.bifurcation.orbits.restored import rescaled, restored_orbit
+from fecontact.bifurcation.orbits.same_orbit import HALVING
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField
 
@@ -50,6 +53,15 @@ class Request:
     width: float | None = None
     direction: float = 1.0
     both: bool = False
+
+    def restored(self, point: BranchPoint) -> tuple[Any, Array, Array]:
+        """Problem, unknowns and tangent of a point, by its own method, to continue its branch.
+
+        Scales of the states that are given no longer grow.
+        """
+        problem, u, tangent = restored_orbit(self.field, point)
+        limits = None if self.scales is not None else point.branch.attributes.get("limits")
+        return replace(rescaled(problem, self.scales, self.width), limits=limits), u, tangent
 
     @property
     def sign(self) -> float:
@@ -128,6 +140,23 @@ class Discretisation(OrbitPoints):
         problem = start[0]
         return stepped_off(start, request, lambda u, tangent, options: self.followed(
             (problem, u, tangent), method, options, None))
+
+
+def follow_orbits(
+    problem: Any, u: Array, options: ContinuationOptions,
+    attributes: Mapping[str, Any] | None = None, **how: Any,
+) -> Branch:
+    """Follow orbits by one method; doubled ones end where they become single ones.
+
+    ``attributes`` are those of the branch besides the ones of its problem.
+    """
+    branch = continue_branch(
+        problem, u, replace(options, stop_at=(*options.stop_at, HALVING)),
+        name=problem.parameter_name, attributes={**problem.attributes(), **(attributes or {})},
+        **how)
+    if branch.points[-1].kind == HALVING and HALVING not in options.stop_at:
+        return replace(branch, status=BranchStatus.CLOSED)
+    return branch
 
 
 def stepped_off(

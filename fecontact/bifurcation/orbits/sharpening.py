@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.newton import finished, newton, norm
+from fecontact.bifurcation.continuation.newton import norm, reached
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import (
     NeimarkSackerPoint,
@@ -331,11 +331,6 @@ def _agree(one: Place, other: Place, kind: str, reach: float) -> bool:
 def _test_at(place: Place, kind: str, along: float) -> float:
     """A test function on the branch at a distance from a place; NaN if the corrector fails."""
     problem, u, tangent = place
-    options, row = ContinuationOptions(), problem.weights() * tangent
-    try:
-        reached = newton(problem, u + along * tangent, row, options.tolerance,
-                            2 * options.iterations)
-        return (np.nan if reached is None
-                else finished(problem, *reached, row, options).tests[kind])
-    except FecontactError:
-        return np.nan
+    found = reached(problem, u + along * tangent, problem.weights() * tangent,
+                    ContinuationOptions())
+    return np.nan if found is None else found.tests[kind]

@@ -23,7 +23,7 @@ from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests, floquet_
 from fecontact.bifurcation.orbits.mesh import interpolate, require_segments
 from fecontact.bifurcation.orbits.multiplier_rounding import MultiplierRounding
 from fecontact.bifurcation.orbits.same_orbit import VANISHING, near_saddle, same_place, shrunk
-from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns
+from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns, by_differences
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array
 from fecontact.integrate.ensembles import ensemble
@@ -377,7 +377,7 @@ class ShootingLinearisation:
         K, d = len(problem.mesh) - 1, problem.field.dimension
         factors = condensation.factors_for(K, 1, d, problem.common)
         values = problem.parameters(self.u)
-        slope = 0.0 if problem.autonomous else self._period_slope(values)
+        slope = 0.0 if problem.autonomous else float(by_differences(problem.period, self.u))
         for j, run in enumerate(self.runs):
             factors.local[j, :, :d] = run.monodromy
             factors.local[j, :, d : 2 * d] = -np.eye(d)
@@ -389,15 +389,6 @@ class ShootingLinearisation:
                 factors.local[j, :, -1] += slope * self._shifted(j, run, values)
         condensation.chain_intervals(factors)
         return factors
-
-    def _period_slope(self, values: Array) -> float:
-        """Derivative dT/dp of the forcing period with respect to the free parameter."""
-        problem, h = self.problem, 1e-4 * (abs(float(self.u[-1])) or 1.0)
-        above, below = values.copy(), values.copy()
-        above[problem.free] += h
-        below[problem.free] -= h
-        periods = [problem.field.forcing_period(each) or 0.0 for each in (above, below)]
-        return problem.periods * (periods[0] - periods[1]) / (2.0 * h)
 
     def _shifted(self, j: int, run: Sensitivity, values: Array) -> Array:
         """Derivative (d,) of the end of segment j with respect to the period."""
@@ -426,4 +417,4 @@ class ShootingLinearisation:
     def require_certain(self) -> None:
         """Warn where differences of set-valued runs to one side have other multipliers."""
         require_same(self.floquet.multipliers, [run.sided for run in self.runs],
-                     f"{list(self.problem.field.parameters)[self.problem.free]} = {self.u[-1]:.6g}")
+                     f"{self.problem.parameter_name} = {self.u[-1]:.6g}")

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.inner_product import unit
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of, width_of
 from fecontact.bifurcation.equilibria.equilibrium import Equilibrium, default_scales
@@ -227,12 +228,8 @@ def size_row(problem: CollocationProblem, u: Array) -> Array:
 
 
 def _newton(problem: CollocationProblem, u: Array, tolerance: float, family: bool) -> Array:
-    row = np.zeros_like(u)
-    row[-1] = 1.0
-    if family:
-        row = size_row(problem, u)
-    name = list(problem.field.parameters)[problem.free]
-    where = f"at {name} = {u[-1]:.6g}, from the period {problem.period(u):.6g} s"
+    row = size_row(problem, u) if family else unit(len(u))
+    where = f"at {problem.parameter_name} = {u[-1]:.6g}, from the period {problem.period(u):.6g} s"
     size = float(np.linalg.norm(np.ptp(problem.nodes(u), axis=0)))
     linearised = problem.linearise(u)
     norm = float(np.linalg.norm(linearised.residual))
@@ -275,9 +272,7 @@ def doubled(problem: CollocationProblem, u: Array) -> Start:
     The direction is the eigenfunction of the multiplier -1, which changes sign after one period.
     """
     linearised = problem.linearise(u)
-    row = np.zeros_like(u)
-    row[-1] = 1.0
-    bordered = linearised.bordered(row, -1.0)
+    bordered = linearised.bordered(unit(len(u)), -1.0)
     d = problem.field.dimension
     _, _, vectors = np.linalg.svd(bordered.matrix[:d, :d])
     shape = bordered.expand(np.concatenate([vectors[-1], np.zeros(problem.common)]))

@@ -58,6 +58,11 @@ class OrbitUnknowns(FreeParameters):
     field: VectorField
     periods: int
 
+    @property
+    def parameter_name(self) -> str:
+        """Name of the parameter that is followed."""
+        return list(self.field.parameters)[self.free]
+
     @cached_property
     def autonomous(self) -> bool:
         """Whether the period is an unknown."""

@@ -93,10 +93,9 @@ class StepBatches:
         if e is None or (here is start and problem.layout.memory):
             return None
         options = self.options
-        stops = [options.stop_at] if isinstance(options.stop_at, str) else options.stop_at
         e.numbers[arrays.FIRST_BOUND : arrays.RESTS] = [
             *options.bounds, options.tolerance, options.largest_step, options.largest_turn,
-            problem.rounding.steps, options.locate and "fold" not in stops]
+            problem.rounding.steps, options.locate and "fold" not in options.stop_at]
         if problem.limits is not None:
             e.limits[:] = problem.limits[: len(e.limits)]
         else:

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.inner_product import unit
 from fecontact.bifurcation.continuation.newton import Solution
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.predictor import Predictor, Trail
@@ -260,7 +261,7 @@ class CurveLinearised:
     def gradient(self) -> Array:
         """Derivative (n,) of the test function."""
         if self.problem.kind == "period":
-            return _unit(len(self.u), -3) / self.problem.period
+            return unit(len(self.u), -3) / self.problem.period
         if self.problem.kind != "Neimark-Sacker":
             self.problem.sign.keep(self.singularity.terms[0], self.problem.orbit.times)
         return gradient(self.orbit, self.singularity.terms, self.second_derivatives)
@@ -318,7 +319,7 @@ def orbit_curve(
     value = float(problem.values[index])
     width = widths.get(second, abs(value) or 1.0)
     orbit = replace(problem, second=index, scales=np.insert(problem.scales, -1, width),
-                    sizes=_sizes(point, problem.intervals), predictor=Trail())
+                    sizes=Intervals.of(point.branch.method, problem.intervals), predictor=Trail())
     start = np.insert(u, -1, value)
     if kind == "period" and not orbit.autonomous:
         raise InputError(f"{point.place} has the period of the excitation, which keep='period' "
@@ -329,16 +330,3 @@ def orbit_curve(
         orbit, kind, problem.period(u), has_kinks=kinked)
     return curve, start, {**point.branch.attributes, "scales": orbit.scales, "method": replace(
         point.branch.method, intervals=problem.intervals)}
-
-
-def _sizes(point: BranchPoint, least: int) -> Intervals | None:
-    """Numbers of intervals along a curve; None where those of the point's branch are kept."""
-    method = point.branch.method
-    return None if method.state_tolerance is None else Intervals(
-        least, max(least, int(method.most_intervals)), method.state_tolerance)
-
-
-def _unit(size: int, place: int) -> Array:
-    row = np.zeros(size)
-    row[place] = 1.0
-    return row
