@@ -115,24 +115,28 @@ class FunctionField(VectorField):
         self, t: Array, x: Array, values: Array, active: Integers
     ) -> tuple[Array, Array, Array, Integers]:
         """Derivatives as in :meth:`derivatives`, and counts (d + a,) of failed complex steps."""
-        n, d = x.shape
         # Products of states beside zero would underflow in the complex step.
         x = np.where(np.abs(x) < _NOTHING * self._scales, 0.0, x)
-        f, J, P = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, len(active)))
-        wrong = np.zeros(d + len(active), dtype=np.int64)
-        address, scales, states = self._rates.address, self._scales, self._jacobian is None
-        kernels.batch_rates(address, t, x, values, f)
+        way = kernels.EXTRAPOLATED if self._complex is None else kernels.COMPLEX
+        return self._derived(way, t, x, values, active, self._scales)
+
+    def _derived(
+        self, way: int, t: Array, x: Array, values: Array, active: Integers, scales: Array,
+        step: float = 0.0,
+    ) -> tuple[Array, Array, Array, Integers]:
+        """Derivatives and counts as of :meth:`checked`, in one of the ways of the kernels."""
+        (n, d), a, states = x.shape, len(active), self._jacobian is None
+        f, J, P = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, a))
+        wrong = np.zeros(d + a, dtype=np.int64)
+        kernels.batch_rates(self._rates.address, t, x, values, f)
         if self._jacobian is not None:
             kernels.batch_jacobians(self._jacobian.address, t, x, values, J)
-        if not (states or len(active)):
-            return f, J, P, wrong
-        places = kernels.Places(t, x, f, values, scales, self._sizes, active, states)
-        workspace = kernels.workspace_for(d, len(values))
-        if self._complex is None:
-            kernels.differences(address, places, workspace, J, P)
-        else:
-            kernels.complex_steps(address, self._complex.address, places, workspace,
-                                  kernels.complex_workspace_for(d, len(values)), J, P, wrong)
+        if states or a:
+            kernels.fill_derivatives(
+                way, step, self._rates.address,
+                0 if self._complex is None else self._complex.address,
+                kernels.Places(t, x, f, values, scales, self._sizes, active, states),
+                kernels.workspace_for(d, len(values)), J, P, wrong)
         return f, J, P, wrong
 
     def rough_derivatives(
@@ -145,23 +149,13 @@ class FunctionField(VectorField):
         :meth:`as_new` forgets what was before.
         """
         chosen = np.array(tuple(active), dtype=np.int64)
-        n, d = x.shape
-        f, J, P = np.empty((n, d)), np.empty((n, d, d)), np.empty((n, d, len(chosen)))
-        kernels.batch_rates(self._rates.address, t, x, values, f)
-        if self._jacobian is not None:
-            kernels.batch_jacobians(self._jacobian.address, t, x, values, J)
-        places = kernels.Places(t, x, f, values, sizes, self._sizes, chosen,
-                                self._jacobian is None)
         if self._complex is not None and not self._was_wrong:
-            kernels.unchecked_complex_steps(self._complex.address, places,
-                                            kernels.complex_workspace_for(d, len(values)), J, P)
+            f, J, P, _ = self._derived(kernels.UNCHECKED, t, x, values, chosen, sizes)
             if np.isfinite(J.sum() + P.sum()):
                 return f, J, P
         if step is None:
             return None
-        kernels.central_differences(self._rates.address, places, step, np.empty(len(values)),
-                                    np.empty((3, d)), J, P)
-        return f, J, P
+        return self._derived(kernels.ONE_STEP, t, x, values, chosen, sizes, step)[:3]
 
     def as_new(self) -> Self:
         """Copy of the field without a record of failed complex steps."""

@@ -4,14 +4,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fecontact.core.addresses import function_at
-from fecontact.core.compiled import helper, kernel
+from fecontact.core.compiled import borrowing, helper, kernel
 from fecontact.core.copies import put
 from fecontact.core.records import (
     Block,
-    ComplexMatrix,
     ComplexVector,
     IntegerVector,
     Matrix,
@@ -39,6 +37,9 @@ _NARROWER = 0.137
 _LEVELS = 36
 # Places beside the state at which the rounding of the rates is measured.
 _PROBES = 16
+# Ways to form derivatives: the complex step, compared with differences or not; differences that are
+# extrapolated, or over one step.
+COMPLEX, UNCHECKED, EXTRAPOLATED, ONE_STEP = range(4)
 # Relative error of the complex step that is let pass.
 _RIGHT = 1e-7
 _EPS = 2.220446049250313e-16
@@ -81,7 +82,10 @@ class Place(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Workspace for one place; ``best`` and ``error`` (d,) are results of differences."""
+    """Workspace for one place, whose state is y and z, and whose parameters are q and w.
+
+    ``best`` and ``error`` (d,) are results of differences.
+    """
 
     y: Vector
     q: Vector
@@ -90,7 +94,21 @@ class Workspace(NamedTuple):
     orders: Matrix
     best: Vector
     error: Vector
-    column: Vector
+    z: ComplexVector
+    w: ComplexVector
+    out: ComplexVector
+
+
+@helper
+def _set_beside(function, place, moved, at, h, workspace):
+    """Fill ``above`` and ``below`` with the rates at ``moved[at]`` + h and - h; their distance."""
+    value = moved[at]
+    moved[at] = value + h
+    function(place.t, place.y, place.q, workspace.above)
+    moved[at] = value - h
+    function(place.t, place.y, place.q, workspace.below)
+    moved[at] = value
+    return (value + h) - (value - h)
 
 
 @helper
@@ -104,18 +122,13 @@ def _extrapolated(function, place, moved, at, size, workspace):
     over less than h. Once a rate has converged, stop at the first step at which its error grows:
     over shorter ones only rounding is seen, and none at all where it keeps f from changing.
     """
-    t, y, q, f = place
+    f, h = place.f, _WIDEST * size
     above, below, orders, best, error = (workspace.above, workspace.below, workspace.orders,
                                          workspace.best, workspace.error)
-    value, h = moved[at], _WIDEST * size
     for i in range(len(f)):
         best[i], error[i], orders[4, i] = np.nan, np.inf, 0.0
     for level in range(_LEVELS):
-        moved[at] = value + h
-        function(t, y, q, above)
-        moved[at] = value - h
-        function(t, y, q, below)
-        width = (value + h) - (value - h)
+        width = _set_beside(function, place, moved, at, h, workspace)
         if not width > 0.0:
             break
         done, largest = level > 1, 0.0
@@ -143,7 +156,6 @@ def _extrapolated(function, place, moved, at, size, workspace):
         if done:
             break
         h *= 0.5
-    moved[at] = value
 
 
 @helper
@@ -156,34 +168,29 @@ def _roughness(function, place, moved, at, size, workspace):
     where short steps change nothing, the least change is that unit. Where none changes anything,
     states and parameters tell what may cancel.
     """
-    t, y, q = place.t, place.y, place.q
+    y, q = place.y, place.q
     above, below, orders = workspace.above, workspace.below, workspace.orders
     value, h = moved[at], _WIDEST * size
     for i in range(len(above)):
         orders[0, i] = 0.0
     for sample in range(_PROBES):
-        place, part = value + h, 1e-9 * 4.0 ** (sample % 6) * size
-        moved[at] = place
-        function(t, y, q, above)
+        moved[at] = value + h
+        function(place.t, y, q, above)
         for i in range(len(above)):
             orders[1, i] = -2.0 * above[i]
-        moved[at] = place + part
-        function(t, y, q, above)
-        moved[at] = place - part
-        function(t, y, q, below)
+        part = 1e-9 * 4.0 ** (sample % 6) * size
+        _set_beside(function, place, moved, at, part, workspace)
         for i in range(len(above)):
             jump = abs(above[i] + below[i] + orders[1, i])
             if jump > orders[0, i]:
                 orders[0, i] = jump
         h *= -0.4
+    moved[at] = value
     for i in range(len(above)):
         orders[1, i], orders[2, i] = 1.0, np.inf
     part = _WIDEST * size
     while part > 1e-13 * size:
-        moved[at] = value + part
-        function(t, y, q, above)
-        moved[at] = value - part
-        function(t, y, q, below)
+        _set_beside(function, place, moved, at, part, workspace)
         for i in range(len(above)):
             change = abs(above[i] - below[i])
             orders[1, i] = min(orders[1, i], change)
@@ -195,22 +202,15 @@ def _roughness(function, place, moved, at, size, workspace):
         if orders[1, i] == 0.0:
             unit = orders[2, i] if orders[2, i] < np.inf else 64.0 * _EPS * hidden
             orders[0, i] = max(orders[0, i], unit)
-    moved[at] = value
 
 
 @helper
-def _correct(function, place, moved, at, size, workspace):
-    """Put differences into ``workspace.column`` where the complex step is wrong; True if it is."""
-    t, y, q, f = place
-    above, below, best, error, column = (workspace.above, workspace.below, workspace.best,
-                                         workspace.error, workspace.column)
-    value, h = moved[at], _CHECK * size
-    moved[at] = value + h
-    function(t, y, q, above)
-    moved[at] = value - h
-    function(t, y, q, below)
-    moved[at] = value
-    width = (value + h) - (value - h)
+def _correct(function, place, moved, at, size, workspace, column):
+    """Put differences into ``column`` (d,) where the complex step is wrong; True if it is."""
+    f = place.f
+    above, below, best, error = (workspace.above, workspace.below, workspace.best,
+                                 workspace.error)
+    width = _set_beside(function, place, moved, at, _CHECK * size, workspace)
     right = True
     for i in range(len(f)):
         change = above[i] - below[i]
@@ -250,38 +250,38 @@ def _correct(function, place, moved, at, size, workspace):
 
 
 @helper
-def columns_by_complex_step(function, analytic, place, scales, workspace, complex_workspace, J,
-                            wrong):
-    """Fill J (d, d) at a place by the complex step; ``wrong`` counts columns put right.
-
-    The workspaces hold the state and the parameters of the place.
-    """
-    x, d = place.y, len(J)
-    z, w = complex_workspace[0, :d], complex_workspace[1, : len(place.q)]
-    out = complex_workspace[2, :d]
-    column = workspace.column
-    for j in range(d):
-        z[j] = complex(x[j], _TINY)
-        analytic(place.t, z, w, out)
-        z[j] = x[j]
-        for i in range(d):
-            column[i] = out[i].imag / _TINY
-        size = max(abs(x[j]), scales[j])
-        if _correct(function, place, place.y, j, size, workspace):
-            wrong[j] += 1
-        for i in range(d):
-            J[i, j] = column[i]
+def move_to(x, p, workspace):
+    """Set state and parameters of the workspace, real and complex."""
+    put(x, workspace.y)
+    put(x, workspace.z)
+    put(p, workspace.q)
+    put(p, workspace.w)
 
 
 @helper
-def columns_by_differences(function, place, x, scales, workspace, J):
-    """Fill J (d, d) by differences; ``workspace`` holds the state x and the parameters."""
-    best = workspace.best
-    for j in range(len(x)):
-        size = max(abs(x[j]), scales[j])
-        _extrapolated(function, place, place.y, j, size, workspace)
-        for i in range(len(x)):
-            J[i, j] = best[i]
+def set_column(way, step, function, analytic, place, moved, shifted, at, scale, workspace, column):
+    """Fill ``column`` (d,) with the derivative to ``moved[at]``, an entry of the place's y or q.
+
+    ``shifted`` is z or w. True if a complex step was wrong, and differences take its place. One
+    ``step`` is in scales, others are in the larger of entry and scale.
+    """
+    size = max(abs(moved[at]), scale)
+    if way == EXTRAPOLATED:
+        _extrapolated(function, place, moved, at, size, workspace)
+        put(workspace.best, column)
+        return False
+    if way == ONE_STEP:
+        h = step * scale
+        _set_beside(function, place, moved, at, h, workspace)
+        for i in range(len(column)):
+            column[i] = (workspace.above[i] - workspace.below[i]) / (2.0 * h)
+        return False
+    shifted[at] = complex(moved[at], _TINY)
+    analytic(place.t, workspace.z, workspace.w, workspace.out)
+    shifted[at] = moved[at]
+    for i in range(len(column)):
+        column[i] = workspace.out[i].imag / _TINY
+    return way == COMPLEX and _correct(function, place, moved, at, size, workspace, column)
 
 
 @kernel
@@ -300,145 +300,43 @@ def batch_jacobians(address: int, t: Vector, x: Matrix, p: Vector, J: Block) -> 
         function(t[k], x[k], p, J[k])
 
 
-@kernel
-def complex_steps(
-    address: int, complex_address: int, places: Places, workspace: Workspace,
-    complex_workspace: ComplexMatrix, J: Block, P: Block, wrong: IntegerVector,
-) -> None:
-    """Fill J (N, d, d) if wanted, and P (N, d, a), by the complex step.
+@borrowing
+def _fill_columns(way, step, function, analytic, places, workspace, J, P, wrong):
+    x, active, y, q, z, w = (places.x, places.active, workspace.y, workspace.q, workspace.z,
+                             workspace.w)
+    d = x.shape[1]
+    for n in range(len(x)):
+        move_to(x[n], places.p, workspace)
+        place = Place(places.t[n], y, q, places.f[n])
+        for c in range(0 if places.states else d, d + len(active)):
+            if c < d:
+                at, scale, moved, shifted, column = c, places.scales[c], y, z, J[n, :, c]
+            else:
+                at = active[c - d]
+                scale, moved, shifted, column = places.sizes[at], q, w, P[n, :, c - d]
+            if set_column(way, step, function, analytic, place, moved, shifted, at, scale,
+                          workspace, column):
+                wrong[c] += 1
 
-    Each column is compared with differences, which take the place of what differs from them:
-    ``wrong`` (d + a,) counts the places at which that is so, by columns of J and P.
-    ``complex_workspace`` is that of :func:`complex_workspace_for`.
+
+@kernel
+def fill_derivatives(
+    way: int, step: float, address: int, complex_address: int, places: Places,
+    workspace: Workspace, J: Block, P: Block, wrong: IntegerVector,
+) -> None:
+    """Fill J (N, d, d) if wanted, and P (N, d, a), by central differences or the complex step.
+
+    ``wrong`` (d + a,) counts the places at which differences took the place of a complex step, by
+    columns of J and P.
     """
-    function, complex_function = rates_at(address), complex_rates_at(complex_address)
-    t, x, p, active, column = places.t, places.x, places.p, places.active, workspace.column
-    d, k = x.shape[1], len(p)
-    y, q = workspace.y, workspace.q
-    z, w, out = complex_workspace[0, :d], complex_workspace[1, :k], complex_workspace[2, :d]
-    put(p, q)
-    for a in range(k):
-        w[a] = p[a]
     wrong[:] = 0
-    for n in range(len(t)):
-        place = Place(t[n], y, q, places.f[n])
-        for i in range(d):
-            z[i], y[i] = x[n, i], x[n, i]
-        if places.states:
-            columns_by_complex_step(function, complex_function, place, places.scales, workspace,
-                                    complex_workspace, J[n], wrong)
-        for a in range(len(active)):
-            at = active[a]
-            w[at] = complex(p[at], _TINY)
-            complex_function(t[n], z, w, out)
-            w[at] = p[at]
-            for i in range(d):
-                column[i] = out[i].imag / _TINY
-            size = max(abs(p[at]), places.sizes[at])
-            if _correct(function, place, q, at, size, workspace):
-                wrong[d + a] += 1
-            for i in range(d):
-                P[n, i, a] = column[i]
-
-
-@kernel
-def differences(address: int, places: Places, workspace: Workspace, J: Block, P: Block) -> None:
-    """Fill J (N, d, d) if wanted, and P (N, d, a), by extrapolated central differences."""
-    function = rates_at(address)
-    t, x, p, active, best = places.t, places.x, places.p, places.active, workspace.best
-    d = x.shape[1]
-    y, q = workspace.y, workspace.q
-    put(p, q)
-    for n in range(len(t)):
-        place = Place(t[n], y, q, places.f[n])
-        for i in range(d):
-            y[i] = x[n, i]
-        if places.states:
-            columns_by_differences(function, place, x[n], places.scales, workspace, J[n])
-        for a in range(len(active)):
-            at = active[a]
-            size = max(abs(p[at]), places.sizes[at])
-            _extrapolated(function, place, q, at, size, workspace)
-            for i in range(d):
-                P[n, i, a] = best[i]
-
-
-@kernel
-def central_differences(
-    address: int, places: Places, step: float, q: Vector, beside: Matrix, J: Block, P: Block,
-) -> None:
-    """Fill J (N, d, d) if wanted, and P (N, d, a), by central differences over one step in sizes.
-
-    ``q`` (k,) and ``beside`` (3, d) are workspace.
-    """
-    function = rates_at(address)
-    t, x, p, active = places.t, places.x, places.p, places.active
-    d = x.shape[1]
-    y, above, below = beside[0], beside[1], beside[2]
-    put(p, q)
-    for n in range(len(t)):
-        for i in range(d):
-            y[i] = x[n, i]
-        for j in range(d if places.states else 0):
-            h = step * places.scales[j]
-            y[j] = x[n, j] + h
-            function(t[n], y, q, above)
-            y[j] = x[n, j] - h
-            function(t[n], y, q, below)
-            y[j] = x[n, j]
-            for i in range(d):
-                J[n, i, j] = (above[i] - below[i]) / (2.0 * h)
-        for a in range(len(active)):
-            at = active[a]
-            h = step * places.sizes[at]
-            q[at] = p[at] + h
-            function(t[n], y, q, above)
-            q[at] = p[at] - h
-            function(t[n], y, q, below)
-            q[at] = p[at]
-            for i in range(d):
-                P[n, i, a] = (above[i] - below[i]) / (2.0 * h)
-
-
-@kernel
-def unchecked_complex_steps(
-    complex_address: int, places: Places, complex_workspace: ComplexMatrix, J: Block, P: Block,
-) -> None:
-    """Fill J and P as :func:`complex_steps`, without the comparison with differences.
-
-    The comparison takes nearly all of the time of :func:`complex_steps`.
-    """
-    complex_function = complex_rates_at(complex_address)
-    t, x, p, active = places.t, places.x, places.p, places.active
-    d, k = x.shape[1], len(p)
-    z, w, out = complex_workspace[0, :d], complex_workspace[1, :k], complex_workspace[2, :d]
-    for a in range(k):
-        w[a] = p[a]
-    for n in range(len(t)):
-        for i in range(d):
-            z[i] = x[n, i]
-        for j in range(d if places.states else 0):
-            z[j] = complex(x[n, j], _TINY)
-            complex_function(t[n], z, w, out)
-            z[j] = x[n, j]
-            for i in range(d):
-                J[n, i, j] = out[i].imag / _TINY
-        for a in range(len(active)):
-            at = active[a]
-            w[at] = complex(p[at], _TINY)
-            complex_function(t[n], z, w, out)
-            w[at] = p[at]
-            for i in range(d):
-                P[n, i, a] = out[i].imag / _TINY
+    _fill_columns(way, step, rates_at(address), complex_rates_at(complex_address), places,
+                  workspace, J, P, wrong)
 
 
 def workspace_for(states: int, parameters: int) -> Workspace:
     """Workspace for a function of so many states and parameters."""
-    y, above, below, best, error, column = np.empty((6, states))
-    return Workspace(y, np.empty(parameters), above, below, np.empty((6, states)), best, error,
-                     column)
-
-
-def complex_workspace_for(states: int, parameters: int) -> NDArray[np.complex128]:
-    """Workspace (3, max(d, k)) for the complex step of such a function."""
-    return np.empty((3, max(states, parameters)), dtype=complex)
+    y, above, below, best, error = np.empty((5, states))
+    z, out = np.empty((2, states), dtype=complex)
+    return Workspace(y, np.empty(parameters), above, below, np.empty((6, states)), best, error, z,
+                     np.empty(parameters, dtype=complex), out)

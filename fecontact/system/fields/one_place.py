@@ -11,17 +11,18 @@ import numpy as np
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law
-from fecontact.core.records import ComplexMatrix, IntegerVector, Matrix, Vector
+from fecontact.core.records import IntegerVector, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.system.fields.function_kernels import (
+    COMPLEX,
+    EXTRAPOLATED,
     Place,
     Workspace,
-    columns_by_complex_step,
-    columns_by_differences,
     complex_rates_at,
-    complex_workspace_for,
     jacobian_at,
+    move_to,
     rates_at,
+    set_column,
     workspace_for,
 )
 
@@ -38,7 +39,7 @@ class FieldKernel(NamedTuple):
         for those that it does not have.
     p, scales : (k,), (d,) arrays
         Parameters, and typical sizes of the states.
-    workspace, complex_workspace : Workspace, (3, max(d, k)) array
+    workspace : Workspace
         Workspace for derivatives.
     wrong : (d,) array
         Columns of Jacobians that the complex step got wrong, counted.
@@ -52,7 +53,6 @@ class FieldKernel(NamedTuple):
     p: Vector
     scales: Vector
     workspace: Workspace
-    complex_workspace: ComplexMatrix
     wrong: IntegerVector
 
 
@@ -78,28 +78,16 @@ def _with_jacobian(t, x, field, f, J):
     jacobian_at(field.jacobian)(t, x, field.p, J)
 
 
-def _with_complex_step(t, x, field, f, J):
-    function, workspace = rates_at(field.function), field.workspace
-    complex_workspace = field.complex_workspace
-    y, q = workspace.y, workspace.q
+def _by_steps(t, x, field, f, J):
+    function, analytic = rates_at(field.function), complex_rates_at(field.analytic)
+    way, workspace = COMPLEX if field.analytic != 0 else EXTRAPOLATED, field.workspace
     function(t, x, field.p, f)
-    for i in range(len(x)):
-        y[i], complex_workspace[0, i] = x[i], x[i]
-    for a in range(len(q)):
-        q[a], complex_workspace[1, a] = field.p[a], field.p[a]
-    columns_by_complex_step(function, complex_rates_at(field.analytic), Place(t, y, q, f),
-                            field.scales, workspace, complex_workspace, J, field.wrong)
-
-
-def _with_differences(t, x, field, f, J):
-    function, workspace = rates_at(field.function), field.workspace
-    y, q = workspace.y, workspace.q
-    function(t, x, field.p, f)
-    for i in range(len(x)):
-        y[i] = x[i]
-    for a in range(len(q)):
-        q[a] = field.p[a]
-    columns_by_differences(function, Place(t, y, q, f), x, field.scales, workspace, J)
+    move_to(x, field.p, workspace)
+    place = Place(t, workspace.y, workspace.q, f)
+    for j in range(len(x)):
+        if set_column(way, 0.0, function, analytic, place, workspace.y, workspace.z, j,
+                      field.scales[j], workspace, J[:, j]):
+            field.wrong[j] += 1
 
 
 def _with_python(t, x, field, f, J):
@@ -111,9 +99,7 @@ _FORM = "evaluate(t, x, field, f)"
 _by_function_law = compile_law(EVALUATE, _FORM, _by_function)
 _by_python_law = compile_law(EVALUATE, _FORM, _by_python)
 _derivatives = {way: compile_law(DERIVE, "derive(t, x, field, f, J)", function)
-                for way, function in (("jacobian", _with_jacobian),
-                                      ("complex", _with_complex_step),
-                                      ("differences", _with_differences),
+                for way, function in (("jacobian", _with_jacobian), ("steps", _by_steps),
                                       ("python", _with_python))}
 
 
@@ -121,8 +107,8 @@ def compiled_field(
     rates: int, jacobian: int, analytic: int, values: Array, scales: Array
 ) -> FieldKernel:
     """A field of compiled functions, by their addresses; zero for a function that there is not."""
-    way = "jacobian" if jacobian else "complex" if analytic else "differences"
-    return _field(_by_function_law.address, _derivatives[way].address,
+    way = _derivatives["jacobian" if jacobian else "steps"]
+    return _field(_by_function_law.address, way.address,
                   (rates, jacobian, analytic), values, scales)
 
 
@@ -138,4 +124,4 @@ def _field(
     d, k = len(scales), len(values)
     return FieldKernel(evaluate, derive, *functions, np.array(values, dtype=float),
                        np.array(scales, dtype=float), workspace_for(d, k),
-                       complex_workspace_for(d, k), np.zeros(d, dtype=np.int64))
+                       np.zeros(d, dtype=np.int64))
