@@ -30,6 +30,14 @@ def summary(thing: Any) -> str:
     return " ".join(text.split())
 
 
+class InheritsDocumentation:
+    """Base of classes whose subclasses describe their own fields alone."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        inherit_documentation(cls)
+
+
 def inherit_documentation(cls: type) -> None:
     """Complete the docstring of a dataclass from those of its bases.
 

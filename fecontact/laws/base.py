@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from typing_extensions import TypeAliasType
 
 from fecontact.core.compiled import CompiledLaw
-from fecontact.core.docstrings import inherit_documentation
+from fecontact.core.docstrings import InheritsDocumentation
 from fecontact.core.errors import LARGEST, InputError, require_choice, shown
 from fecontact.core.types import Array
 from fecontact.laws.friction_curve import stick_velocity
@@ -62,7 +62,7 @@ def _annotations(law: Any) -> Mapping[str, tuple[Any, tuple[Bound, ...]]]:
 
 
 @dataclass(frozen=True)
-class NodeLaw:
+class NodeLaw(InheritsDocumentation):
     """A law whose parameters may differ between contact nodes.
 
     A subclass describes only its own fields; the descriptions of inherited fields and the errors
@@ -79,10 +79,6 @@ class NodeLaw:
     # Parameters that are lists, but not of one value per node.
     shared_fields: ClassVar[frozenset[str]] = frozenset()
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
-
-    def __init_subclass__(cls, **options: Any) -> None:
-        super().__init_subclass__(**options)
-        inherit_documentation(cls)
 
     def __post_init__(self) -> None:
         law: Any = type(self)

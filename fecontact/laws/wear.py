@@ -5,16 +5,22 @@ from typing import Annotated
 
 import numpy as np
 
+from fecontact.core.docstrings import InheritsDocumentation
 from fecontact.core.errors import require_not_negative
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 
 
 @dataclass(frozen=True)
-class WearLaw:
+class WearLaw(InheritsDocumentation):
     """Wear of the body in slip, at each contact node by itself.
 
     Neither what bristles store nor what smoothed friction loses in stick wears anything.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
     """
 
     def volume(self, slip_work: Array, power: Array, pressed_speed: Array) -> Array:
@@ -40,11 +46,6 @@ class EnergyWear(WearLaw):
     ----------
     coefficient : float
         k_w, zero or above [m3/J].
-
-    Raises
-    ------
-    InputError
-        For a coefficient out of range.
 
     References
     ----------
@@ -73,11 +74,6 @@ class ArchardWear(WearLaw):
     ----------
     coefficient : float
         k, zero or above: Archard's dimensionless coefficient over the hardness [m2/N].
-
-    Raises
-    ------
-    InputError
-        For a coefficient out of range.
 
     References
     ----------

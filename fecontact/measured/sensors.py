@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from fecontact.core.checks import as_direction, as_place, require_kind
-from fecontact.core.docstrings import inherit_documentation
+from fecontact.core.docstrings import InheritsDocumentation
 from fecontact.core.errors import (
     InputError,
     choices,
@@ -30,7 +30,7 @@ _AXES = "xyz"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sensor:
+class Sensor(InheritsDocumentation):
     """Base class of virtual sensors: name, sensitivity, mass, noise and resonance.
 
     The reading is ``sensitivity`` times the true value, filtered by the sensor's own resonance
@@ -68,9 +68,6 @@ class Sensor:
     resonance_damping: float = 0.02
     noise_rms: float = 0.0
     noise_density: float = 0.0
-
-    def __init_subclass__(cls) -> None:
-        inherit_documentation(cls)
 
     def __post_init__(self) -> None:
         owner = type(self).__name__

@@ -53,11 +53,6 @@ class FourierSeries(Profile):
         force.
     phases : (n,) sequence, optional
         Phases phi_k [rad]; zero by default.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges, or sequences of different lengths.
     """
 
     kernel: ClassVar = fourier

@@ -7,6 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from fecontact.core.compiled import CompiledLaw
+from fecontact.core.docstrings import InheritsDocumentation
 from fecontact.core.errors import require_finite, require_positive
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
@@ -19,10 +20,15 @@ _SAMPLES = 10_001
 
 
 @dataclass(frozen=True)
-class GroundMotion:
+class GroundMotion(InheritsDocumentation):
     """Base class of motions of the ground: a frozen dataclass with a compiled ``signal``.
 
     The value of the signal is the travel [m], zero at t = 0, its rate the speed [m/s].
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges.
     """
 
     kernel: ClassVar[CompiledLaw]
@@ -90,11 +96,6 @@ class HarmonicSpeed(GroundMotion):
         Frequency f, positive [Hz].
     phase : float
         Phase phi [rad].
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
     """
 
     kernel: ClassVar = _harmonic_speed
@@ -158,11 +159,6 @@ class SpeedRamp(GroundMotion):
         Time t_1 at which the ramp starts [s].
     duration : float
         Duration T of the ramp, positive [s].
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
     """
 
     kernel: ClassVar = _ramp

@@ -8,6 +8,7 @@ import numpy as np
 
 from fecontact.core.checks import as_floats
 from fecontact.core.compiled import CompiledLaw, kernel
+from fecontact.core.docstrings import InheritsDocumentation
 from fecontact.core.errors import require_finite, require_not_negative, require_positive
 from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array, ArrayLike
@@ -22,12 +23,17 @@ def _shape(address: int, xi: Vector, p: Vector, out: Matrix) -> None:
 
 
 @dataclass(frozen=True)
-class Profile:
+class Profile(InheritsDocumentation):
     """Base class of profiles y(xi): a frozen dataclass with a compiled ``ground_profile``.
 
     Height, slope and curvature are continuous. The first parameter of every kernel is a level that
     is added to the height: zero for heights, one for a factor 1 + y of the friction force. A
     user-defined profile sets ``kernel`` and overrides methods as required.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges, or that do not fit together.
     """
 
     kernel: ClassVar[CompiledLaw]
@@ -119,11 +125,6 @@ class Sine(Profile):
         Wavelength lambda_w, positive [m].
     phase : float
         Phase phi [rad].
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
     """
 
     kernel: ClassVar = _sine

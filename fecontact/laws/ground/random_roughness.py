@@ -42,11 +42,6 @@ class RandomRoughness(Profile):
         Period of the profile [m].
     seed : int
         Zero or above.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges, or more than 100 000 waves.
     """
 
     kernel: ClassVar = fourier

@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.core.checks import as_floats
 from fecontact.core.compiled import CompiledLaw, kernel
+from fecontact.core.docstrings import InheritsDocumentation
 from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array, ArrayLike
 from fecontact.laws.signatures import signal_at
@@ -19,10 +20,21 @@ def _history(address: int, t: Vector, p: Vector, out: Matrix) -> None:
 
 
 @dataclass(frozen=True)
-class Signal:
+class Signal(InheritsDocumentation):
     """Base class of signals: a frozen dataclass with a :func:`~fecontact.laws.signal`.
 
-    A user-defined signal sets ``kernel`` and overrides methods as required.
+    A user-defined signal sets ``kernel`` and overrides methods as required. The amplitude and the
+    errors below are added to its docstring.
+
+    Parameters
+    ----------
+    amplitude : float
+        Amplitude A, in the unit of the quantity.
+
+    Raises
+    ------
+    InputError
+        For values outside these ranges, or that do not fit together.
     """
 
     kernel: ClassVar[CompiledLaw]

@@ -37,11 +37,6 @@ class Constant(Signal):
     ----------
     value : float
         Value, in the unit of the quantity.
-
-    Raises
-    ------
-    InputError
-        For a value that is not finite.
     """
 
     kernel: ClassVar = _constant
@@ -72,17 +67,10 @@ class Harmonic(Signal):
 
     Parameters
     ----------
-    amplitude : float
-        Amplitude A, in the unit of the quantity.
     frequency_hz : float
         Frequency f, zero or above [Hz]; w / (2 pi) of an angular frequency w [rad/s].
     phase : float
         Phase phi [rad]; pi / 2 for a cosine.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
     """
 
     kernel: ClassVar = _harmonic
@@ -141,11 +129,6 @@ class Harmonics(Signal):
         f_k, zero or above [Hz].
     phases : sequence, optional
         Phases phi_k [rad]; zero by default.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges, or sequences of different lengths.
     """
 
     kernel: ClassVar = _harmonics
@@ -226,18 +209,11 @@ class SweptSine(Signal):
 
     Parameters
     ----------
-    amplitude : float
-        Amplitude A, in the unit of the quantity.
     start_frequency_hz, end_frequency_hz : float
         Frequencies f_0 and f_1 [Hz], zero or above; above zero for a logarithmic sweep.
     duration : float
         Duration T of the sweep, positive [s].
     kind : 'linear' or 'logarithmic'
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges.
     """
 
     kernel: ClassVar = _sweep

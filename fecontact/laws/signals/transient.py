@@ -44,11 +44,6 @@ class Step(Signal):
         Time of the step [s].
     value : float
         Value after the step, in the unit of the quantity.
-
-    Raises
-    ------
-    InputError
-        For values that are not finite.
     """
 
     kernel: ClassVar = _step
@@ -102,19 +97,12 @@ class Pulse(Signal):
     Parameters
     ----------
     kind : 'half-sine', 'rectangle', 'triangle' or 'haversine'
-    amplitude : float
-        Amplitude A, in the unit of the quantity.
     duration : float
         Duration T, positive [s].
     start : float
         Start t_0 [s].
     rise : float, optional
         Rise time of a rectangle, above zero and at most T / 2 [s]; by default T / 100.
-
-    Raises
-    ------
-    InputError
-        For values outside these ranges, or a rise of another kind of pulse.
     """
 
     kernel: ClassVar = _pulse
