@@ -167,14 +167,16 @@ def check_law(law: NormalLaw | FrictionLaw) -> None:
         _check_energy(law, share)
 
 
+def _forces(law: NormalLaw | FrictionLaw, p: Array) -> Values:
+    """Force (k, 1) of a law without memory as a function of its two arguments (k, 2)."""
+    return lambda points: law_values(law.kernel.address, p, points[:, 0], points[:, 1])[:, :1]
+
+
 def _check_normal(law: NormalLaw, p: Array) -> None:
     scale = law.penetration_scale
     u, v = (grid.ravel() for grid in np.meshgrid(
         scale * np.concatenate([_SIGNED[np.abs(_SIGNED) <= 1.0], np.linspace(-3.0, 10.0, 131)]),
         np.concatenate([-np.geomspace(1.0, 1e-4, 5), [0.0], np.geomspace(1e-4, 1.0, 5)])))
-
-    def forces(points: Array) -> Array:
-        return law_values(law.kernel.address, p, points[:, 0], points[:, 1])[:, :1]
 
     values = law_values(law.kernel.address, p, u, v)
     still = law_values(law.kernel.address, p, u, np.zeros_like(u))
@@ -189,7 +191,7 @@ def _check_normal(law: NormalLaw, p: Array) -> None:
              "must not give energy off by damping: (F(u, v) - F(u, 0)) v < 0")
     # Sizes for difference quotients dF/du and dF/dv; near zero a lower bound replaces |u|, |v|.
     sizes = np.column_stack([np.maximum(np.abs(u), 1e-3 * scale), np.maximum(np.abs(v), 1e-5)])
-    _check_derivatives(law, "(u, v)", points, sizes, forces, values[:, None, 1:],
+    _check_derivatives(law, "(u, v)", points, sizes, _forces(law, p), values[:, None, 1:],
                        ("F",), ("u", "v"))
 
 
@@ -220,9 +222,6 @@ def _check_friction(law: FrictionLaw, p: Array) -> None:
     scale = law.velocity_scale
     v, F = (grid.ravel() for grid in np.meshgrid(scale * _SIGNED, _FORCES))
 
-    def forces(points: Array) -> Array:
-        return law_values(law.kernel.address, p, points[:, 0], points[:, 1])[:, :1]
-
     values = law_values(law.kernel.address, p, v, F)
     points, force = np.column_stack([v, F]), values[:, 0]
     _require(law, "(v, F)", points, np.isfinite(values).all(axis=1), values, "must be finite")
@@ -232,7 +231,7 @@ def _check_friction(law: FrictionLaw, p: Array) -> None:
     _require(law, "(v, F)", points * [1.0, 0.0], open_ == 0.0, open_,
              "must be zero without normal force")
     sizes = np.column_stack([np.maximum(np.abs(v), scale), F])
-    _check_derivatives(law, "(v, F)", points, sizes, forces, values[:, None, 1:],
+    _check_derivatives(law, "(v, F)", points, sizes, _forces(law, p), values[:, None, 1:],
                        ("R",), ("v", "F"))
 
 

@@ -1,7 +1,7 @@
 """Python files of users' laws that tables name: where they are, and whether they may be run."""
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -52,11 +52,11 @@ def law_files(table: Any) -> set[Path]:
 
 def with_folder(table: Any, folder: Path) -> Any:
     """A table with files of laws and data named relative to the current folder."""
-    if isinstance(table, list):
-        return [with_folder(item, folder) for item in table]
-    if not isinstance(table, Mapping):
-        return table
-    return {key: _located(key, with_folder(value, folder), folder) for key, value in table.items()}
+    def located(key: str, value: Any) -> Any:
+        named = isinstance(value, str) and (key == "file" or (key == "law" and ".py:" in value))
+        return str(folder.resolve() / value) if named else value
+
+    return _changed(table, located)
 
 
 def movable(table: Any, folder: Path, root: Path) -> Any:
@@ -64,23 +64,23 @@ def movable(table: Any, folder: Path, root: Path) -> Any:
 
     The reverse of :func:`with_folder`; ``root`` can then be moved with its contents.
     """
+    folder, root = folder.resolve(), root.resolve()
+
+    def relative(key: str, value: Any) -> Any:
+        if key != "law" or not isinstance(value, str) or ".py:" not in value:
+            return value
+        path, _, title = value.rpartition(":")
+        if not Path(path).is_relative_to(root):
+            return value
+        return f"{Path(os.path.relpath(path, folder)).as_posix()}:{title}"
+
+    return _changed(table, relative)
+
+
+def _changed(table: Any, change: Callable[[str, Any], Any]) -> Any:
+    """A table of tables and lists with other values, by their keys."""
     if isinstance(table, list):
-        return [movable(item, folder, root) for item in table]
+        return [_changed(item, change) for item in table]
     if not isinstance(table, Mapping):
         return table
-    return {key: _relative(key, movable(value, folder, root), folder.resolve(), root.resolve())
-            for key, value in table.items()}
-
-
-def _relative(key: str, value: Any, folder: Path, root: Path) -> Any:
-    if key != "law" or not isinstance(value, str) or ".py:" not in value:
-        return value
-    path, _, title = value.rpartition(":")
-    if not Path(path).is_relative_to(root):
-        return value
-    return f"{Path(os.path.relpath(path, folder)).as_posix()}:{title}"
-
-
-def _located(key: str, value: Any, folder: Path) -> Any:
-    named = isinstance(value, str) and (key == "file" or (key == "law" and ".py:" in value))
-    return str(folder.resolve() / value) if named else value
+    return {key: change(key, _changed(value, change)) for key, value in table.items()}

@@ -83,7 +83,6 @@ from fecontact.study.sweep_section import SweepSettings, flat_axes
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.gap import Crown
 from fecontact.system.model_limits import (
-    PlannedBodies,
     implausible_bodies,
     implausible_faces,
     warn_of_limits,
@@ -455,8 +454,8 @@ class Study(Summarised, StudyModels):
             # Check names before the run: an error after a long run would come too late.
             for point in self.output.points:
                 system.basis.point_index(point)
-        warn_of_limits(implausible_faces(PlannedBodies(self.made_bodies(), self.contact_faces,
-                                                       system)), "In this study")
+        warn_of_limits(implausible_faces(self.made_bodies(), self.contact_faces, system),
+                       "In this study")
         initial = self.initial()
         with located(f"{_title(self.path)}: [simulation]:"):
             return simulate(system, t_end, t_start=settings.t_start,

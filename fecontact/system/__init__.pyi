@@ -1,5 +1,5 @@
+from .contact_quantities import Instant
 from .forcing_period import forcing_period
-from .instant import Instant
 from .interfaces import PrescribedMotion
 from .nodes import SystemArrays
 from .quasistatic.history import LoadHistory, Loop

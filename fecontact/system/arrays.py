@@ -1,13 +1,13 @@
 """Arrays of a contact system for its compiled kernels."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from fecontact.core.checks import whole_number
 from fecontact.core.compiled import CompiledLaw
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.types import Array, Integers
 from fecontact.laws.excitation import AXES, Drive, Load
 from fecontact.laws.friction.planar import along_slip
@@ -222,6 +222,28 @@ def _set_return_times(basis: ModalBasis, friction_groups: list[LawGroup], table:
             held = sliders[0].sum(axis=1) @ (rows**2).sum(axis=(1, 2))
             square = np.linalg.norm(basis.stiffness_matrix, 2) + held
             table[nodes, 0] = _RETURN_PART / np.sqrt(square) if square > 0.0 else _RETURN_PART
+
+
+def require_laws(
+    owner: str, what: str, kind: type, given: Any, group: str, names: Sequence[str]
+) -> None:
+    """Raise InputError unless this is a law of a kind, or a mapping with one for each of the names.
+
+    The names are those of groups of contact nodes, of a kind such as 'interface'.
+    """
+    if isinstance(given, Mapping):
+        for name in given:
+            if name not in names:
+                raise InputError(f"{owner}: {what} has a law for the {group} {name!r}"
+                                 f"{nearest(str(name), names)}, but the {group}s are: "
+                                 f"{choices(names)}.")
+        missing = [name for name in names if name not in given]
+        if missing:
+            raise InputError(f"{owner}: {what} lacks a law for the {group}"
+                             f"{'s' * (len(missing) > 1)} {choices(missing)}.")
+    for law in given.values() if isinstance(given, Mapping) else (given,):
+        if not isinstance(law, kind):
+            raise InputError(f"{owner}: {what} = {law!r} must be a {kind.__name__}.")
 
 
 def groups_of_laws(groups: Iterable[tuple[int, Any]], tributary: Array) -> Iterator[LawGroup]:

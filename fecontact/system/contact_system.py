@@ -27,11 +27,17 @@ from fecontact.reduction.basis_parameters import basis_parameter, with_basis_par
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import jacobian as contact_jacobian
 from fecontact.system import kernels
-from fecontact.system.arrays import LawGroup, excited, groups_of_laws, system_arrays
+from fecontact.system.arrays import (
+    LawGroup,
+    excited,
+    groups_of_laws,
+    require_laws,
+    system_arrays,
+)
+from fecontact.system.contact_quantities import Instant
 from fecontact.system.elastic_sliders import exact_arrays, slider_counts
 from fecontact.system.friction_memory import bristle_history, memory_scales, velocity_scale
 from fecontact.system.gap import Gap, gap_values
-from fecontact.system.instant import Instant
 from fecontact.system.interfaces import (
     Interface,
     PrescribedMotion,
@@ -168,14 +174,12 @@ class ContactSystem(Summarised):
                 raise InputError(NO_FRICTION_LAW.format("ContactSystem lacks friction"))
             object.__setattr__(self, "friction", ConstantFriction(0.0))
         self._require_parts(_KINDS)
+        names = [group for group, _ in self.basis.groups]
         for name, law in (("normal", NormalLaw), ("friction", FrictionLaw)):
             given = getattr(self, name)
+            require_laws("ContactSystem", name, law, given, "interface", names)
             if isinstance(given, Mapping):
-                self._require_groups(name, given)
                 object.__setattr__(self, name, MappingProxyType(dict(given)))
-            for one in getattr(self, name).values() if isinstance(given, Mapping) else (given,):
-                if not isinstance(one, law):
-                    raise InputError(f"ContactSystem: {name} = {one!r} must be a {law.__name__}.")
         object.__setattr__(self, "gap", gap_values(
             self.gap, self.basis.contact_places))
         object.__setattr__(self, "sliding", checked_sliding(self.basis, self.ground, self.sliding))
@@ -223,18 +227,6 @@ class ContactSystem(Summarised):
         """Arrays with another 'drive' or 'load' in ``parts``, which is checked as by with_()."""
         require_motion(self.basis, parts.get("drive", self.drive), parts.get("load", self.load))
         return excited(self.arrays, self.basis, self.drive, parts)
-
-    def _require_groups(self, name: str, given: Mapping[str, Any]) -> None:
-        names = [group for group, _ in self.basis.groups]
-        for group in given:
-            if group not in names:
-                raise InputError(f"ContactSystem: {name} has a law for the interface "
-                                 f"{group!r}{nearest(str(group), names)}, but the interfaces of "
-                                 f"the basis are: {choices(names)}.")
-        missing = [group for group in names if group not in given]
-        if missing:
-            raise InputError(f"ContactSystem: {name} lacks a law for the interface"
-                             f"{'s' * (len(missing) > 1)} {choices(missing)}.")
 
     def summary(self) -> list[tuple[str, str]]:
         """Modes and contact nodes, laws, ground, drive and load."""

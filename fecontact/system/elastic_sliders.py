@@ -228,18 +228,12 @@ def booked(
         return states, work
     states, work = within_limits(system, times, states, counts), work.copy()
     first = within_limits(system, np.array(start[:1]), start[1][None], counts)
-    _book(work, stored_in_sliders(system, states, counts)
-          - stored_in_sliders(system, first, counts))
-    return states, work
-
-
-def _book(work: Array, stored: Array) -> None:
-    """Count energies (N, n) put into springs of elements as stored, not as lost, in work."""
-    n = stored.shape[1]
+    stored = stored_in_sliders(system, states, counts) - stored_in_sliders(system, first, counts)
     work[:, BRISTLES] += stored.sum(axis=1)
     work[:, FRICTION] -= stored.sum(axis=1)
     if work.shape[1] > POWER_COUNT:
-        work[:, POWER_COUNT : POWER_COUNT + n] -= stored
+        work[:, POWER_COUNT : POWER_COUNT + stored.shape[1]] -= stored
+    return states, work
 
 
 def stored_in_sliders(system: Any, states: Array, counts: Integers) -> Array:

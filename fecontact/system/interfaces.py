@@ -186,11 +186,6 @@ class MotionSource:
     speed: float
     motion: GroundMotion | None
 
-    @property
-    def moves(self) -> bool:
-        """True if the speed can differ from zero."""
-        return self.motion is not None or self.speed != 0.0
-
 
 @read_only_arrays
 @dataclass(frozen=True, eq=False)
@@ -328,7 +323,7 @@ def prescribed_motion(
         return PrescribedMotion((Ground(),), factors)
     varying = [source for source in sources if source.motion is not None]
     steady = [source for source in sources if source.motion is None]
-    moving = [source for source in steady if source.moves]
+    moving = [source for source in steady if source.speed != 0.0]
     if len(varying) + bool(moving) > most:
         others = [source.what for source in (*varying[1:], *moving)]
         raise InputError(f"ContactSystem: {varying[0].what} varies in time while {choices(others)} "

@@ -121,6 +121,12 @@ def mean_load(arrays: SystemArrays, drive: Drive, load: Load) -> Array:
     return found
 
 
+def under_constant(arrays: SystemArrays, load: Array) -> SystemArrays:
+    """Arrays of a system under constant modal forces (m,) alone."""
+    return arrays._replace(constant_load=load, drive_shapes=np.zeros_like(arrays.drive_shapes),
+                           load_shapes=np.zeros_like(arrays.load_shapes))
+
+
 def work_of_loads(basis: ModalBasis, load: Load, depth: float) -> float:
     """Magnitude of the work of the constant loads when the body moves by a small depth [J]."""
     constant, _ = load_rows(basis, replace(load, normal=0.0))

@@ -96,29 +96,10 @@ class Planned:
                      for first, count in spans)
 
 
-@dataclass(frozen=True)
-class PlannedBodies:
-    """Elastic bodies of a study by name, their boundaries in contact, and the contact system."""
-
-    bodies: Mapping[str, ElasticBody]
-    faces: Mapping[str, tuple[str, ...]]
-    system: ContactSystem
-
-
 def implausible_values(planned: Planned) -> tuple[str, ...]:
     """Messages about values that are possible, but more likely an error; usually none."""
     with np.errstate(all="ignore"):
         return tuple(sentence for check in CHECKS_BEFORE for sentence in check(planned))
-
-
-def implausible_bodies(bodies: Mapping[str, ElasticBody]) -> tuple[str, ...]:
-    """Messages about size, material and thickness of bodies by name, "" for the only one."""
-    return tuple(_bodies(bodies))
-
-
-def implausible_faces(planned: PlannedBodies) -> tuple[str, ...]:
-    """Messages about meshes of contact faces that are more likely an error."""
-    return tuple(_chords(planned))
 
 
 def warn_of_limits(sentences: Iterable[str], what: str) -> None:
@@ -222,7 +203,8 @@ def beyond_fit(basis: ModalBasis, coordinates: Array) -> str | None:
     return None
 
 
-def _bodies(bodies: Mapping[str, ElasticBody]) -> Iterator[str]:
+def implausible_bodies(bodies: Mapping[str, ElasticBody]) -> Iterator[str]:
+    """Messages about size, material and thickness of bodies by name, "" for the only one."""
     for name, body in bodies.items():
         who = f"body '{name}'" if name else "the body"
         yield from implausible_body(who, body)
@@ -253,13 +235,13 @@ def implausible_body(who: str, body: ElasticBody) -> Iterator[str]:
                    f"check its unit.")
 
 
-def _chords(planned: PlannedBodies) -> Iterator[str]:
-    """Straight elements along curved contact faces."""
-    scale = planned.system.penetration_scale
-    for name, faces in planned.faces.items():
-        body = planned.bodies.get(name)
-        for face in faces if body is not None else ():
-            assert body is not None
+def implausible_faces(
+    bodies: Mapping[str, ElasticBody], faces: Mapping[str, tuple[str, ...]], system: ContactSystem
+) -> Iterator[str]:
+    """Messages about straight elements along curved contact faces, boundaries by body."""
+    scale = system.penetration_scale
+    for name, body in bodies.items():
+        for face in faces.get(name, ()):
             # Plane faces that are paired are smoothed where edges meet at up to 30 degrees.
             smoothed = np.radians(30.0) if name and body.dimension == 2 else 0.0
             found = chords(body.mesh, face, smoothed)

@@ -42,7 +42,6 @@ from fecontact.laws import ExponentialFriction, RoughSurface
 from fecontact.study.study import with_given_keys
 from fecontact.system.model_limits import (
     Planned,
-    PlannedBodies,
     implausible_faces,
     implausible_values,
 )
@@ -592,8 +591,8 @@ def implausible(study):
         warnings.simplefilter("always")
         with study.warning_of_bodies():
             system = study.system()
-    bodies = PlannedBodies(study.made_bodies(), study.contact_faces, system)
-    return (*(str(one.message) for one in caught), *implausible_faces(bodies),
+    return (*(str(one.message) for one in caught),
+            *implausible_faces(study.made_bodies(), study.contact_faces, system),
             *implausible_values(Planned(system, study.t_end, np.zeros(system.size))))
 
 

@@ -177,7 +177,7 @@ def test_contact_that_does_not_fit_is_refused():
             ({"contact": "bottom"}, "lacks normal"),
             ({"normal": law}, "there are none"),
             ({"contact": "bottom", "normal": {"botom": law}}, "did you mean 'bottom'"),
-            ({"contact": "bottom", "normal": {}}, "lacks a law for 'bottom'"),
+            ({"contact": "bottom", "normal": {}}, "lacks a law for the face 'bottom'"),
             ({"contact": "bottom", "normal": Frictionless()}, "normal"),
             ({"contact": "bottom", "normal": law, "gap": (0.0, 1.0)}, "gap"),
             ({"contact": "top", "normal": law}, "does not face")):

@@ -33,16 +33,14 @@ class BilateralLaw(NormalLaw):
     """Law of a spring between two points; see :mod:`fecontact.laws.normal.bilateral`."""
 
     bilateral: ClassVar = True
+    _shortening: ClassVar = 4  # column of the table
 
     def stored_energy(self, penetration: Array, share: Array) -> Array:
         """Energy (..., n) stored in the spring [J], zero at u = 0."""
         table = self.table(share)
-        shortening = self._shortening(table)
+        shortening = table[:, self._shortening]
         return self._potential(shortening - penetration, table) - self._potential(
             shortening, table)
-
-    def _shortening(self, table: Array) -> Array:
-        raise NotImplementedError
 
     def _potential(self, elongation: Array, table: Array) -> Array:
         """Integral (..., n) of the tension over the elongation (..., n)."""
@@ -115,9 +113,6 @@ class BilateralPolynomial(BilateralLaw):
         """None: a place (1, n) that no spring reaches [m]."""
         return np.full((1, nodes), _NOWHERE)
 
-    def _shortening(self, table: Array) -> Array:
-        return np.asarray(table[:, 4])
-
     def _potential(self, elongation: Array, table: Array) -> Array:
         c, cubic, _, preload, _, quadratic, quintic, *_ = table.T
         e, square = elongation, elongation**2
@@ -182,9 +177,6 @@ class BilateralPlay(BilateralLaw):
         middle, clearance = np.asarray(self.shortening), np.asarray(self.clearance)
         return np.array([np.broadcast_to(middle + side * clearance, nodes) for side in (-1, 1)])
 
-    def _shortening(self, table: Array) -> Array:
-        return np.asarray(table[:, 4])
-
     def _potential(self, elongation: Array, table: Array) -> Array:
         c, clearance, _, preload, _ = table.T
         depth = np.maximum(np.abs(elongation) - clearance, 0.0)
@@ -234,6 +226,7 @@ class BilateralPiecewise(BilateralLaw):
     kernel: ClassVar = _piecewise
     extensive: ClassVar = frozenset({"forces", "damping", "preload"})
     shared_fields: ClassVar = frozenset({"elongations", "forces"})
+    _shortening: ClassVar = 3
 
     elongations: Annotated[tuple[float, ...], Unit("m")]
     forces: Annotated[tuple[float, ...], Unit("N")]
@@ -272,9 +265,6 @@ class BilateralPiecewise(BilateralLaw):
         points[:, 1::2] = np.asarray(self.forces) * share[:, None]
         count = np.full((len(share), 1), float(len(self.elongations)))
         return np.column_stack([count, rows[0][:, 2:], points])
-
-    def _shortening(self, table: Array) -> Array:
-        return np.asarray(table[:, 3])
 
     def _potential(self, elongation: Array, table: Array) -> Array:
         e = np.asarray(self.elongations)

@@ -10,7 +10,7 @@ from fecontact.core.simd.vectors import everywhere, select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import NormalLaw, NotNegative, OneOrAbove, Positive
-from fecontact.laws.normal.powers import lower_power
+from fecontact.laws.normal.power import lower_power
 from fecontact.laws.pieces import pieces_of
 from fecontact.laws.signatures import normal_law
 

@@ -13,6 +13,7 @@ from fecontact.core.types import Array
 from fecontact.core.units import count
 from fecontact.system import columns, kernels
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.loads import under_constant
 from fecontact.system.model_limits import limits_exceeded, warn_of_limits
 from fecontact.system.nodes import SystemArrays
 from fecontact.system.quasistatic.given import given_rows, travelled, travelling, with_named_forces
@@ -27,7 +28,7 @@ from fecontact.system.quasistatic.pose import (
     sizes_of,
 )
 from fecontact.system.quasistatic.rest_state import RestState
-from fecontact.system.quasistatic.sliders import components, require_sliders, sliders_of
+from fecontact.system.quasistatic.sliders import components, sliders_of, springs_of
 from fecontact.system.statics.balance import Balance
 from fecontact.system.statics.equilibrium import resting
 
@@ -84,7 +85,9 @@ def load_history(
     require_kind("load_history", LoadPath, path=path)
     require_rtol(rtol, "load_history: rtol")
     system.require_compliance("load_history")
-    require_sliders(system)
+    for _, share, law in system.law_groups("friction"):
+        if law.memory:
+            springs_of(law, share)
     system, path = with_named_forces(system, path)
     given, arrays = given_rows(system, path), travelling(system)
     if start is None:
@@ -101,7 +104,8 @@ def load_history(
     # Tuples for kernels hold no read-only arrays.
     sliders = Sliders(*map(np.array, state.sliders))
     pose = _pose(state.modal_coordinates, sliders, state.slider_place, state.slider_force)
-    scale = _balance(system, arrays, given[0]).scale
+    scale = Balance(under_constant(arrays, given[0, : system.basis.modes].copy()), 0.0,
+                    system.penetration_scale).scale
     given = np.vstack([state.given, given])
     return _loaded(system, path, given, sliders,
                    _marched(arrays, given, pose, sliders, scale, rtol), 1)
@@ -180,13 +184,6 @@ def _pose(q: Array, sliders: Sliders, left: Array, force: Array | None = None) -
     if force is not None:
         pose.force[:] = force.reshape(n, e * tangents)
     return pose
-
-
-def _balance(system: ContactSystem, arrays: SystemArrays, given: Array) -> Balance:
-    return Balance(arrays._replace(
-        constant_load=given[: system.basis.modes].copy(),
-        drive_shapes=np.zeros_like(arrays.drive_shapes),
-        load_shapes=np.zeros_like(arrays.load_shapes)), 0.0, system.penetration_scale)
 
 
 def _slope_under_preload(

@@ -14,6 +14,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, kernel, routine
+from fecontact.core.copies import put, put_rows
 from fecontact.core.records import Matrix, Size, Vector
 from fecontact.core.types import Array, Integers
 from fecontact.system.node_forces import normal_force
@@ -121,32 +122,23 @@ def _begin(j, e, old, new, sliders):
 def _slid(j, e, old, new, sliders):
     """Friction loss and work of slider e of node j between two poses, in proportional motion.
 
-    The work is the mean force times the displacement of the slider.
+    The work is the mean force times the displacement of the slider. Last the work of that force on
+    the way of the node, without its sign.
     """
     tangents = old.force.shape[1] // sliders.stiffness.shape[1]
-    way, work = 0.0, 0.0
-    for k in range(tangents):
-        at = tangents * e + k
-        part = new.left[j, at] - old.left[j, at]
-        way = math.hypot(way, part)
-        work += 0.5 * (old.force[j, at] + new.force[j, at]) * part
-    if way == 0.0:
-        return 0.0, 0.0
-    P0, P1 = old.node[j, PRESSING], new.node[j, PRESSING]
-    begin = 0.0 if sliders.rigid[j, e] != 0.0 else _begin(j, e, old, new, sliders)
-    return 0.5 * sliders.limit[j, e] * (P0 + begin * (P1 - P0) + P1) * way, work
-
-
-@helper
-def _rubbed(j, e, old, new, sliders):
-    """Work of the mean force of slider e of node j on the way of the node, without its sign."""
-    tangents = old.force.shape[1] // sliders.stiffness.shape[1]
-    total = 0.0
+    way, work, rubbed = 0.0, 0.0, 0.0
     for k in range(tangents):
         at, place = tangents * e + k, PLACE + PER_TANGENT * k
-        total += 0.5 * (old.force[j, at] + new.force[j, at]) * (
-            new.node[j, place] - old.node[j, place])
-    return abs(total)
+        force, part = 0.5 * (old.force[j, at] + new.force[j, at]), new.left[j, at] - old.left[j, at]
+        way = math.hypot(way, part)
+        work += force * part
+        rubbed += force * (new.node[j, place] - old.node[j, place])
+    if way == 0.0:
+        return 0.0, 0.0, abs(rubbed)
+    P0, P1 = old.node[j, PRESSING], new.node[j, PRESSING]
+    begin = 0.0 if sliders.rigid[j, e] != 0.0 else _begin(j, e, old, new, sliders)
+    loss = 0.5 * sliders.limit[j, e] * (P0 + begin * (P1 - P0) + P1) * way
+    return loss, work, abs(rubbed)
 
 
 @helper
@@ -219,10 +211,10 @@ def _measure(
     for j in range(len(old.node)):
         lost = 0.0
         for e in range(sliders.stiffness.shape[1]):
-            loss, work = _slid(j, e, old, new, sliders)
+            loss, work, rubbed = _slid(j, e, old, new, sliders)
             lost += loss
             error += abs(work - loss)
-            turned += _rubbed(j, e, old, new, sliders)
+            turned += rubbed
         part[len(WORKS) + j] = lost
         # By the trapezoidal rule F du is F y_R' dg - F dy.
         F = 0.5 * (old.node[j, FORCE] + new.node[j, FORCE])
@@ -247,22 +239,10 @@ def _measure(
 @helper
 def _copy(source, target):
     """Copy a pose."""
-    for i in range(len(source.q)):
-        target.q[i] = source.q[i]
-    for j in range(len(source.node)):
-        for k in range(source.node.shape[1]):
-            target.node[j, k] = source.node[j, k]
-        for k in range(source.force.shape[1]):
-            target.force[j, k] = source.force[j, k]
-            target.left[j, k] = source.left[j, k]
-
-
-@helper
-def _keep(row, pose, total, kept):
-    """Write a pose, and works and losses so far, as a row of the results."""
-    _copy(pose, Pose(kept.q[row], kept.node[row], kept.force[row], kept.left[row]))
-    for i in range(len(total)):
-        kept.work[row, i] = total[i]
+    put(source.q, target.q)
+    put_rows(source.node, target.node)
+    put_rows(source.force, target.force)
+    put_rows(source.left, target.left)
 
 
 @kernel
@@ -323,8 +303,7 @@ def march(
         for i in range(size):
             total[i] += part[i]
         _copy(new, old)
-        for i in range(columns):
-            ends[0, i] = ends[1, i]
+        put(ends[1], ends[0])
         done = goal
         rubbing += turnover[TURNED]
         pressing += turnover[PRESSED]
@@ -332,7 +311,8 @@ def march(
             failed = 2.0
         proposed = length * min(8.0, max(0.9 / np.sqrt(max(excess, 1e-4)), 1.0))
         if done == 1.0:
-            _keep(row, old, total, kept)
+            _copy(old, Pose(kept.q[row], kept.node[row], kept.force[row], kept.left[row]))
+            put(total, kept.work[row])
             rubbed, pressed = max(rubbed, rubbing), max(pressed, pressing)
             rubbing, pressing = 0.0, 0.0
             row, done, proposed, failed = row + 1, 0.0, 1.0, 2.0

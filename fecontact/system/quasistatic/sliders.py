@@ -1,16 +1,18 @@
 """Sliders of the contact nodes of a system: springs of friction laws, or of stuck contacts."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from numbers import Real
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError, shown
 from fecontact.core.types import Array
 from fecontact.laws.base import FrictionLaw
 from fecontact.laws.friction_curve import static_coefficient
+from fecontact.system.arrays import LawGroup
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.quasistatic.pose import Sliders
 
@@ -18,17 +20,32 @@ from fecontact.system.quasistatic.pose import Sliders
 _PENALTY = 1e3
 
 
-def require_sliders(system: ContactSystem) -> None:
-    """Raise InputError for friction with internal variables that are not deflections of springs."""
-    for _, share, law in system.law_groups("friction"):
-        require_springs(law, share)
-
-
-def require_springs(law: FrictionLaw, share: Array) -> None:
-    """Raise InputError for a law with internal variables that are not deflections of springs."""
-    if law.memory and law.sliders(share) is None:
+def springs_of(law: FrictionLaw, share: Array) -> tuple[Array, Array]:
+    """Springs and limits of :meth:`FrictionLaw.sliders`; InputError for a law without them."""
+    found = law.sliders(share)
+    if found is None:
         raise InputError(f"{type(law).__name__} has no quasi-static limit made of springs and "
                          f"sliders; use JenkinsFriction, IwanFriction or a law without memory.")
+    return found
+
+
+def friction_springs(
+    groups: Iterable[LawGroup], n: int
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Springs (n, e) [N/m] and limits (n, e) of friction, and nodes (n,) without springs yet.
+
+    These have laws without memory.
+    """
+    each = [(nodes, share, law) for nodes, share, law in groups]
+    stiffness, limit = np.zeros((2, n, max(law.memory or 1 for _, _, law in each)))
+    plain = np.ones(n, dtype=bool)
+    for nodes, share, law in each:
+        if law.memory:
+            stiffness[nodes, : law.memory], limit[nodes, : law.memory] = springs_of(law, share)
+            plain[nodes] = False
+        else:
+            limit[nodes, 0] = static_coefficient(law, nodes.stop - nodes.start)
+    return stiffness, limit, plain
 
 
 def sliders_of(
@@ -55,17 +72,8 @@ def sliders_of(
         For values that are not above zero, and where there is no c_N for the ratio.
     """
     n = system.basis.contact_nodes
-    groups = [(nodes, share, law, law.sliders(share) if law.memory else None)
-              for nodes, share, law in system.law_groups("friction")]
-    width = max(law.memory or 1 for _, _, law, _ in groups)
-    stiffness, limit, rigid = np.zeros((3, n, width))
-    plain = np.ones(n, dtype=bool)
-    for nodes, _, law, springs in groups:
-        if springs is not None:
-            stiffness[nodes, : law.memory], limit[nodes, : law.memory] = springs
-            plain[nodes] = False
-        else:
-            limit[nodes, 0] = static_coefficient(law, nodes.stop - nodes.start)
+    stiffness, limit, plain = friction_springs(system.law_groups("friction"), n)
+    rigid = np.zeros_like(stiffness)
     if plain.any():
         share = system.share
         given = _given(tangential_ratio, tangential_stiffness, n, share)

@@ -6,8 +6,8 @@ distance from the other side, along the normal there, is n . (x - y) with the fo
 body is the given one.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,7 +15,7 @@ import numpy as np
 from typing_extensions import TypeAliasType
 
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, choices, nearest
+from fecontact.core.errors import InputError
 from fecontact.core.tables import located
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import listed
@@ -27,12 +27,11 @@ from fecontact.fem.faces.moving_feet import DeformedFace, FlatGround, Opposite
 from fecontact.fem.pairing import Pairing
 from fecontact.laws.base import FrictionLaw, NodeLaw, NormalLaw
 from fecontact.laws.check import require_sound
-from fecontact.laws.friction_curve import static_coefficient
-from fecontact.system.arrays import LawGroup, groups_of_laws, law_table
+from fecontact.system.arrays import LawGroup, groups_of_laws, law_table, require_laws
 from fecontact.system.gap import Gap, gap_values
 from fecontact.system.interfaces import Interface, PointPairing
 from fecontact.system.node_forces import normal_values
-from fecontact.system.quasistatic.sliders import require_springs
+from fecontact.system.quasistatic.sliders import friction_springs
 
 NormalLaws = TypeAliasType("NormalLaws", NormalLaw | Mapping[str, NormalLaw])
 FrictionLaws = TypeAliasType("FrictionLaws", FrictionLaw | Mapping[str, FrictionLaw])
@@ -116,8 +115,8 @@ def ground_points(
         raise InputError(f"deflection_path: gap has {np.size(given)} values for {count} contact "
                          f"nodes; give one number or one per node.")
     return [_points(face.matrix, face.positions, np.broadcast_to(given, count), FlatGround(d),
-                    [*_by_group("normal", NormalLaw, normal, face.groups)],
-                    [*_by_group("friction", FrictionLaw, friction, face.groups)], face.tributary)]
+                    _by_group("normal", NormalLaw, normal, face.groups),
+                    _by_group("friction", FrictionLaw, friction, face.groups), face.tributary)]
 
 
 def interface_points(
@@ -201,45 +200,22 @@ def _points(
         require_sound(law)
     found = ContactPoints(matrix.tocsr()[chosen], places, np.array(gap, dtype=float), opposite,
                           groups[0], np.zeros((n, 0)), np.zeros((n, 0)))
-    return found if not groups[1] else ContactPoints(
-        found.rows, places, found.gap, opposite, groups[0], *_sliders(found, groups[1]))
-
-
-def _sliders(points: ContactPoints, groups: Sequence[LawGroup]) -> tuple[Array, Array]:
-    """Springs (n, e) [N/m] and limits (n, e) of friction."""
-    n = len(points.gap)
-    width = max(law.memory or 1 for _, _, law in groups)
-    stiffness, limit = np.zeros((2, n, width))
+    if not groups[1]:
+        return found
+    stiffness, limit, plain = friction_springs(groups[1], n)
     scale = np.concatenate([np.full(nodes.stop - nodes.start, law.penetration_scale)
-                            for nodes, _, law in points.normal])
-    slope = points.forces(scale)[1]
-    for nodes, share, law in groups:
-        if law.memory:
-            require_springs(law, share)
-            stiffness[nodes, : law.memory], limit[nodes, : law.memory] = law.sliders(share)
-        else:
-            stiffness[nodes, 0] = _TANGENTIAL * slope[nodes]
-            limit[nodes, 0] = static_coefficient(law, nodes.stop - nodes.start)
-    return stiffness, limit
+                            for nodes, _, law in groups[0]])
+    stiffness[plain, 0] = _TANGENTIAL * found.forces(scale)[1][plain]
+    return replace(found, stiffness=stiffness, limit=limit)
 
 
 def _by_group(
     what: str, kind: type[Any], given: Any, groups: Sequence[tuple[str, int]]
-) -> Iterator[tuple[int, Any]]:
-    """Number of points and law of each group, or of all with one law; nothing without laws."""
+) -> list[tuple[int, Any]]:
+    """Number of points and law of each group, or of all with one law; none without laws."""
     if given is None:
-        return
-    require_kind("deflection_path", (kind, Mapping), **{what: given})
+        return []
+    require_laws("deflection_path", what, kind, given, "face", [name for name, _ in groups])
     if isinstance(given, kind):
-        yield sum(count for _, count in groups), given
-        return
-    names = [name for name, _ in groups]
-    for name, law in given.items():
-        if name not in names:
-            raise InputError(f"deflection_path: {what} has a law for {name!r}"
-                             f"{nearest(str(name), names)}, but contact names {choices(names)}.")
-        require_kind(f"deflection_path: {what}", kind, **{name: law})
-    for name, count in groups:
-        if name not in given:
-            raise InputError(f"deflection_path: {what} lacks a law for '{name}'.")
-        yield count, given[name]
+        return [(sum(count for _, count in groups), given)]
+    return [(count, given[name]) for name, count in groups]

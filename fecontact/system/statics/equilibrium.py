@@ -13,16 +13,16 @@ from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, listed, quantity
 from fecontact.laws.excitation import AXES, Load
-from fecontact.laws.friction.planar import along_slip, clear
+from fecontact.laws.friction.planar import clear
 from fecontact.laws.signatures import friction_law, planar_friction_law, signal
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import columns
 from fecontact.system.complex_modes import unstable_count
-from fecontact.system.contact_quantities import total_friction
+from fecontact.system.contact_quantities import Instant, total_friction
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.elastic_sliders import without_elements
 from fecontact.system.friction_memory import steady_memory
-from fecontact.system.instant import Instant
-from fecontact.system.loads import mean_load
+from fecontact.system.loads import mean_load, under_constant
 from fecontact.system.model_limits import limits_exceeded, named_motion, warn_of_limits
 from fecontact.system.nodes import SystemArrays
 from fecontact.system.statics.balance import Balance
@@ -33,11 +33,6 @@ Kind = Literal["rest", "sliding"]
 _LONGEST_SLIDE = 0.125
 # Longest step on the way to a stable state, in parts of the fitted range of large deflections.
 _PART_OF_RANGE = 0.1
-
-
-@friction_law
-def _frictionless(v, F, p):
-    return 0.0, 0.0, 0.0
 
 
 @friction_law
@@ -235,12 +230,8 @@ def at_rest(
     arrays: SystemArrays, travel: float, second_travel: float = 0.0
 ) -> SystemArrays:
     """Arrays of a system without friction, on ground at rest that has travelled [m]."""
-    return arrays._replace(
-        friction=np.full_like(arrays.friction, _frictionless.address),
-        memory=np.zeros_like(arrays.memory),
-        bristle_stiffness=np.zeros((2, len(arrays.gap), 0)), ground_motion=_still.address,
-        planar=np.full_like(arrays.planar, along_slip.address),
-        ground_motion_parameters=np.array([travel], dtype=float),
+    return without_elements(arrays)._replace(
+        ground_motion=_still.address, ground_motion_parameters=np.array([travel], dtype=float),
         second_motion=_still.address if len(arrays.planar) else 0,
         second_motion_parameters=np.array([second_travel], dtype=float))
 
@@ -255,9 +246,7 @@ def resting(
     that of the other sides. AnalysisError if there is none.
     """
     drive_forces = (arrays.drive_stiffness * motion) @ arrays.drive_shapes
-    arrays = at_rest(arrays, *travel.tolist())._replace(
-        constant_load=load + drive_forces, drive_shapes=np.zeros_like(arrays.drive_shapes),
-        load_shapes=np.zeros_like(arrays.load_shapes))
+    arrays = under_constant(at_rest(arrays, *travel.tolist()), load + drive_forces)
     problem = Balance(arrays, 0.0, system.penetration_scale)
     solution = problem.equilibrium()
     if solution is None:
@@ -270,11 +259,7 @@ def _at_mean(system: ContactSystem) -> SystemArrays:
 
     Only constant signals contribute; time-dependent ones are taken to have zero mean.
     """
-    arrays = system.arrays
-    return arrays._replace(
-        constant_load=mean_load(arrays, system.drive, system.load),
-        drive_shapes=np.zeros_like(arrays.drive_shapes),
-        load_shapes=np.zeros_like(arrays.load_shapes))
+    return under_constant(system.arrays, mean_load(system.arrays, system.drive, system.load))
 
 
 def _reason(system: ContactSystem, problem: Balance, friction: bool) -> str:
