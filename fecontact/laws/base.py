@@ -78,12 +78,16 @@ class NodeLaw(InheritsDocumentation):
     extensive: ClassVar[frozenset[str]] = frozenset()
     # Parameters that are lists, but not of one value per node.
     shared_fields: ClassVar[frozenset[str]] = frozenset()
+    # Fields that are no numbers, which the class checks itself.
+    own_fields: ClassVar[frozenset[str]] = frozenset()
     choices: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     def __post_init__(self) -> None:
         law: Any = type(self)
         for entry in fields(self):
             given = getattr(self, entry.name)
+            if entry.name in self.own_fields:
+                continue
             if entry.name in self.choices:
                 require_choice(type(self).__name__, entry.name, given, self.choices[entry.name])
                 continue

@@ -15,10 +15,7 @@ from fecontact.core.types import Array
 def numbers(owner: str, name: str, given: Any, least: int = 0) -> tuple[float, ...]:
     """Convert a sequence to a tuple of finite floats.
 
-    Raises
-    ------
-    InputError
-        For a value that is not finite, with its index, or fewer than ``least`` values.
+    InputError for a value that is not finite, with its index, or fewer than ``least`` values.
     """
     try:
         array = np.asarray(given, dtype=float)
@@ -76,10 +73,7 @@ def read_or_given(
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Two sequences of equal length, the first ascending, from a file or as given.
 
-    Raises
-    ------
-    InputError
-        Unless exactly one of both is given and valid.
+    InputError unless exactly one of both is given and valid.
     """
     (first, x), (second, y) = columns.items()
     if file is not None:

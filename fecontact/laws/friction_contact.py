@@ -92,10 +92,7 @@ class FrictionContact3D(NormalLaw):
 def separated(normal: Any, friction: Any, where: str) -> tuple[Any, Any]:
     """Normal and friction law, or mappings of them, with each FrictionContact3D taken apart.
 
-    Raises
-    ------
-    InputError
-        For a friction law beside a FrictionContact3D.
+    InputError for a friction law beside a FrictionContact3D.
     """
     if isinstance(normal, FrictionContact3D):
         if friction is not None:

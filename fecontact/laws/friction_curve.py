@@ -91,25 +91,14 @@ def velocity_of_minimum(law: Any) -> Array:
     return _per_node(law, _nodes(law), smallest)[:, 0]
 
 
+@lru_cache(maxsize=64)  # Many short runs may use the same law.
 def stick_velocity(law: Any, nodes: int) -> Array:
     """Slip velocity (n,) of the largest maximum of R/F, else ten times the velocity scale."""
-    try:
-        hash(law)
-    except TypeError:
-        return _stick_velocity(law, nodes)
-    return _kept_stick_velocity(law, nodes)
-
-
-def _stick_velocity(law: Any, nodes: int) -> Array:
     velocity = _largest(law, nodes)[1]
     width = _per_node(law, nodes, lambda single, _: [10.0 * single.velocity_scale])[:, 0]
     found = np.where(np.isfinite(velocity), velocity, width)
     found.setflags(write=False)
     return found
-
-
-# Many short runs may use the same law.
-_kept_stick_velocity = lru_cache(maxsize=64)(_stick_velocity)
 
 
 def _largest(law: Any, nodes: int) -> tuple[Array, Array]:

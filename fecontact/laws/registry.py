@@ -124,10 +124,7 @@ def is_kind(hint: Any) -> bool:
 def law_class(kind: type, name: Any, where: str) -> type:
     """The class of a law by its name, or by ``FILE.py:CLASS``; for None the default, if any.
 
-    Raises
-    ------
-    InputError
-        If there is no such law, file or class; the message lists the laws.
+    InputError if there is no such law, file or class; the message lists the laws.
     """
     names = law_names()[kind]
     if name is None and kind not in _DEFAULTS:
@@ -163,10 +160,7 @@ def _meant(name: str, names: Mapping[str, type], meant: list[type]) -> str:
 def own_law(kind: Any, name: str, where: str) -> type:
     """The class ``FILE.py:CLASS`` of a law of a kind, or of one of several.
 
-    Raises
-    ------
-    InputError
-        If there is no such file, it cannot be loaded, or has no such class.
+    InputError if there is no such file, it cannot be loaded, or has no such class.
     """
     path, _, title = name.rpartition(":")
     file = str(Path(path).resolve())

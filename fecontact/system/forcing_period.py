@@ -23,11 +23,8 @@ _REPEATING = (Harmonic, Harmonics)
 def common_period(system: ContactSystem) -> float | None:
     """Common period [s] of drive, loads and ground; None for an autonomous system.
 
-    Raises
-    ------
-    AnalysisError
-        If one of them is not periodic, or the periods have no common multiple up to 1000 times the
-        longest.
+    AnalysisError if one of them is not periodic, or the periods have no common multiple up to 1000
+    times the longest.
     """
     require_kind("common_period", ContactSystem, system=system)
     return common_multiple([period for _, period in source_periods(system)])
@@ -36,10 +33,7 @@ def common_period(system: ContactSystem) -> float | None:
 def drive_sets_period(system: ContactSystem) -> bool:
     """Whether nothing repeats in time but the drive's motion with its frequency.
 
-    Raises
-    ------
-    AnalysisError
-        As :func:`common_period`.
+    AnalysisError as :func:`common_period`.
     """
     names = {name for name, _ in source_periods(system)}
     return type(system.drive) is Drive and bool(names) and names <= _set_by_frequency(system)
@@ -75,10 +69,7 @@ def require_effect(system: ContactSystem, name: str) -> None:
 def source_periods(system: ContactSystem) -> list[tuple[str, float]]:
     """Names of the excitations that repeat in time, each with its period [s].
 
-    Raises
-    ------
-    AnalysisError
-        If one of them is not periodic.
+    AnalysisError if one of them is not periodic.
     """
     drive, ground = system.drive, system.ground
     given: list[tuple[str, Any]] = [
@@ -150,10 +141,7 @@ def _repeat_length(name: str, shape: Profile) -> float:
 def common_multiple(periods: list[float]) -> float | None:
     """Common period of some periods [s]; None for none.
 
-    Raises
-    ------
-    AnalysisError
-        If they have no common multiple up to 1000 times the longest.
+    AnalysisError if they have no common multiple up to 1000 times the longest.
     """
     if not periods:
         return None

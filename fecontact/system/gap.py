@@ -103,12 +103,8 @@ def gap_values(gap: Gap, places: Array) -> float | tuple[float, ...]:
 
     ``places`` (n, d) are those of the nodes, or (n,) their abscissae. Functions take x (n,), of
     solids x and y. A HeightMap holds heights of the surface of a solid out of it, which move with
-    the body; the highest contact node has the gap zero.
-
-    Raises
-    ------
-    InputError
-        For a wrong number of values, or a value that is negative or not finite.
+    the body; the highest contact node has the gap zero. InputError for a wrong number of values, or
+    a value that is negative or not finite.
     """
     if isinstance(gap, HeightMap):
         gap = _below(gap, places).tolist()

@@ -99,11 +99,8 @@ def system_fields(
 ) -> dict[str, Any]:
     """Basis, laws, gap and sliding of a contact system of several bodies.
 
-    Raises
-    ------
-    InputError
-        As :func:`fecontact.reduction.assembled_basis`; for interfaces of the same name, and those
-        that slide without friction law.
+    InputError as :func:`fecontact.reduction.assembled_basis`; for interfaces of the same name, and
+    those that slide without friction law.
     """
     require_kind("ContactSystem", Mapping, bodies=bodies)
     require_kind("ContactSystem", (Sequence, type(None)), interfaces=interfaces)
@@ -271,11 +268,8 @@ def checked_sliding(
 ) -> Mapping[str, Sliding]:
     """The sliding by interface, read-only.
 
-    Raises
-    ------
-    InputError
-        For unknown interfaces, values of another type, and waves of the ground below contact nodes
-        whose normal is not the vertical axis.
+    InputError for unknown interfaces, values of another type, and waves of the ground below contact
+    nodes whose normal is not the vertical axis.
     """
     require_kind("ContactSystem", Mapping, sliding=sliding)
     names = [group for group, _ in basis.groups if group not in basis.springs]
@@ -305,12 +299,7 @@ def prescribed_motion(
     """Functions of time and the factors of the nodes: one in the plane, up to two in space.
 
     A single source keeps its own speed as the parameter. Several constant speeds become factors of
-    a speed of one.
-
-    Raises
-    ------
-    InputError
-        If a speed varies in time beside others that are not zero.
+    a speed of one. InputError if a speed varies in time beside others that are not zero.
     """
     sources = motion_sources(basis, ground, sliding)
     size = (basis.contact_nodes,) if basis.dimension == 2 else (basis.contact_nodes, 2)

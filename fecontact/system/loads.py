@@ -1,7 +1,9 @@
 """Loads of a system as modal forces."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -45,19 +47,29 @@ class ActingLoad:
 def acting_loads(basis: ModalBasis, load: Load) -> Iterator[ActingLoad]:
     """Parts of a load that are not zero; those in time in the order of ``load.signals``.
 
-    Raises
-    ------
-    InputError
-        For points or boundaries that the basis does not have, gravity or base acceleration with a
-        basis without rows of inertia, and places outside the body or for a basis without shapes.
+    InputError for points or boundaries that the basis does not have, gravity or base acceleration
+    with a basis without rows of inertia, and places outside the body or for a basis without shapes.
     """
     if basis.constant_load is not None:
         yield ActingLoad("the preload of links or the temperature", basis.constant_load, 1.0,
                          "they hold, or the body is held")
-    d = basis.dimension
-    components = basis.components
+    yield from load_parts(load, basis.components, partial(_point_rows, basis),
+                          partial(_inertia, basis), basis.boundary_row)
+
+
+def load_parts(
+    load: Load, components: tuple[str, ...], point_rows: Callable[[Any], Array],
+    inertia: Callable[[str], Array], boundary_rows: Callable[[str], Array],
+) -> Iterator[ActingLoad]:
+    """Parts of a load that are not zero, by what gives their rows.
+
+    ``point_rows`` gives the rows of the displacement ``components`` of a point, ``inertia`` those
+    of unit accelerations along the axes for a load of some name, ``boundary_rows`` those of unit
+    stresses on a boundary.
+    """
+    d = 2 if len(components) == 3 else 3
     if load.normal:
-        yield ActingLoad(f"normal = {load.normal!r}", basis.T[1, d - 1], -load.normal,
+        yield ActingLoad(f"normal = {load.normal!r}", point_rows("C")[d - 1], -load.normal,
                          f"'C' moves along {AXES[d - 1]}")
     if load.gravity is not None and len(load.gravity) != d:
         raise InputError(f"Load: gravity = {load.gravity} must have {d} components, as the body "
@@ -65,8 +77,7 @@ def acting_loads(basis: ModalBasis, load: Load) -> Iterator[ActingLoad]:
     for axis, g in enumerate(load.gravity or ()):
         if g:
             what = f"gravity = {load.gravity}"
-            yield ActingLoad(what, _inertia(basis, what)[axis], g,
-                             f"the body moves along {AXES[axis]}")
+            yield ActingLoad(what, inertia(what)[axis], g, f"the body moves along {AXES[axis]}")
     for force in load.forces:
         if not force.suits(components):
             raise InputError(f"Load: a force at {force.point!r} has the component "
@@ -74,17 +85,17 @@ def acting_loads(basis: ModalBasis, load: Load) -> Iterator[ActingLoad]:
                              f"{choices(components)}.")
         turn = "turns" if force.moment else f"moves along {force.along}"
         yield ActingLoad(f"a force at {force.point!r} with component {force.component!r}",
-                         force.row(_point_rows(basis, force.point), components),
+                         force.row(point_rows(force.point), components),
                          force.signal, f"{force.point!r} {turn}")
     for axis, signal in enumerate(load.base_accelerations):
         if signal is not None:
             what = f"base_acceleration_{AXES[axis]}"
             if axis >= d:
                 raise InputError(f"Load: {what} acts on solids only, but the body is plane.")
-            yield ActingLoad(what, -_inertia(basis, what)[axis], signal,
+            yield ActingLoad(what, -inertia(what)[axis], signal,
                              f"the body moves along {AXES[axis]}")
     for one in load.boundaries:
-        rows = basis.boundary_row(one.boundary)
+        rows = boundary_rows(one.boundary)
         for index, name in enumerate(BOUNDARY_STRESSES):
             value = getattr(one, name)
             if isinstance(value, Signal) or value:

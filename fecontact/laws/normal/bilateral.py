@@ -30,7 +30,17 @@ def _felt(tension, slope, damping):
 
 @dataclass(frozen=True)
 class BilateralLaw(NormalLaw):
-    """Law of a spring between two points; see :mod:`fecontact.laws.normal.bilateral`."""
+    """Law of a spring between two points; see :mod:`fecontact.laws.normal.bilateral`.
+
+    Parameters
+    ----------
+    damping : float or (n,) sequence
+        Damping b, zero or above [N s/m].
+    preload : float or (n,) sequence
+        Constant tension N_0 [N].
+    shortening : float or (n,) sequence
+        Prescribed shortening s [m].
+    """
 
     bilateral: ClassVar = True
     _shortening: ClassVar = 4  # column of the table
@@ -73,12 +83,6 @@ class BilateralPolynomial(BilateralLaw):
     stiffness, cubic_stiffness : float or (n,) sequence
         Stiffnesses c [N/m] and c_3 [N/m^3]. A negative c makes a spring with two positions of rest;
         the spring hardens with positive c_3 and softens with negative c_3.
-    damping : float or (n,) sequence
-        Damping b, zero or above [N s/m].
-    preload : float or (n,) sequence
-        Constant tension N_0 [N].
-    shortening : float or (n,) sequence
-        Prescribed shortening s [m].
     quadratic_stiffness, quintic_stiffness : float or (n,) sequence
         Stiffnesses c_2 [N/m^2] and c_5 [N/m^5], of any sign.
     quadratic_damping, cubic_damping : float or (n,) sequence
@@ -152,8 +156,6 @@ class BilateralPlay(BilateralLaw):
         Play h to either side, zero or above [m].
     damping : float or (n,) sequence
         Damping b beyond the clearance, zero or above [N s/m].
-    preload : float or (n,) sequence
-        Constant tension N_0 [N].
     shortening : float or (n,) sequence
         Prescribed shortening s [m]; it moves the middle of the play to e = -s.
     """
@@ -215,12 +217,6 @@ class BilateralPiecewise(BilateralLaw):
         Elongations of the corners, at least two, ascending [m]; the same at all nodes.
     forces : sequence
         Tension at each corner [N].
-    damping : float or (n,) sequence
-        Damping b, zero or above [N s/m].
-    preload : float or (n,) sequence
-        Constant tension N_0 [N].
-    shortening : float or (n,) sequence
-        Prescribed shortening s [m].
     """
 
     kernel: ClassVar = _piecewise

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self, cast
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from fecontact.core.errors import InputError, require_positive, shown
 from fecontact.core.tables import located
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
-from fecontact.laws.base import PerNode
+from fecontact.laws.base import Bound, PerNode
 from fecontact.laws.data_columns import numbers, read_columns, require_growing
 from fecontact.laws.normal.rough_surface import RoughSurface, bed_of_asperities
 from fecontact.laws.signatures import normal_law
@@ -87,10 +87,12 @@ class MeasuredSurface(RoughSurface):
     """
 
     kernel: ClassVar = _measured
-    shared_fields: ClassVar = frozenset({"bearing", "depths", "file"})
+    shared_fields: ClassVar = frozenset({"bearing", "depths", "file", "scale"})
+    own_fields: ClassVar = shared_fields
 
     # From the file if there is one.
-    roughness_height: Annotated[PerNode | None, Unit("m")] = None  # type: ignore[assignment]
+    roughness_height: Annotated[  # type: ignore[assignment]
+        PerNode | None, Bound("above zero", lambda x: x > 0.0), Unit("m")] = None
     bearing: tuple[float, ...] = _UNIFORM
     depths: tuple[float, ...] = ()
     file: str | None = None
@@ -106,8 +108,7 @@ class MeasuredSurface(RoughSurface):
         if self.roughness_height is None:
             raise InputError("MeasuredSurface lacks roughness_height, the peak-to-valley height "
                              "of the surface [m]; give it, or the file of a profile.")
-        for name, value in vars(self._bed).items():
-            object.__setattr__(self, name, value)
+        super().__post_init__()
         h = numbers("MeasuredSurface", "bearing", self.bearing)
         if len(h) < 3 or h[0] != 0.0 or h[-1] != 1.0 or (np.diff(h) < 0.0).any():
             raise InputError(f"MeasuredSurface: bearing = {shown(list(h))} must be at least three "
@@ -132,11 +133,6 @@ class MeasuredSurface(RoughSurface):
             object.__setattr__(self, name, getattr(measured, name))
         object.__setattr__(self, "file", None)
         object.__setattr__(self, "scale", 1.0)
-
-    @property
-    def _bed(self) -> "_Bed":
-        """The parameters that may differ from node to node."""
-        return _Bed(self.stiffness, cast(PerNode, self.roughness_height), self.damping)
 
     @classmethod
     def from_heights(
@@ -223,7 +219,7 @@ class MeasuredSurface(RoughSurface):
         curve = self._curve()
         knots = np.column_stack([curve.antiderivative()(_DEPTHS), curve(_DEPTHS),
                                  curve.derivative()(_DEPTHS)]).reshape(-1)
-        return np.column_stack([self._bed.table(share), np.tile(knots, (len(share), 1))])
+        return np.column_stack([super().table(share), np.tile(knots, (len(share), 1))])
 
     def untouched(self, nodes: int) -> Array:
         """Zero (n,), the place of the highest peak."""
@@ -242,9 +238,3 @@ class MeasuredSurface(RoughSurface):
 
     def _energy(self, s: Array, table: Array) -> Array:
         return np.asarray(self._curve().antiderivative(2)(s))
-
-
-@dataclass(frozen=True)
-class _Bed(RoughSurface):
-    def _title(self, name: str) -> str:
-        return f"{MeasuredSurface.__name__}: {name}"

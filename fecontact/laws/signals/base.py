@@ -68,8 +68,8 @@ class Signal(InheritsDocumentation):
 
     @property
     def largest(self) -> float:
-        """Upper bound of its magnitude."""
-        raise NotImplementedError
+        """Upper bound of its magnitude; by default that of its ``amplitude``."""
+        return abs(float(vars(self)["amplitude"]))
 
     def history(self, times: ArrayLike) -> Array:
         """Values and rates (N, 2) at N times [s]."""
@@ -77,6 +77,11 @@ class Signal(InheritsDocumentation):
         out = np.empty((len(t), 2))
         _history(self.kernel.address, t, self.parameters(), out)
         return out
+
+
+def value_at(given: float | Signal, time: float) -> float:
+    """Value of a number or a signal at a time [s]."""
+    return float(given.history(time)[0, 0]) if isinstance(given, Signal) else float(given)
 
 
 def between(times: ArrayLike, t0: float, t1: float) -> tuple[float, ...]:

@@ -98,11 +98,6 @@ class Harmonic(Signal):
         """Frequency of the signal [Hz]; None for a constant."""
         return None if self.shortest_period is None else self.frequency_hz
 
-    @property
-    def largest(self) -> float:
-        """Magnitude of the amplitude."""
-        return abs(float(self.amplitude))
-
 
 @signal
 def _harmonics(t, p):
@@ -255,8 +250,3 @@ class SweptSine(Signal):
         """Period of the highest frequency [s]."""
         highest = max(self.start_frequency_hz, self.end_frequency_hz)
         return 1.0 / highest if highest > 0.0 and self.amplitude != 0.0 else None
-
-    @property
-    def largest(self) -> float:
-        """Magnitude of the amplitude."""
-        return abs(float(self.amplitude))

@@ -145,11 +145,6 @@ class Pulse(Signal):
             places += [self._rise, self.duration - self._rise]
         return between(self.start + np.array(places), t0, t1)
 
-    @property
-    def largest(self) -> float:
-        """Magnitude of the amplitude."""
-        return abs(float(self.amplitude))
-
 
 @signal
 def _tabulated(t, p):

@@ -16,10 +16,7 @@ MOVING = (ContactSystem, VectorField)
 def in_time(owner: str, given: Any) -> Moving:
     """System to integrate in time: a contact system, also that of a contact field, or a field.
 
-    Raises
-    ------
-    InputError
-        For anything else.
+    InputError for anything else.
     """
     if isinstance(given, VectorField):
         return given.in_time()

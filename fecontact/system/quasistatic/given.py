@@ -24,11 +24,7 @@ def with_named_forces(system: ContactSystem, path: LoadPath) -> tuple[ContactSys
     """The system with all forces that a path names, and the path with their values in order.
 
     Forces that the system lacks get their values at the end of the path, so that it rests there.
-
-    Raises
-    ------
-    InputError
-        For a point or a component that does not exist.
+    InputError for a point or a component that does not exist.
     """
     if not isinstance(path.forces, Mapping):
         return system, path
@@ -53,11 +49,8 @@ def with_named_forces(system: ContactSystem, path: LoadPath) -> tuple[ContactSys
 def given_rows(system: ContactSystem, path: LoadPath) -> Array:
     """Rows (N, m + 2 d - 1) of a path: modal forces of the loads, driven ends, travel.
 
-    Raises
-    ------
-    InputError
-        For another number of forces than the system has, motions in space of a plane body, and a
-        travel that could be that of several sides.
+    InputError for another number of forces than the system has, motions in space of a plane body,
+    and a travel that could be that of several sides.
     """
     arrays, forces, own = system.arrays, system.load.forces, path.forces
     assert not isinstance(own, Mapping)

@@ -15,10 +15,7 @@ from fecontact.system.contact_system import ContactSystem
 from fecontact.system.polynomial_forces import polynomial_energy
 from fecontact.system.quasistatic.given import actions_of, travel_forces
 from fecontact.system.quasistatic.path import LoadPath
-from fecontact.system.quasistatic.pose import (
-    PENETRATION,
-    Sliders,
-)
+from fecontact.system.quasistatic.pose import PENETRATION
 from fecontact.system.quasistatic.rest_state import STATES, ContactPoses, RestState
 from fecontact.system.quasistatic.sliders import components
 
@@ -91,26 +88,19 @@ class LoadHistory(ContactPoses, Summarised):
 
     Attributes
     ----------
+    modal_coordinates, given, node, slider_force, slider_place : arrays
+        As of :class:`RestState`, with an axis of N points before the others.
+    sliders : Sliders
+        Springs and limits of the nodes.
     system : ContactSystem
         The system.
     path : LoadPath
         The path; N points on it.
-    given : (N, m + 3) array
-        Modal forces of the loads, displacements of the driven ends in x and y [m], travel [m]; in
-        space (N, m + 5), with z and the travel along y.
-    modal_coordinates : (N, m) array
-        q.
-    node : (N, n, 6) array, in space (N, n, 9)
-        As :attr:`RestState.node`.
-    slider_force, slider_place : (N, n, e) arrays, in space (N, n, e, 2)
-        As in :class:`RestState`.
     works : (N, 4) array
         Work done so far by loads, drive, travel of the ground, and stiffness that is not symmetric
         [J].
     node_loss : (N, n) array
         Energy lost in friction so far at each node, the sum of R dz [J].
-    sliders : Sliders
-        Springs and limits of the nodes.
     status : 'finished' or 'no-equilibrium'
         Whether the end of the path was reached. If not, there are only the points up to the last
         equilibrium that was found.
@@ -125,14 +115,8 @@ class LoadHistory(ContactPoses, Summarised):
 
     system: ContactSystem
     path: LoadPath
-    given: Array
-    modal_coordinates: Array
-    node: Array
-    slider_force: Array
-    slider_place: Array
     works: Array
     node_loss: Array
-    sliders: Sliders
     status: Literal["finished", "no-equilibrium"]
     statistics: dict[str, int]
 

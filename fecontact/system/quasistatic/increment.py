@@ -138,14 +138,18 @@ def _add_forces(away, F, along, T, rounding, workspace):
 
 
 @helper
-def _stretched(j, tangent, sliders, pose):
-    """Sum of stiffness times |displacement| of the sliders of node j along a tangent [N]."""
+def _rounding(j, tangent, moved, sliders, pose):
+    """Part of the forces of the springs of node j along a tangent that counts for rounding [N].
+
+    Springs round off with the displacements whose difference they feel: those ``moved`` by the
+    node and the other side, and those of the sliders.
+    """
     elements = sliders.stiffness.shape[1]
     tangents = pose.left.shape[1] // elements
     total = 0.0
     for e in range(elements):
-        total += sliders.stiffness[j, e] * abs(pose.left[j, tangents * e + tangent])
-    return total
+        total += sliders.stiffness[j, e] * (moved + abs(pose.left[j, tangents * e + tangent]))
+    return _SPRINGS * total
 
 
 @kernel
@@ -186,16 +190,11 @@ def evaluate(
         _friction(j, tangents, pressing, sliders, pose, workspace, total, out)
         if s.follows_surface:
             _follow_surface(F, contact, d, out)
-        # Springs round off with the displacements whose difference they feel.
-        springs = 0.0
-        for e in range(sliders.stiffness.shape[1]):
-            springs += sliders.stiffness[j, e]
         for k in range(tangents):
             second, gone = PER_TANGENT * k, ground_travel(k, j, moved, s)
             T = tangent_force(F, total[k], contact.slope[k], s)
             node[j, AGAINST + second], node[j, ALONG_SURFACE + second] = T, F * contact.slope[k]
-            rounding = _SPRINGS * (springs * (abs(motion.places[2 * k]) + abs(gone))
-                                   + _stretched(j, k, sliders, pose))
+            rounding = _rounding(j, k, abs(motion.places[2 * k]) + abs(gone), sliders, pose)
             _add_forces(s.rows[j, 1], F if k == 0 else 0.0, s.rows[j, 2 * k], T, rounding,
                         workspace)
         if derive:

@@ -11,7 +11,6 @@ from fecontact.core.records import allocate
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array
 from fecontact.core.units import count
-from fecontact.system import columns, kernels
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.loads import under_constant
 from fecontact.system.model_limits import limits_exceeded, warn_of_limits
@@ -126,9 +125,9 @@ def _loaded(
     # Vectors of sliders in space.
     shape = (reached - skipped, *sliders.limit.shape, *([2] if system.basis.dimension == 3 else []))
     history = LoadHistory(
-        system, path, given[kept], found.q[kept], found.node[kept],
-        found.force[kept].reshape(shape), found.left[kept].reshape(shape),
-        found.work[kept, : len(WORKS)], found.work[kept, len(WORKS) :], sliders,
+        found.q[kept], given[kept], found.node[kept], found.force[kept].reshape(shape),
+        found.left[kept].reshape(shape), sliders, system, path,
+        found.work[kept, : len(WORKS)], found.work[kept, len(WORKS) :],
         "finished" if complete else "no-equilibrium",
         {"solved": int(counts[SOLVED]), "cut": int(counts[CUT]), "jumps": int(counts[JUMPS])})
     if not complete:
@@ -193,7 +192,7 @@ def _slope_under_preload(
     """Slope dF/du (n,) under the largest load of the path, with nodes that stick without limit."""
     scale = np.abs(path.at_points(path.load_scale))
     preload = int(np.argmax(scale >= scale.max() * (1.0 - 1e-12)))
-    slope = balance.normal(_penetration(balance.arrays, q))[1]
+    slope = balance.normal(balance.penetration(q))[1]
     if preload == 0 or not len(slope):
         return slope
     stuck = np.full((len(arrays.gap), 1), max(float(np.max(slope)), float(np.mean(
@@ -205,9 +204,3 @@ def _slope_under_preload(
         raise AnalysisError("There is no equilibrium under the largest load of the path, even if "
                             "all nodes stuck; check the sign and place of the loads.")
     return balance.normal(found.node[1, :, PENETRATION].copy())[1]
-
-
-def _penetration(arrays: SystemArrays, q: Array) -> Array:
-    """Penetration (n,) of a system at rest."""
-    found = kernels.contact_at(0.0, np.concatenate([q, np.zeros_like(q)]), arrays)
-    return found[:, columns.PENETRATION].copy()

@@ -29,12 +29,15 @@ _AT_LIMIT = 1e-9
 
 
 @read_only_arrays
+@dataclass(frozen=True, eq=False, repr=False)
 class ContactPoses:
     """Forces, slips and states of contact nodes in equilibria; of several with an axis (N, ...)."""
 
+    modal_coordinates: Array
     given: Array
     node: Array
     slider_force: Array
+    slider_place: Array
     sliders: Sliders
 
     @property
@@ -116,13 +119,6 @@ class RestState(ContactPoses, Summarised):
     sliders : Sliders
         Stiffness [N/m] and limit, as a part of F, of each slider, and whether it sticks rigidly.
     """
-
-    modal_coordinates: Array
-    given: Array
-    node: Array
-    slider_force: Array
-    slider_place: Array
-    sliders: Sliders
 
     def summary(self) -> list[tuple[str, str]]:
         """Nodes by their state, normal and friction force."""

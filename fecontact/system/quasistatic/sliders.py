@@ -66,10 +66,7 @@ def sliders_of(
         c_N = dF/du under the preload [N/m]; nodes that are open there take the mean of the others
         by their share of the face.
 
-    Raises
-    ------
-    InputError
-        For values that are not above zero, and where there is no c_N for the ratio.
+    InputError for values that are not above zero, and where there is no c_N for the ratio.
     """
     n = system.basis.contact_nodes
     stiffness, limit, plain = friction_springs(system.law_groups("friction"), n)

@@ -40,7 +40,7 @@ class Balance:
         self._rate, self._matrix = np.empty(size), np.empty((size, size))
         self._state = np.zeros(size)
         # Stiffness of the fully closed contact, and its force at zero displacement.
-        far = np.full(n, max(10.0 * scale, 2.0 * self._penetration(scale)))
+        far = np.full(n, max(10.0 * scale, 2.0 * self._depth_under_load(scale)))
         values, self.face_stiffness = self.normal(far)
         undisplaced = kernels.contact_at(time, self._state, arrays)
         self.face_force = values + self.face_stiffness * (
@@ -54,7 +54,7 @@ class Balance:
         largest = self.scale.max(initial=0.0) or 1.0
         self.scale[self.scale <= _ROUNDING**2 * 1e-2 * largest] = largest
 
-    def _penetration(self, scale: float) -> float:
+    def _depth_under_load(self, scale: float) -> float:
         """Uniform penetration under which the face carries the load, at most 1e6 scales.
 
         It is ``scale`` for laws whose force falls with penetration, which never carry the load.
@@ -75,6 +75,12 @@ class Balance:
         normal_values(self.arrays.normal, penetration, np.zeros(len(penetration)),
                       self.arrays.normal_parameters, force, slope)
         return force, slope
+
+    def penetration(self, q: Array) -> Array:
+        """Penetration (n,) at rest."""
+        self._state[: len(q)] = q
+        state = kernels.contact_at(self._time, self._state, self.arrays)
+        return state[:, columns.PENETRATION].copy()
 
     def force(self, q: Array, load: float) -> Array:
         """Out-of-balance force (m,) under a fraction of the load."""
@@ -239,10 +245,7 @@ class Balance:
     def _upright(self, q: Array) -> Array:
         """Symmetric stiffness (m, m) at q, for ground that is level under each node."""
         arrays = self.arrays
-        self._state[: len(q)] = q
-        state = kernels.contact_at(self._time, self._state, arrays)
-        slope = self.normal(state[:, columns.PENETRATION].copy())[1]
-        normal = arrays.rows[:, 1]
+        slope, normal = self.normal(self.penetration(q))[1], arrays.rows[:, 1]
         return np.asarray(arrays.stiffness + polynomial_stiffness_at(q, arrays)
                           + (normal.T * slope) @ normal)
 

@@ -93,10 +93,7 @@ def ground_points(
 ) -> list[ContactPoints]:
     """Contact points of boundaries above flat ground, none without boundaries.
 
-    Raises
-    ------
-    InputError, MeshError
-        For laws, gaps and boundaries that do not fit.
+    InputError, MeshError for laws, gaps and boundaries that do not fit.
     """
     face, d = contact_groups(body, boundaries, counts), body.dimension
     if not face.groups:
@@ -124,12 +121,8 @@ def interface_points(
 ) -> list[ContactPoints]:
     """Contact points of interfaces of bodies with each other, with themselves or the ground.
 
-    One body alone, named '', may have any name in its pairings.
-
-    Raises
-    ------
-    InputError
-        For interfaces of other bodies, of points, and those that slide.
+    One body alone, named '', may have any name in its pairings. InputError for interfaces of other
+    bodies, of points, and those that slide.
     """
     require_kind("deflection_path", Sequence, interfaces=interfaces)
     found = []

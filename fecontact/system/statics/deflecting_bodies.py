@@ -19,7 +19,7 @@ from fecontact.fem.follower_pressure import follower_pressure
 from fecontact.fem.load_steps import Loads
 from fecontact.fem.points import Place
 from fecontact.laws.excitation import Load
-from fecontact.laws.signals.base import Signal
+from fecontact.laws.signals.base import value_at
 from fecontact.system.statics.contact_forces import MovingContact, PointForces
 from fecontact.system.statics.static_solution import nodal_forces
 
@@ -181,9 +181,8 @@ def _without_pressures(load: Load, time: float) -> tuple[Load, dict[str, float]]
     pressures: dict[str, float] = {}
     others = []
     for one in load.boundaries:
-        given = one.pressure
-        value = float(given.history(time)[0, 0]) if isinstance(given, Signal) else float(given)
-        pressures[one.boundary] = pressures.get(one.boundary, 0.0) + value
+        before = pressures.get(one.boundary, 0.0)
+        pressures[one.boundary] = before + value_at(one.pressure, time)
         if one.shear or one.shear_across:
             others.append(replace(one, pressure=0.0))
     return replace(load, boundaries=tuple(others)), pressures

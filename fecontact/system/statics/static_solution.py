@@ -1,11 +1,12 @@
 """Static displacement and stress of an elastic body without contact, by its finite elements."""
 
 from collections.abc import Mapping
+from functools import cache
 
 import numpy as np
 
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import AnalysisError, InputError, choices, require_finite
+from fecontact.core.errors import AnalysisError, InputError, require_finite
 from fecontact.core.types import Array, Coordinates
 from fecontact.fem.body_forces import boundary_forces, inertia_forces
 from fecontact.fem.elastic_body import ElasticBody
@@ -18,9 +19,10 @@ from fecontact.fem.thermal import (
     nodal_temperatures,
     thermal_forces,
 )
-from fecontact.laws.excitation import BOUNDARY_STRESSES, Load
-from fecontact.laws.signals.base import Signal
+from fecontact.laws.excitation import Load
+from fecontact.laws.signals.base import value_at
 from fecontact.reduction.eigenmodes import FreeSystem
+from fecontact.system.loads import load_parts
 
 # Largest resultant of the loads, relative to their size, that a free direction may have.
 _BALANCED = 1e-9
@@ -92,10 +94,7 @@ def static_solution(
 def nodal_forces(
     body: ElasticBody, load: Load, points: Mapping[str, Place], time: float
 ) -> Array:
-    """Nodal forces (2 N,) of a load at a time; errors as of :func:`static_solution`."""
-
-    def value(given: float | Signal) -> float:
-        return float(given.history(time)[0, 0]) if isinstance(given, Signal) else float(given)
+    """Nodal forces (d N,) of a load at a time; errors as of :func:`static_solution`."""
 
     def at(point: str | int | Coordinates) -> Array:
         if isinstance(point, int):
@@ -105,31 +104,16 @@ def nodal_forces(
         name = point if isinstance(point, str) else "of a force"
         return np.asarray(place_rows(body, place, name).matrix.toarray())
 
-    d = body.mesh.dimension
-    total = np.zeros(d * len(body.nodes))
-    if load.normal:
-        total -= load.normal * at("C")[d - 1]
-    components = ("x", "y", "phi") if d == 2 else ("x", "y", "z", "phi_x", "phi_y", "phi_z")
-    for force in load.forces:
-        if not force.suits(components):
-            raise InputError(f"static_solution: a force at {force.point!r} has the component "
-                             f"{force.component!r}, but points of this body have "
-                             f"{choices(components)}.")
-        total += value(force.signal) * force.row(at(force.point), components)
-    carried = [0.0 if signal is None else value(signal) for signal in load.base_accelerations]
-    gravity = load.gravity or (0.0,) * d
-    if len(gravity) != d or any(carried[d:]):
-        raise InputError(f"static_solution: gravity and base acceleration must have {d} components "
-                         f"for this body.")
-    acceleration = np.array(gravity) - carried[:d]
-    if acceleration.any():
-        total += inertia_forces(body) @ acceleration
-    for one in load.boundaries:
-        stresses = [value(getattr(one, name)) for name in BOUNDARY_STRESSES]
-        if any(stresses[d:]):
-            raise InputError(f"static_solution: shear_across on '{one.boundary}' acts on solids "
-                             f"only, but the body is plane.")
-        total += boundary_forces(body, one.boundary) @ stresses[:d]
+    @cache
+    def inertia(what: str) -> Array:
+        return inertia_forces(body).T
+
+    components = ("x", "y", "phi") if body.dimension == 2 else (
+        "x", "y", "z", "phi_x", "phi_y", "phi_z")
+    total = np.zeros(body.nodes.size)
+    for part in load_parts(load, components, at, inertia,
+                           lambda name: boundary_forces(body, name).T):
+        total += value_at(part.value, time) * part.row
     return total
 
 
