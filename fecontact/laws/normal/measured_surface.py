@@ -91,8 +91,9 @@ class MeasuredSurface(RoughSurface):
     own_fields: ClassVar = shared_fields
 
     # From the file if there is one.
-    roughness_height: Annotated[  # type: ignore[assignment]
-        PerNode | None, Bound("above zero", lambda x: x > 0.0), Unit("m")] = None
+    roughness_height: Annotated[
+        PerNode | None, Bound("above zero", lambda x: x > 0.0),
+        Unit("m")] = None  # type: ignore[assignment]
     bearing: tuple[float, ...] = _UNIFORM
     depths: tuple[float, ...] = ()
     file: str | None = None

@@ -14,7 +14,8 @@ from fecontact.core.types import Array
 from fecontact.core.units import Summarised, listed, quantity
 from fecontact.laws.excitation import AXES, Load
 from fecontact.laws.friction.planar import clear
-from fecontact.laws.signatures import friction_law, planar_friction_law, signal
+from fecontact.laws.signals.harmonic import Constant
+from fecontact.laws.signatures import friction_law, planar_friction_law
 from fecontact.reduction.modal_basis import ModalBasis
 from fecontact.system import columns
 from fecontact.system.complex_modes import unstable_count
@@ -48,11 +49,6 @@ def planar_follower(law, v1, v2, F, z, p, force, rates):
     second = 4 + len(rates)
     force[0], force[2] = p[0] * F, p[0]
     force[second], force[second + 2] = p[1] * F, p[1]
-
-
-@signal
-def _still(t, p):
-    return p[0], 0.0
 
 
 @read_only_arrays
@@ -231,8 +227,9 @@ def at_rest(
 ) -> SystemArrays:
     """Arrays of a system without friction, on ground at rest that has travelled [m]."""
     return without_elements(arrays)._replace(
-        ground_motion=_still.address, ground_motion_parameters=np.array([travel], dtype=float),
-        second_motion=_still.address if len(arrays.planar) else 0,
+        ground_motion=Constant.kernel.address,
+        ground_motion_parameters=np.array([travel], dtype=float),
+        second_motion=Constant.kernel.address if len(arrays.planar) else 0,
         second_motion_parameters=np.array([second_travel], dtype=float))
 
 
