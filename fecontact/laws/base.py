@@ -41,9 +41,12 @@ class Bound:
         return self.allowed
 
 
-Positive = Annotated[PerNode, Bound("above zero", lambda x: x > 0.0)]
-NotNegative = Annotated[PerNode, Bound("zero or above", lambda x: x >= 0.0)]
-OneOrAbove = Annotated[PerNode, Bound("one or above", lambda x: x >= 1.0)]
+ABOVE_ZERO = Bound("above zero", lambda x: x > 0.0)
+ZERO_OR_ABOVE = Bound("zero or above", lambda x: x >= 0.0)
+ONE_OR_ABOVE = Bound("one or above", lambda x: x >= 1.0)
+Positive = Annotated[PerNode, ABOVE_ZERO]
+NotNegative = Annotated[PerNode, ZERO_OR_ABOVE]
+OneOrAbove = Annotated[PerNode, ONE_OR_ABOVE]
 UpToOne = Annotated[PerNode, Bound("above zero and at most 1", lambda x: (x > 0.0) & (x <= 1.0))]
 
 
@@ -99,7 +102,7 @@ class NodeLaw(InheritsDocumentation):
                 raise InputError(f"{self._title(entry.name)} = {given!r} must be a number or a "
                                  f"list of numbers, one per contact node.")
             kind, ranges = _annotations(law)[entry.name]
-            if array.ndim and kind is float:
+            if array.ndim and kind in (float, int):
                 raise InputError(f"{self._title(entry.name)} = {given!r} must be a number; only "
                                  f"parameters annotated as PerNode take one per contact node.")
             value = tuple(float(item) for item in array) if array.ndim else float(array)
@@ -108,9 +111,11 @@ class NodeLaw(InheritsDocumentation):
             if np.abs(value).max() > LARGEST:
                 raise InputError(f"{self._title(entry.name)} = {shown(value)} must be a number "
                                  f"from {-LARGEST:g} to {LARGEST:g}.")
-            object.__setattr__(self, entry.name, value)
+            object.__setattr__(self, entry.name, given if kind is int else value)
             for one in ranges:
                 self.require(one.allowed, one.holds, entry.name)
+            if kind is int:
+                object.__setattr__(self, entry.name, int(value))
 
     def node_count(self) -> int | None:
         """Number of values of the parameters given per contact node; None if there are none.

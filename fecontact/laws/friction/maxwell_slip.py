@@ -10,12 +10,14 @@ from fecontact.core.errors import InputError, require_positive, shown
 from fecontact.core.simd.vectors import select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
-from fecontact.laws.base import Bound, NotNegative, Positive
+from fecontact.laws.base import ONE_OR_ABOVE, ZERO_OR_ABOVE, Bound, NotNegative, Positive
 from fecontact.laws.friction.base import LimitedFriction
 from fecontact.laws.friction.planar import clear
 from fecontact.laws.signatures import memory_friction_law, planar_friction_law
 
 _MOST_ELEMENTS = 10_000  # of which each contact node has one internal variable
+Elements = Annotated[int, Bound(f"a whole number from 1 to {_MOST_ELEMENTS}", lambda x: (
+    x >= 1.0) & (x <= _MOST_ELEMENTS) & (x == np.floor(x)))]
 
 # Time [s] within which elements return to their limits in equations that are solved as a whole.
 RETURN_TIME = 1e-7
@@ -233,12 +235,7 @@ class IwanFriction(_MaxwellSlip):
     Journal of Applied Mechanics 33 (1966).
     """
 
-    elements: int = 8
-
-    def __post_init__(self) -> None:
-        given = self.elements
-        super().__post_init__()
-        object.__setattr__(self, "elements", _whole(type(self).__name__, given))
+    elements: Elements = 8
 
     @property
     def memory(self) -> int:
@@ -344,14 +341,9 @@ class FourParameterIwanFriction(_MaxwellSlip):
     """
 
     chi: Annotated[float, Bound("above -1 and at most 0", lambda x: (x > -1.0) & (x <= 0.0))]
-    beta: Annotated[float, Bound("zero or above", lambda x: x >= 0.0)]
-    elements: int = 16
-    spacing_ratio: Annotated[float, Bound("one or above", lambda x: x >= 1.0)] = 1.3
-
-    def __post_init__(self) -> None:
-        given = self.elements
-        super().__post_init__()
-        object.__setattr__(self, "elements", _whole(type(self).__name__, given))
+    beta: Annotated[float, ZERO_OR_ABOVE]
+    elements: Elements = 16
+    spacing_ratio: Annotated[float, ONE_OR_ABOVE] = 1.3
 
     @classmethod
     def from_distribution(
@@ -406,11 +398,3 @@ class FourParameterIwanFriction(_MaxwellSlip):
         if beta > 0.0:
             springs, limits = np.append(springs, beta), np.append(limits, beta)
         return springs / (1.0 + beta), limits / (arm + beta)
-
-
-def _whole(law: str, elements: int) -> int:
-    """The number of elements; InputError if it is not a whole number from 1 to the largest."""
-    if np.ndim(elements) or not 1 <= elements <= _MOST_ELEMENTS or elements != int(elements):
-        raise InputError(f"{law}: elements = {shown(elements)} must be a whole number from 1 to "
-                         f"{_MOST_ELEMENTS}.")
-    return int(elements)

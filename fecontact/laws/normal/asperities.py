@@ -9,7 +9,15 @@ import numpy as np
 from fecontact.core.errors import InputError, require_not_negative
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
-from fecontact.laws.base import Bound, NormalLaw, NotNegative, PerNode, Positive
+from fecontact.laws.base import (
+    ABOVE_ZERO,
+    ZERO_OR_ABOVE,
+    Bound,
+    NormalLaw,
+    NotNegative,
+    PerNode,
+    Positive,
+)
 from fecontact.laws.friction.maxwell_slip import ParallelSliders
 from fecontact.laws.signatures import normal_law
 
@@ -98,11 +106,11 @@ class AsperityContact(NormalLaw):
     shared_fields: ClassVar = frozenset({"density"})
 
     asperities: Positive
-    asperity_radius: Annotated[float, Bound("above zero", lambda x: x > 0.0), Unit("m")]
-    composite_modulus: Annotated[float, Bound("above zero", lambda x: x > 0.0), Unit("Pa")]
-    gap_range: Annotated[float, Bound("above zero", lambda x: x > 0.0), Unit("m")]
+    asperity_radius: Annotated[float, ABOVE_ZERO, Unit("m")]
+    composite_modulus: Annotated[float, ABOVE_ZERO, Unit("Pa")]
+    gap_range: Annotated[float, ABOVE_ZERO, Unit("m")]
     density: tuple[float, ...] = (1.0, 1.0)
-    yield_stress: Annotated[float, Bound("zero or above", lambda x: x >= 0.0), Unit("Pa")] = 0.0
+    yield_stress: Annotated[float, ZERO_OR_ABOVE, Unit("Pa")] = 0.0
     poisson_ratio: Annotated[float, Bound("from 0 to 0.5", lambda x: (x >= 0.0) & (x <= 0.5))] = 0.3
     deepest: Annotated[NotNegative, Unit("m")] = 0.0
     damping_factor: Annotated[NotNegative, Unit("s/m")] = 0.0

@@ -12,7 +12,7 @@ from fecontact.core.errors import InputError, require_positive, shown
 from fecontact.core.tables import located
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
-from fecontact.laws.base import Bound, PerNode
+from fecontact.laws.base import ABOVE_ZERO, PerNode
 from fecontact.laws.data_columns import numbers, read_columns, require_growing
 from fecontact.laws.normal.rough_surface import RoughSurface, bed_of_asperities
 from fecontact.laws.signatures import normal_law
@@ -92,8 +92,7 @@ class MeasuredSurface(RoughSurface):
 
     # From the file if there is one.
     roughness_height: Annotated[
-        PerNode | None, Bound("above zero", lambda x: x > 0.0),
-        Unit("m")] = None  # type: ignore[assignment]
+        PerNode | None, ABOVE_ZERO, Unit("m")] = None  # type: ignore[assignment]
     bearing: tuple[float, ...] = _UNIFORM
     depths: tuple[float, ...] = ()
     file: str | None = None

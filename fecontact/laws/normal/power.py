@@ -14,15 +14,14 @@ from fecontact.core.errors import InputError, choices, nearest
 from fecontact.core.simd.vectors import everywhere, select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
-from fecontact.laws.base import Bound, NormalLaw, NotNegative, PerNode, Positive, UpToOne
+from fecontact.laws.base import ONE_OR_ABOVE, NormalLaw, NotNegative, PerNode, Positive, UpToOne
 from fecontact.laws.pieces import pieces_of
 from fecontact.laws.signatures import normal_law
 
 DampingModel = Literal["exact", "hunt-crossley", "lankarani-nikravesh", "flores"]
 
 EXPONENTS = {"point": 1.5, "line": 10.0 / 9.0}
-Exponent = Annotated[PerNode | Literal["point", "line"],
-                     Bound("one or above", lambda x: x >= 1.0)]
+Exponent = Annotated[PerNode | Literal["point", "line"], ONE_OR_ABOVE]
 
 
 @helper
