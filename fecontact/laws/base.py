@@ -105,7 +105,7 @@ class NodeLaw(InheritsDocumentation):
             if array.ndim and kind in (float, int):
                 raise InputError(f"{self._title(entry.name)} = {given!r} must be a number; only "
                                  f"parameters annotated as PerNode take one per contact node.")
-            value = tuple(float(item) for item in array) if array.ndim else float(array)
+            value: Any = tuple(float(item) for item in array) if array.ndim else float(array)
             if not np.isfinite(value).all():
                 raise InputError(f"{self._title(entry.name)} = {value!r} must be finite.")
             if np.abs(value).max() > LARGEST:

@@ -25,6 +25,13 @@ class MemorylessFriction(base.FrictionLaw):
     largest_coefficient = friction_curve.largest_coefficient
     velocity_of_minimum = friction_curve.velocity_of_minimum
 
+    smoothing_slope: Positive
+
+    @property
+    def velocity_scale(self) -> float:
+        """Width 1/k_s of the smoothing [m/s], the smallest of all nodes."""
+        return 1.0 / float(np.max(self.smoothing_slope))
+
 
 class SmoothedFriction(MemorylessFriction):
     r"""Friction R = F (mu(\|v\|) s(v) + viscous term), with the sign of v smoothed to s(v).
@@ -55,13 +62,6 @@ class SmoothedFriction(MemorylessFriction):
     """
 
     choices: ClassVar = {"smoothing": get_args(Smoothing)}
-
-    smoothing_slope: Positive
-
-    @property
-    def velocity_scale(self) -> float:
-        """Width 1/k_s of the smoothing [m/s], the smallest of all nodes."""
-        return 1.0 / float(np.max(self.smoothing_slope))
 
 
 class MemoryFriction(base.FrictionLaw):

@@ -4,8 +4,6 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
-import numpy as np
-
 from fecontact.core.compiled import helper
 from fecontact.core.simd.vectors import select, somewhere
 from fecontact.core.types import Array
@@ -290,11 +288,6 @@ class ProductFriction(MemorylessFriction):
     excess: NotNegative
     decay: Annotated[NotNegative, Unit("s/m")]
     smoothing_slope: Annotated[Positive, Unit("s/m")]
-
-    @property
-    def velocity_scale(self) -> float:
-        """Width 1/b_2 of the arctan [m/s], the smallest of all nodes."""
-        return 1.0 / float(np.max(self.smoothing_slope))
 
 
 @dataclass(frozen=True)

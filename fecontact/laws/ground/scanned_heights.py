@@ -1,7 +1,6 @@
 """Grids of heights from the files of profilometers and microscopes."""
 
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -46,9 +45,8 @@ def read_scan(owner: str, file: str | Path) -> Grid:
     path = Path(file)
     where = f"{owner}: file = '{file}'"
     require_regular_file(path, "a scan", f"{owner}: ")
-    reader = _READERS.get(path.suffix.lower(), _any_format)
     try:
-        heights, dx, dy = reader(path)
+        heights, dx, dy = (_x3p if path.suffix.lower() == ".x3p" else _any_format)(path)
     except InputError as error:
         raise InputError(f"{where} {error}") from None
     known = np.isfinite(heights)
@@ -101,9 +99,6 @@ def _any_format(path: Path) -> Grid:
                              f"one.") from None
         dx, dy = (float(one) for one in found.pixel_size)
     return heights, dx, dy
-
-
-_READERS: dict[str, Callable[[Path], Grid]] = {".x3p": _x3p}
 
 
 def _first_line(error: Any) -> str:
