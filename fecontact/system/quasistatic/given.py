@@ -11,7 +11,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.tables import located
 from fecontact.core.types import Array
 from fecontact.core.units import listed
-from fecontact.laws.excitation import AXES, PointLoad
+from fecontact.laws.excitation import PointLoad
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.system.arrays import with_motions
 from fecontact.system.contact_system import ContactSystem
@@ -75,12 +75,6 @@ def given_rows(system: ContactSystem, path: LoadPath) -> Array:
     travel = [path.at_points(path.travel), path.at_points(path.travel_y or 0.0)][: d - 1]
     _require_one_side(system, path, travel)
     return np.ascontiguousarray(np.column_stack([loads, *ends, *travel]))
-
-
-def actions_of(dimension: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of the motions of driven ends, and of the travels, in the plane or in space."""
-    return (tuple(f"motion_{axis}" for axis in AXES[:dimension]),
-            ("travel", "travel_y")[: dimension - 1])
 
 
 def travelling(system: ContactSystem) -> SystemArrays:

@@ -10,10 +10,11 @@ from fecontact.core.errors import InputError, require_choice
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.types import Array
 from fecontact.core.units import Summarised, quantity
+from fecontact.laws.excitation import AXES
 from fecontact.system.contact_quantities import total_friction
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.polynomial_forces import polynomial_energy
-from fecontact.system.quasistatic.given import actions_of, travel_forces
+from fecontact.system.quasistatic.given import travel_forces
 from fecontact.system.quasistatic.path import LoadPath
 from fecontact.system.quasistatic.pose import PENETRATION
 from fecontact.system.quasistatic.rest_state import STATES, ContactPoses, RestState
@@ -224,13 +225,14 @@ class LoadHistory(ContactPoses, Summarised):
         q, given, path = self.modal_coordinates, self.given, self.path
         arrays, m = self.system.arrays, q.shape[1]
         yield "load", q @ arrays.constant_load, path.at_points(path.load_scale)[: len(self)]
-        motions, travels = actions_of(self.system.basis.dimension)
-        for axis, name in enumerate(motions):
+        for axis, name in enumerate(AXES[: self.system.basis.dimension]):
             end = given[:, m + axis]
-            yield name, end, arrays.drive_stiffness[axis] * (end - q @ arrays.drive_shapes[axis])
+            pull = arrays.drive_stiffness[axis] * (end - q @ arrays.drive_shapes[axis])
+            yield f"motion_{name}", end, pull
         forces = travel_forces(self.system, self.tangential_forces)
-        for axis, name in enumerate(travels):
-            yield name, self.travels[:, axis], forces[:, axis]
+        for name, travel, force in zip(("travel", "travel_y"), self.travels.T, forces.T,
+                                       strict=False):
+            yield name, travel, force
         # Those that a path names have become a list beside the system's.
         assert not isinstance(path.forces, Mapping)
         names = [f"{force.point}.{force.along}" for force in self.system.load.forces]

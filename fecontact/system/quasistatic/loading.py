@@ -153,17 +153,13 @@ def _marched(
 ) -> tuple[int, Kept]:
     """Number of rows reached, and results."""
     n, _, m = arrays.rows.shape
-    e, tangents = sliders.limit.shape[1], _tangents(pose, sliders)
-    sizes = sizes_of(m, n, e, tangents) | {ROWS: len(given)}
+    e = sliders.limit.shape[1]
+    sizes = sizes_of(m, n, e, pose.force.shape[1] // e) | {ROWS: len(given)}
     kept = allocate(Kept, sizes)
     reached = march(
         arrays, sliders, np.ascontiguousarray(given), rtol, pose, allocate(Pose, sizes),
         allocate(Workspace, sizes, scale=np.ascontiguousarray(scale, dtype=float)), kept)
     return int(reached), kept
-
-
-def _tangents(pose: Pose, sliders: Sliders) -> int:
-    return pose.force.shape[1] // sliders.limit.shape[1]
 
 
 def _begin(system: ContactSystem, q: Array, given: Array, sliders: Sliders) -> Pose:
