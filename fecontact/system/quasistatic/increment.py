@@ -152,6 +152,15 @@ def _rounding(j, tangent, moved, sliders, pose):
     return _SPRINGS * total
 
 
+@helper
+def _size(force, scale):
+    """Size of modal forces (m,), by the typical stiffnesses of the modes."""
+    total = 0.0
+    for i in range(len(scale)):
+        total += force[i] ** 2 / scale[i]
+    return np.sqrt(total)
+
+
 @kernel
 def evaluate(
     load: Vector, moved: GroundMotion, sliders: Sliders, s: SystemArrays,
@@ -163,7 +172,6 @@ def evaluate(
     """
     n, d, m = s.rows.shape
     q, node, residual, out = pose.q, pose.node, workspace.residual, workspace.partial
-    terms = 0.0
     for i in range(m):
         total, size = load[i], abs(load[i])
         for k in range(m):
@@ -205,8 +213,6 @@ def evaluate(
                 for other in range(d):
                     for i in range(m):
                         answer[i] += sign * out[axis, other] * s.rows[j, other, i]
-    for i in range(m):
-        terms += workspace.before[i] ** 2 / workspace.scale[i]
     if derive:
         put_rows(s.stiffness, workspace.matrix)
         if has_polynomial(s):
@@ -214,25 +220,13 @@ def evaluate(
         matrix = workspace.matrix
         matrix += np.dot(s.rows.reshape((n * d, m)).T,
                          workspace.flexibility.reshape((n * d, m)))
-    return np.sqrt(terms)
-
-
-@helper
-def _size(workspace):
-    """Size of the out-of-balance force."""
-    total = 0.0
-    for i in range(len(workspace.scale)):
-        total += workspace.residual[i] ** 2 / workspace.scale[i]
-    return np.sqrt(total)
+    return _size(workspace.before, workspace.scale)
 
 
 @helper
 def _balanced(size, terms, part, workspace):
     """Whether an out-of-balance force is rounding, up to a part of the forces that cancel."""
-    acting = 0.0
-    for i in range(len(workspace.scale)):
-        acting += workspace.acting[i] ** 2 / workspace.scale[i]
-    return size <= part * terms and size <= _WRONG * np.sqrt(acting)
+    return size <= part * terms and size <= _WRONG * _size(workspace.acting, workspace.scale)
 
 
 @routine
@@ -262,7 +256,7 @@ def _hasty_newton(load, moved, sliders, s, pose, workspace):
     put(q, workspace.start)
     for _ in range(_HASTY):
         terms = evaluate(load, moved, sliders, s, pose, workspace, 1)
-        size = _size(workspace)
+        size = _size(workspace.residual, workspace.scale)
         if _balanced(size, terms, _FINE, workspace) or (
                 _balanced(size, terms, _ROUGH, workspace) and size >= 0.5 * last):
             return True
@@ -282,7 +276,7 @@ def _newton(load, moved, sliders, s, pose, workspace):
     shift, q = 0.0, pose.q
     for _ in range(_TRIES):
         terms = evaluate(load, moved, sliders, s, pose, workspace, 1)
-        size = _size(workspace)
+        size = _size(workspace.residual, workspace.scale)
         if not np.isfinite(size):
             return False
         if _balanced(size, terms, _FINE, workspace):
@@ -297,7 +291,7 @@ def _newton(load, moved, sliders, s, pose, workspace):
                 evaluate(load, moved, sliders, s, pose, workspace, 1)
                 continue
             evaluate(load, moved, sliders, s, pose, workspace, 0)
-            if _size(workspace) < size:
+            if _size(workspace.residual, workspace.scale) < size:
                 better = True
                 break
             for i in range(m):
