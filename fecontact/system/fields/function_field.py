@@ -132,9 +132,9 @@ class FunctionField(VectorField):
         if self._jacobian is not None:
             kernels.batch_jacobians(self._jacobian.address, t, x, values, J)
         if states or a:
+            complex_rates = 0 if self._complex is None else self._complex.address
             kernels.fill_derivatives(
-                way, step, self._rates.address,
-                0 if self._complex is None else self._complex.address,
+                kernels.Steps(way, step, self._rates.address, complex_rates),
                 kernels.Places(t, x, f, values, scales, self._sizes, active, states),
                 kernels.workspace_for(d, len(values)), J, P, wrong)
         return f, J, P, wrong

@@ -72,6 +72,18 @@ class Places(NamedTuple):
     states: bool
 
 
+class Steps(NamedTuple):
+    """How derivatives are formed, from the addresses of the rates of real and complex numbers.
+
+    One ``step`` is in the typical sizes, others are in the larger of these and the entry.
+    """
+
+    way: int
+    step: float
+    rates: int
+    complex_rates: int
+
+
 class Place(NamedTuple):
     """One place: time, state and parameters that may be moved, and the rates there."""
 
@@ -259,29 +271,28 @@ def move_to(x, p, workspace):
 
 
 @helper
-def set_column(way, step, function, analytic, place, moved, shifted, at, scale, workspace, column):
+def set_column(steps, place, moved, shifted, at, scale, workspace, column):
     """Fill ``column`` (d,) with the derivative to ``moved[at]``, an entry of the place's y or q.
 
-    ``shifted`` is z or w. True if a complex step was wrong, and differences take its place. One
-    ``step`` is in scales, others are in the larger of entry and scale.
+    ``shifted`` is z or w. True if a complex step was wrong, and differences take its place.
     """
-    size = max(abs(moved[at]), scale)
-    if way == EXTRAPOLATED:
+    function, size = rates_at(steps.rates), max(abs(moved[at]), scale)
+    if steps.way == EXTRAPOLATED:
         _extrapolated(function, place, moved, at, size, workspace)
         put(workspace.best, column)
         return False
-    if way == ONE_STEP:
-        h = step * scale
+    if steps.way == ONE_STEP:
+        h = steps.step * scale
         _set_beside(function, place, moved, at, h, workspace)
         for i in range(len(column)):
             column[i] = (workspace.above[i] - workspace.below[i]) / (2.0 * h)
         return False
     shifted[at] = complex(moved[at], _TINY)
-    analytic(place.t, workspace.z, workspace.w, workspace.out)
+    complex_rates_at(steps.complex_rates)(place.t, workspace.z, workspace.w, workspace.out)
     shifted[at] = moved[at]
     for i in range(len(column)):
         column[i] = workspace.out[i].imag / _TINY
-    return way == COMPLEX and _correct(function, place, moved, at, size, workspace, column)
+    return steps.way == COMPLEX and _correct(function, place, moved, at, size, workspace, column)
 
 
 @kernel
@@ -301,7 +312,7 @@ def batch_jacobians(address: int, t: Vector, x: Matrix, p: Vector, J: Block) -> 
 
 
 @borrowing
-def _fill_columns(way, step, function, analytic, places, workspace, J, P, wrong):
+def _fill_columns(steps, places, workspace, J, P, wrong):
     x, active, y, q, z, w = (places.x, places.active, workspace.y, workspace.q, workspace.z,
                              workspace.w)
     d = x.shape[1]
@@ -314,15 +325,13 @@ def _fill_columns(way, step, function, analytic, places, workspace, J, P, wrong)
             else:
                 at = active[c - d]
                 scale, moved, shifted, column = places.sizes[at], q, w, P[n, :, c - d]
-            if set_column(way, step, function, analytic, place, moved, shifted, at, scale,
-                          workspace, column):
+            if set_column(steps, place, moved, shifted, at, scale, workspace, column):
                 wrong[c] += 1
 
 
 @kernel
 def fill_derivatives(
-    way: int, step: float, address: int, complex_address: int, places: Places,
-    workspace: Workspace, J: Block, P: Block, wrong: IntegerVector,
+    steps: Steps, places: Places, workspace: Workspace, J: Block, P: Block, wrong: IntegerVector,
 ) -> None:
     """Fill J (N, d, d) if wanted, and P (N, d, a), by central differences or the complex step.
 
@@ -330,8 +339,7 @@ def fill_derivatives(
     columns of J and P.
     """
     wrong[:] = 0
-    _fill_columns(way, step, rates_at(address), complex_rates_at(complex_address), places,
-                  workspace, J, P, wrong)
+    _fill_columns(steps, places, workspace, J, P, wrong)
 
 
 def workspace_for(states: int, parameters: int) -> Workspace:

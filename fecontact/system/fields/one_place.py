@@ -17,8 +17,8 @@ from fecontact.system.fields.function_kernels import (
     COMPLEX,
     EXTRAPOLATED,
     Place,
+    Steps,
     Workspace,
-    complex_rates_at,
     jacobian_at,
     move_to,
     rates_at,
@@ -79,14 +79,15 @@ def _with_jacobian(t, x, field, f, J):
 
 
 def _by_steps(t, x, field, f, J):
-    function, analytic = rates_at(field.function), complex_rates_at(field.analytic)
-    way, workspace = COMPLEX if field.analytic != 0 else EXTRAPOLATED, field.workspace
-    function(t, x, field.p, f)
+    steps = Steps(COMPLEX if field.analytic != 0 else EXTRAPOLATED, 0.0, field.function,
+                  field.analytic)
+    workspace = field.workspace
+    rates_at(field.function)(t, x, field.p, f)
     move_to(x, field.p, workspace)
     place = Place(t, workspace.y, workspace.q, f)
     for j in range(len(x)):
-        if set_column(way, 0.0, function, analytic, place, workspace.y, workspace.z, j,
-                      field.scales[j], workspace, J[:, j]):
+        if set_column(steps, place, workspace.y, workspace.z, j, field.scales[j], workspace,
+                      J[:, j]):
             field.wrong[j] += 1
 
 
