@@ -15,7 +15,12 @@ from fecontact.bifurcation.harmonic.elements import (
     follow_elements,
 )
 from fecontact.bifurcation.harmonic.engine_order import Waves
-from fecontact.bifurcation.harmonic.layout import Layout, all_coefficients, filled, orbit_weights
+from fecontact.bifurcation.harmonic.layout import (
+    Layout,
+    SeriesUnknowns,
+    all_coefficients,
+    filled,
+)
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
 from fecontact.bifurcation.harmonic.series import (
     Series,
@@ -41,7 +46,7 @@ _NOTHING_KEPT = Kept(np.zeros((0, 0)), np.zeros(0), *np.zeros((2, 0), dtype=np.i
 
 
 @dataclass(frozen=True, eq=False)
-class Balance(OrbitUnknowns):
+class Balance(SeriesUnknowns, OrbitUnknowns):
     """Equations of a periodic orbit of x' = f(t, x, p) with truncated Fourier series.
 
     With tau = t / T, displacements q and other states y are Fourier series with H harmonics,
@@ -117,11 +122,6 @@ class Balance(OrbitUnknowns):
         """Transforms between samples and coefficients."""
         return series(self.harmonics, self.samples)
 
-    @property
-    def size(self) -> int:
-        """Number of coefficients."""
-        return self.reference.size
-
     @cached_property
     def rows_kept(self) -> Integers:
         """Rows of the coefficients (2 H + 1, b) whose harmonics are not left out."""
@@ -140,10 +140,6 @@ class Balance(OrbitUnknowns):
         if self.waves is not None:
             left = np.union1d(left, self.waves.left_out(self.reference.shape))
         return left
-
-    def coefficients(self, u: Array) -> Array:
-        """Coefficients (2 H + 1, b) of q and y."""
-        return u[: self.size].reshape(self.reference.shape)
 
     def period(self, u: Array) -> float:
         """Period T [s] of the orbit."""
@@ -222,20 +218,15 @@ class Balance(OrbitUnknowns):
         return None if self.waves is not None else contact_directions(
             self.field, self.values, self.harmonics)
 
-    @cached_property
-    def _weights(self) -> Array:
-        return orbit_weights(self.scales[self.layout.columns], self.scales[-self.common :],
-                             len(self.reference))
-
-    def weights(self) -> Array:
-        """Weights of the inner product: mean over the orbit of scaled q and y; T; parameter."""
-        return self._weights
+    @property
+    def common_scales(self) -> Array:
+        """Scales of the period, if it is unknown, and the parameter."""
+        return self.scales[-self.common :]
 
     @cached_property
     def phase_row(self) -> Array:
         """Row (n,) of the phase condition over the coefficients."""
-        row = differentiated(self.reference) * self.scales[self.layout.columns] ** -2.0
-        return np.asarray((row / (np.abs(row).max() or 1.0)).reshape(-1))
+        return self.phase_row_of(differentiated(self.reference))
 
     def states(self, u: Array, period: float, z: Array) -> Array:
         """States (N, d) with z (N, c) at the samples."""
@@ -501,13 +492,11 @@ class Linearised(BorderedEquations):
         problem, u, rows = self.problem, self.u, self.tangents
         assert isinstance(problem.field, ContactField)
         L, n = len(problem.reference), problem.size
-        change = problem.series.projection @ self.elements.rows
         axes = problem.field.arrays(problem.parameters(u)).rows
-        within = found[:n, :n].reshape(L, -1, L, axes.shape[2])
-        for axis in range(axes.shape[1]):
-            along = np.repeat(axes[:, axis], axes.shape[1] - 1, axis=0)
-            within += np.einsum("jqk,ji,jo->qiko", change[:, :, axis * L : (axis + 1) * L], rows,
-                                along, optimize=True)
+        nodes, d, m = axes.shape
+        change = (problem.series.projection @ self.elements.rows).reshape(nodes, d - 1, L, d, L)
+        found[:n, :n].reshape(L, m, L, m)[:] += np.einsum(
+            "jtlak,jti,jam->likm", change, axes[:, ::2], axes, optimize=True)
         for column in range(-problem.common, 0):
             change = by_differences(lambda end: problem.followed(
                 end, problem.period(end), False).friction, u, column)

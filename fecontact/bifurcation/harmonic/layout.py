@@ -12,6 +12,7 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.memory import Kept
 from fecontact.bifurcation.harmonic.series import basis_at, differentiated
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.orbits.unknowns import FreeParameters
 from fecontact.core.types import Array, Integers
 from fecontact.system.elastic_sliders import slider_counts
 from fecontact.system.fields.vector_field import VectorField
@@ -125,13 +126,57 @@ def all_coefficients(layout: Layout, X: Array, period: float | Array) -> Array:
     return np.concatenate([q, differentiated(q) / period, y], axis=-1) if m else X
 
 
-def grown(layout: Layout, scales: Array, X: Array, limits: Array | None) -> Array:
-    """Scales enlarged with coefficients X (L, b) of an orbit or torus, up to limits if any."""
-    if limits is None:
-        return scales
-    sizes = scales[: layout.states].copy()
-    sizes[layout.columns] = np.sqrt(np.einsum("ki,ki->i", X[1:], X[1:]))
-    return enlarged(scales, sizes, limits)
+class SeriesUnknowns(FreeParameters):
+    """Coefficients (L, b) of series first among the unknowns, those of an orbit or a torus.
+
+    Scales begin with those of the d states; ``limits`` (d,) bound their growth, None keeps them.
+    """
+
+    reference: Array
+    scales: Array
+    layout: Layout
+    limits: Array | None = None
+
+    @property
+    def size(self) -> int:
+        """Number L b of coefficients."""
+        return self.reference.size
+
+    def coefficients(self, u: Array) -> Array:
+        """Coefficients (L, b) of q and y."""
+        return u[: self.size].reshape(self.reference.shape)
+
+    @property
+    def sizes(self) -> Array:
+        """Scales (b,) of q and y."""
+        return self.scales[self.layout.columns]
+
+    @property
+    def common_scales(self) -> Array:
+        """Scales of the unknowns behind the coefficients."""
+        raise NotImplementedError
+
+    @cached_property
+    def _weights(self) -> Array:
+        return orbit_weights(self.sizes, self.common_scales, len(self.reference))
+
+    def weights(self) -> Array:
+        """Weights of the inner product: mean of scaled q and y, and further unknowns."""
+        return self._weights
+
+    def phase_row_of(self, rate: Array) -> Array:
+        """Row (L b,) of the phase condition <X, rate> = 0 with a rate (L, b) of the reference."""
+        row = rate * self.sizes**-2.0
+        return np.asarray((row / (np.abs(row).max() or 1.0)).reshape(-1))
+
+    def _grown(self, u: Array) -> Array:
+        """Scales of all unknowns, enlarged with the motion."""
+        if self.limits is None:
+            return self.scales
+        layout, X = self.layout, self.coefficients(u)
+        sizes = self.scales[: layout.states].copy()
+        sizes[layout.columns] = np.sqrt(np.einsum("ki,ki->i", X[1:], X[1:]))
+        return enlarged(self.scales, sizes, self.limits)
 
 
 def series_states(layout: Layout, X: Array, z: Array, period: float, times: Array) -> Array:

@@ -36,7 +36,6 @@ from fecontact.bifurcation.harmonic.compiled.orbits import (
     evaluate,
 )
 from fecontact.bifurcation.harmonic.compiled.step_batches import StepBatches
-from fecontact.bifurcation.harmonic.layout import grown
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.series import differentiated, shifted
 from fecontact.bifurcation.harmonic.stability import by_hill, by_transitions, stability_grid
@@ -80,9 +79,8 @@ class HarmonicLinearisation(Linearised):
     @cached_property
     def neglected(self) -> tuple[float, float]:
         """Estimates of the error: of the orbit, and of its equations; see :mod:`estimates`."""
-        problem, layout = self.problem, self.problem.layout
-        X, sizes, (forces, mean) = (problem.coefficients(self.u), problem.scales[layout.columns],
-                                    self._samples())
+        problem, (forces, mean) = self.problem, self._samples()
+        X, sizes = problem.coefficients(self.u), problem.sizes
         if problem.waves is not None:
             return problem.waves.neglected(X, forces, self.period, float(self.u[-1]), sizes,
                                            problem.harmonics_kept), np.nan
@@ -255,10 +253,6 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
             scales=self._grown(u),
             predictor=self.predictor.after(self.weights(), u, tangent)), u, tangent
 
-    def _grown(self, u: Array) -> Array:
-        """Scales of states, period and parameter, enlarged with the orbit."""
-        return grown(self.layout, self.scales, self.coefficients(u), self.limits)
-
     def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
         """Period, stability, the errors of the truncation and the extremes of the states."""
         known = dict(self._stability(linearisation))
@@ -266,7 +260,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
             known |= zip(ERRORS, linearisation.neglected, strict=True)
         forces, mean = linearisation._samples()
         return self.stored(u[None], linearisation.memory[None], forces[None], mean[None],
-                           self.scales[None, self.layout.columns],
+                           self.sizes[None],
                            {name: [value] for name, value in known.items()})[0]
 
     def _stability(self, linearisation: Any) -> dict[str, Any]:
@@ -310,8 +304,8 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
         """Test functions of the multipliers, if known, and of orbits that shrink to rest."""
         found = {} if self.stability is None else super().tests(u, linearisation, tangent)
         if self.autonomous and self.reference[1:].any():
-            found[VANISHING] = shrunk(np.ones(1), self.coefficients(u)[1:] / self._sizes,
-                                      self.reference[1:] / self._sizes)
+            found[VANISHING] = shrunk(np.ones(1), self.coefficients(u)[1:] / self.sizes,
+                                      self.reference[1:] / self.sizes)
         return found
 
     def note(self, points: Sequence[BranchPoint]) -> str:
@@ -336,11 +330,6 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
             return BranchStatus.HOMOCLINIC
         return None
 
-    @property
-    def _sizes(self) -> Array:
-        """Scales of the states that are series."""
-        return self.scales[self.layout.columns]
-
     def fast_steps(self, options: ContinuationOptions) -> StepBatches | None:
         """Compiled steps, for forced orbits of contact systems."""
         return StepBatches.of(self, options) if type(self) is HarmonicProblem else None
@@ -363,7 +352,7 @@ class HarmonicProblem(FloquetTests, Balance, Problem):
 
     def _halves_meet(self, u: Array, tangent: Array) -> bool:
         """Whether an orbit has even harmonics alone, while the branch adds odd ones."""
-        sizes = self._sizes
+        sizes = self.sizes
 
         def odd_part(vector: Array) -> float:
             X = self.coefficients(vector)[1:] / sizes

@@ -1,8 +1,7 @@
 """Start of a nonlinear mode: the system without excitation, and its linear mode at rest."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from fecontact.bifurcation.harmonic.engine_order import EngineOrder, WaveField, 
 from fecontact.bifurcation.harmonic.forced_starts import rest_state
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ComplexArray
-from fecontact.laws.excitation import BOUNDARY_STRESSES, BoundaryLoad, Drive, Load
+from fecontact.laws.excitation import BOUNDARY_STRESSES, BoundaryLoad
 from fecontact.laws.signals.base import Signal
 from fecontact.laws.signals.harmonic import Constant
 from fecontact.system.contact_system import ContactSystem
@@ -33,8 +32,6 @@ _BELOW_LIMIT = 1e-6
 _SETTLED = 1e-13
 # Rates at the equilibrium, relative to the size of the equations, that are rounding.
 _AT_REST = 1e-9
-
-_Part = TypeVar("_Part", BoundaryLoad, Drive, Load)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,27 +80,24 @@ class LinearStart:
 def unforced(system: ContactSystem) -> ContactSystem:
     """The system without the parts of drive and loads that depend on time; constant ones stay."""
     drive, load = system.drive, system.load
-    kept = {f"motion_{axis}": motion if isinstance(motion, Constant) else None
-            for axis, motion in zip("xyz", (drive.motion_x, drive.motion_y, drive.motion_z),
-                                    strict=True)}
-    none = {f"amplitude_{axis}": 0.0 for axis in "xyz"}
-    boundaries = [_changed(one, {name: _constant(getattr(one, name))
-                                 for name in BOUNDARY_STRESSES})
+    kept: dict[str, Any] = {
+        f"motion_{axis}": motion if isinstance(motion, Constant) else None
+        for axis, motion in zip("xyz", (drive.motion_x, drive.motion_y, drive.motion_z),
+                                strict=True)}
+    none: dict[str, Any] = {f"amplitude_{axis}": 0.0 for axis in "xyz"}
+    boundaries = [replace(one, **{name: _constant(getattr(one, name))
+                                  for name in BOUNDARY_STRESSES})
                   for one in load.boundaries if _remains(one)]
     forces = [one for one in load.forces if isinstance(one.signal, Constant)]
-    accelerations = {f"base_acceleration_{axis}": signal if isinstance(signal, Constant) else None
-                     for axis, signal in zip("xyz", load.base_accelerations, strict=True)}
+    accelerations: dict[str, Any] = {
+        f"base_acceleration_{axis}": signal if isinstance(signal, Constant) else None
+        for axis, signal in zip("xyz", load.base_accelerations, strict=True)}
     return system.with_(
-        drive=_changed(drive, {"frequency_hz": 0.0, **none, **kept}),
-        load=_changed(load, {"forces": tuple(forces), "boundaries": tuple(boundaries),
-                             **accelerations}))
+        drive=replace(drive, frequency_hz=0.0, **none, **kept),
+        load=replace(load, forces=tuple(forces), boundaries=tuple(boundaries), **accelerations))
 
 
-def _changed(part: _Part, changes: Mapping[str, Any]) -> _Part:
-    return replace(part, **changes)
-
-
-def _constant(given: float | Signal) -> float | Signal:
+def _constant(given: float | Signal) -> Any:
     return 0.0 if isinstance(given, Signal) and not isinstance(given, Constant) else given
 
 

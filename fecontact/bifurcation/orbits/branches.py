@@ -38,7 +38,7 @@ from fecontact.bifurcation.orbits.restored import rescaled, restored, restored_o
 from fecontact.core.checks import require_flags, require_kind
 from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
 from fecontact.core.resources.blas_threads import one_blas_thread
-from fecontact.core.types import ArrayLike
+from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.field_runs.field_run import FieldRun
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.system.fields.vector_field import VectorField, require_field
@@ -181,14 +181,22 @@ def _from_hopf(point: HopfPoint, request: Request) -> Branch:
         lambda found: by.followed(found[0], method, options, found[1]))
 
 
-def _from_motion(motion: PeriodicMotion, parameter: str, request: Request) -> Branch:
-    field, options, method = request.field, request.options, request.method or Collocation()
-    free = field.index(parameter)
+def values_of(
+    motion: PeriodicMotion, field: VectorField, free: int, options: ContinuationOptions
+) -> Array:
+    """Parameter values (k,) of a motion, by default those of the field, the free one in bounds."""
     given = field.values if motion.parameter_values is None else motion.parameter_values.copy()
     if given.shape != field.values.shape:
         raise InputError(f"parameter_values of the motion must be {len(field.values)} numbers, one "
                          f"for each parameter of the field, not of shape {given.shape}.")
     given[free] = inside(float(given[free]), options)
+    return given
+
+
+def _from_motion(motion: PeriodicMotion, parameter: str, request: Request) -> Branch:
+    field, options, method = request.field, request.options, request.method or Collocation()
+    free = field.index(parameter)
+    given = values_of(motion, field, free, options)
     sizes, limits = sizes_of(request.scales, motion.amplitudes + 1e-300)
     widths = np.append(sizes, width_of(request.width, options, given[free]))
     return discretisation_by(method).from_motion(

@@ -17,11 +17,10 @@ from fecontact.bifurcation.continuation.problem import (
     sizes_of,
     width_of,
 )
-from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.layout import Layout, layout_of
 from fecontact.bifurcation.harmonic.series import real_coefficients
-from fecontact.bifurcation.orbits.branches import as_motion
+from fecontact.bifurcation.orbits.branches import as_motion, values_of
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.tori.elements import elements_of
 from fecontact.bifurcation.tori.excitation import Excitation, excitation_of
@@ -150,17 +149,20 @@ class _Guess(NamedTuple):
 def _problem(
     excitation: Excitation, values: Array, free: int, method: TorusBalance, guess: _Guess,
     given: Any,
-) -> TorusProblem:
+) -> tuple[TorusProblem, Array]:
+    """Problem, and unknowns of a guess."""
     scales, width, options = given
     sizes, limits = sizes_of(scales, guess.amplitudes + 1e-300)
     layout = _layout(excitation.field)
     elements = elements_of(excitation.field, layout)
     if elements is not None and guess.kept is not None:
         elements = replace(elements, kept=replace(elements.kept, offsets=guess.kept))
-    return TorusProblem(
+    problem = TorusProblem(
         excitation, values, free, method.orders, method.counts, guess.X,
         np.concatenate([sizes, guess.frequencies, [width_of(width, options, values[free])]]),
         layout, method.stability, method.tolerance, limits, elements)
+    return problem, np.concatenate([
+        guess.X.reshape(-1), [guess.frequencies[i] for i in problem.unknown], [values[free]]])
 
 
 def _kept(field: VectorField, motion: PeriodicMotion) -> Array | None:
@@ -169,26 +171,12 @@ def _kept(field: VectorField, motion: PeriodicMotion) -> Array | None:
     return None if elements is None else elements.kept.left_by(motion.states).offsets
 
 
-def _unknowns(problem: TorusProblem, X: Array, frequencies: tuple[float, float]) -> Array:
-    return np.concatenate([X.reshape(-1), [frequencies[i] for i in problem.unknown],
-                           [problem.values[problem.free]]])
-
-
 def _of_orbit(
     layout: Layout, motion: PeriodicMotion, orders: tuple[int, int]
 ) -> tuple[Array, Array]:
     """Coefficients (L, b) of a periodic motion as a torus, and amplitudes (d,) of its states."""
     c = motion.harmonics(min(orders[0], max((len(motion.times) - 3) // 2, 0)))[:, layout.columns]
     return with_orders(real_coefficients(c), (len(c) - 1, 0), orders), motion.amplitudes
-
-
-def _values(field: VectorField, motion: PeriodicMotion, free: int, options: Any) -> Array:
-    given = field.values if motion.parameter_values is None else motion.parameter_values.copy()
-    if given.shape != field.values.shape:
-        raise InputError(f"parameter_values of the motion must be {len(field.values)} numbers, one "
-                         f"for each parameter of the field, not of shape {given.shape}.")
-    given[free] = inside(float(given[free]), options)
-    return given
 
 
 def _from_neimark_sacker(
@@ -203,18 +191,16 @@ def _from_neimark_sacker(
     frequencies = (1.0 / motion.period, point.angle / (2.0 * np.pi * motion.period))
     values = point.parameter_values(field)
     guess = _Guess(X, frequencies, amplitudes, _kept(field, motion))
-    problem = _problem(excitation, values, free, method, guess, given)
-    u = _unknowns(problem, X, frequencies)
+    problem, u = _problem(excitation, values, free, method, guess, given)
     leaving = np.zeros_like(X)
     rows = np.arange(2 * method.orders[0] + 1, 6 * method.orders[0] + 3)
     matrix = problem.linearise(u).matrix[rows][:, :, rows]
     n = matrix.shape[0] * matrix.shape[1]
-    sizes = np.tile(problem.scales[problem.layout.columns], len(rows))
+    sizes = np.tile(problem.sizes, len(rows))
     square = matrix.reshape(n, n) * sizes
     square /= np.abs(square).max(axis=1)[:, None]
     leaving[rows] = (sizes * np.linalg.svd(square)[2][-1]).reshape(len(rows), -1)
-    tangent = np.zeros_like(u)
-    tangent[: problem.size] = leaving.reshape(-1)
+    tangent = np.append(leaving, np.zeros(problem.common))
     tangent /= np.sqrt(problem.weights() @ tangent**2)
 
     def go(part: float) -> Branch:
@@ -232,7 +218,7 @@ def _from_motion(
 ) -> tuple[TorusProblem, Array]:
     """Problem and first guess from an orbit, or from a run."""
     field, layout = excitation.field, _layout(excitation.field)
-    values = _values(field, motion, free, given[2])
+    values = values_of(motion, field, free, given[2])
     if motion.period is not None:
         excitation = replace(excitation, periods=motion.periods)
     known = excitation.frequencies(values)
@@ -249,8 +235,7 @@ def _from_motion(
                                           method.orders)
         X, amplitudes = with_orders(fit, orders, method.orders), motion.amplitudes
     guess = _Guess(X, frequencies, amplitudes, _kept(field, motion))
-    problem = _problem(excitation, values, free, method, guess, given)
-    return problem, _unknowns(problem, X, frequencies)
+    return _problem(excitation, values, free, method, guess, given)
 
 
 def _from_torus(
@@ -264,18 +249,15 @@ def _from_torus(
     own = method or TorusBalance((H1, H2), (N1, N2), bool(known["torus_multipliers"]),
                                  float(known["tolerance"]))
     values, layout = point.parameter_values(excitation.field), _layout(excitation.field)
-    X = with_orders(motion.coefficients[:, layout.columns], motion.harmonics, own.orders)
+    L, n = len(motion.coefficients), len(motion.coefficients) * layout.harmonic
+    X, along = (with_orders(vector[:n].reshape(L, -1), motion.harmonics, own.orders)
+                for vector in (point.u, point.tangent))
     scales = np.asarray(known["scales"], dtype=float)
     frequencies = float(motion.frequencies[0]), float(motion.frequencies[1])
     guess = _Guess(X, frequencies, scales[: layout.states], known.get("kept_deflections"))
-    problem = _problem(excitation, values, free, own, guess,
-                       (given[0], given[1] or float(scales[-1]), given[2]))
-    u = _unknowns(problem, X, frequencies)
-    tangent = np.zeros_like(u)
-    L = len(motion.coefficients)
-    along = point.tangent[: L * layout.harmonic].reshape(L, -1)
-    tangent[: problem.size] = with_orders(along, motion.harmonics, own.orders).reshape(-1)
-    tangent[problem.size :] = point.tangent[L * layout.harmonic :]
+    problem, u = _problem(excitation, values, free, own, guess,
+                          (given[0], given[1] or float(scales[-1]), given[2]))
+    tangent = np.append(along, point.tangent[n:])
     return problem, u, tangent / np.sqrt(problem.weights() @ tangent**2)
 
 
@@ -290,7 +272,7 @@ def _converged(problem: TorusProblem, u: Array) -> tuple[TorusProblem, Array]:
     row = np.zeros_like(u)
     row[-1] = 1.0
     u, _, converged = damped_newton(problem, u, row, _TOLERANCE, _CORRECTIONS)
-    X = problem.coefficients(u) / problem.scales[problem.layout.columns]
+    X = problem.coefficients(u) / problem.sizes
     orbit = 1 in problem.unknown and np.abs(X[2 * problem.orders[0] + 1 :]).max() < (
         _ORBIT * np.abs(X).max())
     if not converged or orbit:

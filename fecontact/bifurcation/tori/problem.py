@@ -9,11 +9,11 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.harmonic.estimates import responses
-from fecontact.bifurcation.harmonic.layout import Layout, grown, orbit_weights
+from fecontact.bifurcation.harmonic.layout import Layout, SeriesUnknowns
 from fecontact.bifurcation.harmonic.series import turned
 from fecontact.bifurcation.harmonic.woodbury import BorderedEquations
 from fecontact.bifurcation.orbits.same_orbit import shrunk
-from fecontact.bifurcation.orbits.unknowns import FreeParameters, beside, by_differences
+from fecontact.bifurcation.orbits.unknowns import beside, by_differences
 from fecontact.bifurcation.tori.elements import Friction, TorusElements
 from fecontact.bifurcation.tori.excitation import Excitation
 from fecontact.bifurcation.tori.series import (
@@ -43,7 +43,7 @@ _SHRINKS = "torus shrinks"
 
 
 @dataclass(frozen=True, eq=False)
-class TorusProblem(FreeParameters, Problem):
+class TorusProblem(SeriesUnknowns, Problem):
     """Equations of a torus X(theta1, theta2), along which theta_i' = 2 pi f_i.
 
     With D = 2 pi (f1 d/dtheta1 + f2 d/dtheta2), displacements q and other states y are Fourier
@@ -101,11 +101,6 @@ class TorusProblem(FreeParameters, Problem):
         """The field of the branch."""
         return self.excitation.field
 
-    @property
-    def size(self) -> int:
-        """Number L b of coefficients."""
-        return self.reference.size
-
     @cached_property
     def unknown(self) -> tuple[int, ...]:
         """Indices of the unknown frequencies, 0 and 1, in their order in u."""
@@ -121,10 +116,6 @@ class TorusProblem(FreeParameters, Problem):
     def pairs(self) -> Any:
         """Pairs (K, 2) of the harmonics."""
         return orders(*self.orders)
-
-    def coefficients(self, u: Array) -> Array:
-        """Coefficients (L, b) of q and y."""
-        return u[: self.size].reshape(self.reference.shape)
 
     def frequencies(self, u: Array) -> tuple[float, float]:
         """f1 and f2 [Hz]."""
@@ -170,23 +161,16 @@ class TorusProblem(FreeParameters, Problem):
                                  *self.orders)
         return on_lines(c, taus, count, ratio)
 
-    @cached_property
-    def _weights(self) -> Array:
-        others = [self.layout.states + i for i in self.unknown] + [-1]
-        return orbit_weights(self.scales[self.layout.columns], self.scales[others],
-                             len(self.reference))
-
-    def weights(self) -> Array:
-        """Weights of the inner product: mean over the torus of scaled states; f; parameter."""
-        return self._weights
+    @property
+    def common_scales(self) -> Array:
+        """Scales of the unknown frequencies and the parameter."""
+        return self.scales[[*(self.layout.states + i for i in self.unknown), -1]]
 
     @cached_property
     def phase_rows(self) -> Array:
         """Rows (a, L b) of the phase conditions."""
-        rows = [turned(self.reference, self.pairs[:, i].astype(float))
-                * self.scales[self.layout.columns] ** -2.0 for i in self.unknown]
-        return np.array([row.reshape(-1) / (np.abs(row).max() or 1.0) for row in rows]
-                        ).reshape(len(rows), self.size)
+        return np.array([self.phase_row_of(turned(self.reference, self.pairs[:, i].astype(float)))
+                         for i in self.unknown]).reshape(-1, self.size)
 
     def linearise(self, u: Array) -> "TorusLinearisation":
         """Residual and linearisation at u, each computed on demand."""
@@ -196,9 +180,8 @@ class TorusProblem(FreeParameters, Problem):
 
     def adapted(self, u: Array, tangent: Array) -> "tuple[TorusProblem, Array, Array]":
         """The problem for the next step, with the phase conditions at u."""
-        X = self.coefficients(u).copy()
-        return replace(self, reference=X, values=self.parameters(u), scales=grown(
-            self.layout, self.scales, X, self.limits)), u, tangent
+        return replace(self, reference=self.coefficients(u).copy(), values=self.parameters(u),
+                       scales=self._grown(u)), u, tangent
 
     @cached_property
     def _second(self) -> int:
@@ -230,11 +213,11 @@ class TorusProblem(FreeParameters, Problem):
         """Test function of tori that shrink to an orbit."""
         if 1 not in self.unknown:
             return {}
-        scale = self.scales[self.layout.columns]
-        before = self.reference[self._second :] / scale
+        before = self.reference[self._second :] / self.sizes
         if not before.any():
             return {}
-        return {_SHRINKS: shrunk(np.ones(1), self.coefficients(u)[self._second :] / scale, before)}
+        return {_SHRINKS: shrunk(np.ones(1), self.coefficients(u)[self._second :] / self.sizes,
+                                  before)}
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
         """At tori that their harmonics do not resolve."""
@@ -434,12 +417,8 @@ class TorusLinearisation(BorderedEquations):
     @cached_property
     def _size(self) -> float:
         """Root mean square of the torus without its mean, in the scales of its states."""
-        scaled = self.problem.coefficients(self.u)[1:] / self._scales
+        scaled = self.problem.coefficients(self.u)[1:] / self.problem.sizes
         return float(np.sqrt((scaled**2).sum())) or 1.0
-
-    @property
-    def _scales(self) -> Array:
-        return self.problem.scales[self.problem.layout.columns]
 
     @cached_property
     def truncation_error(self) -> float:
@@ -459,7 +438,7 @@ class TorusLinearisation(BorderedEquations):
         if problem.elements is not None:
             by_state = by_state - np.einsum("jt,jti,jtm->im", self._friction.stiffness,
                                             self._tangents, self._tangents)
-        added = responses(f, turns, by_state, by_velocity) / self._scales
+        added = responses(f, turns, by_state, by_velocity) / self.problem.sizes
         return float(np.sqrt(2.0 * (np.abs(added) ** 2).sum())) / self._size
 
     @cached_property
@@ -471,7 +450,7 @@ class TorusLinearisation(BorderedEquations):
         row = np.zeros(len(self.u))
         row[-1] = 1.0
         change = self.solve(row, np.append(-residual, 0.0))
-        scaled = problem.coefficients(change) / self._scales
+        scaled = problem.coefficients(change) / self.problem.sizes
         return float(np.sqrt((scaled**2).sum())) / self._size
 
     @cached_property

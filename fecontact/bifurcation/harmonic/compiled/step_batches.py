@@ -72,7 +72,7 @@ class StepBatches:
         u, along, forces, mean, z = found
         values = None if problem.stability is not None else problem.stored(
             u[None], z[None], forces[None], mean[None],
-            problem.scales[None, problem.layout.columns], {})[0]
+            problem.sizes[None], {})[0]
         return completed(problem, u, problem.linearise(u),
                          along / weighted_norm(problem.weights(), along), 1, self.options, values)
 
