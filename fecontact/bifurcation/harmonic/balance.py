@@ -9,18 +9,9 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.arrays import Equations
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.compiled.kinks import SampledRates, add_kinks, kink_onsets
-from fecontact.bifurcation.harmonic.elements import (
-    Displacements,
-    ElementForces,
-    follow_elements,
-)
+from fecontact.bifurcation.harmonic.elements import Displacements, ElementForces, follow_elements
 from fecontact.bifurcation.harmonic.engine_order import Waves
-from fecontact.bifurcation.harmonic.layout import (
-    Layout,
-    SeriesUnknowns,
-    all_coefficients,
-    filled,
-)
+from fecontact.bifurcation.harmonic.layout import Layout, SeriesUnknowns, all_coefficients, filled
 from fecontact.bifurcation.harmonic.memory import LEAK, Kept, differences, march, solve_around
 from fecontact.bifurcation.harmonic.series import (
     Series,

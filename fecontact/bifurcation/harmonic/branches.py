@@ -9,10 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.predictor import BENT
-from fecontact.bifurcation.continuation.problem import (
-    BranchStatus,
-    ContinuationOptions,
-)
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic import starts
 from fecontact.bifurcation.harmonic.method import MOST, MOST_SAMPLED, HarmonicBalance
@@ -159,9 +156,10 @@ def follow(
     whole = replace(final, stability=problem.stability)
     wrong = _wrong_at_folds(whole, branch) if judged else ""
     if judged and (final.stability is None) != bool(wrong):
-        branch = follow_orbits(
-            replace(whole, stability=None) if wrong else whole, u, options,
-            {**(further or {}), **_known(branch)}, tangent=tangent, **how)
+        known = {name: value for name, value in branch.attributes.items()
+                 if name == "sampling_error"}
+        branch = follow_orbits(replace(whole, stability=None) if wrong else whole, u, options,
+                               {**(further or {}), **known}, tangent=tangent, **how)
     return replace(_watched(branch, final), message=_joined(branch.message, notes, wrong))
 
 
@@ -211,12 +209,6 @@ def _refined(
     return branch, problem, u, tangent, _joined(
         _FEW.format(method.count, error) if error > max(_NOTED, sampling or 0.0) else "",
         _CORNERS.format(corners) if corners and not problem.autonomous else "")
-
-
-def _known(branch: Branch) -> dict[str, Any]:
-    """Attributes of a branch that another one of the same orbits has as well."""
-    return {name: branch.attributes[name] for name in ("sampling_error",)
-            if name in branch.attributes}
 
 
 def _joined(*sentences: str) -> str:

@@ -6,11 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.problem import (
-    BranchStatus,
-    ContinuationOptions,
-    width_of,
-)
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, width_of
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic import branches, starts
 from fecontact.bifurcation.harmonic.compiled.arrays import RESTS

@@ -179,11 +179,6 @@ class SeriesUnknowns(FreeParameters):
         return enlarged(self.scales, sizes, self.limits)
 
 
-def series_states(layout: Layout, X: Array, z: Array, period: float, times: Array) -> Array:
-    """States (k, d) at times tau (k,); internal variables linear between their samples."""
-    return filled(layout, X, around(z, times), period, basis_at(times, len(X) // 2))
-
-
 def around(samples: Array, times: Array) -> Array:
     """Values (..., k, c) at times tau (k,), linear between periodic samples (..., N, c)."""
     N = samples.shape[-2]
@@ -205,11 +200,13 @@ def balanced(
 ) -> PeriodicMotion:
     """Sample an orbit by harmonic balance over one period, both ends included.
 
-    ``values`` are those stored of the point, ``attributes`` those of its branch.
+    Internal variables are linear between their samples. ``values`` are those stored of the point,
+    ``attributes`` those of its branch.
     """
     layout, period = layout_from(attributes), float(values["period"])
     phases = np.linspace(0.0, 1.0, samples)
     count = 2 * attributes["method"].highest + 1
     X = u[: count * layout.harmonic].reshape(-1, layout.harmonic)
-    z = np.asarray(values.get("memory", np.zeros((1, 0))))
-    return PeriodicMotion(phases * period, series_states(layout, X, z, period, phases), period)
+    z = around(np.asarray(values.get("memory", np.zeros((1, 0)))), phases)
+    states = filled(layout, X, z, period, basis_at(phases, len(X) // 2))
+    return PeriodicMotion(phases * period, states, period)

@@ -11,21 +11,12 @@ import numpy as np
 from fecontact.bifurcation.continuation.inner_product import weighted_norm
 from fecontact.bifurcation.continuation.point import BranchPoint, attributes_of
 from fecontact.bifurcation.continuation.predictor import BENT, Predictor
-from fecontact.bifurcation.continuation.problem import (
-    BranchStatus,
-    ContinuationOptions,
-    Problem,
-)
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, Problem
 from fecontact.bifurcation.continuation.rounding import RestingParameter, Rounding
 from fecontact.bifurcation.fields.fast_modes import unresolved_modes
 from fecontact.bifurcation.fields.jumps import missed_jumps
 from fecontact.bifurcation.harmonic import estimates
-from fecontact.bifurcation.harmonic.balance import (
-    UNREPEATED,
-    Balance,
-    Linearised,
-    zero_left_out,
-)
+from fecontact.bifurcation.harmonic.balance import UNREPEATED, Balance, Linearised, zero_left_out
 from fecontact.bifurcation.harmonic.compiled.arrays import TOLERANCE, Equations
 from fecontact.bifurcation.harmonic.compiled.balance import MOST_UNKNOWNS
 from fecontact.bifurcation.harmonic.compiled.orbits import (

@@ -16,32 +16,20 @@ from fecontact.bifurcation.continuation.points import (
     details_of,
     special_point,
 )
-from fecontact.bifurcation.continuation.problem import (
-    BranchStatus,
-    ContinuationOptions,
-    options_of,
-)
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, options_of
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
-from fecontact.bifurcation.fields.contact_field import (
-    ContactField,
-    field_between,
-)
+from fecontact.bifurcation.fields.contact_field import ContactField, field_between
 from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches
 from fecontact.bifurcation.harmonic.engine_order import WaveField
-from fecontact.bifurcation.harmonic.estimates import (
-    observed_of_series,
-)
+from fecontact.bifurcation.harmonic.estimates import observed_of_series
 from fecontact.bifurcation.harmonic.forced_starts import Forced, start_of
 from fecontact.bifurcation.harmonic.layout import Layout, layout_from, layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.orbit_methods import Method
 from fecontact.bifurcation.orbits.branches import orbit_branch
-from fecontact.bifurcation.orbits.discretisations import (
-    DISCRETISATIONS,
-    discretisation_by,
-)
+from fecontact.bifurcation.orbits.discretisations import DISCRETISATIONS, discretisation_by
 from fecontact.bifurcation.orbits.from_run import periodic_motion
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.orbit_points import orbit_points_of

@@ -16,11 +16,7 @@ from fecontact.bifurcation.harmonic.series import basis_at
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.motion_transitions import integrals, motion_transitions
 from fecontact.bifurcation.linalg.transition_matrices import transitions
-from fecontact.bifurcation.orbits.floquet import (
-    Floquet,
-    by_falling_modulus,
-    floquet_of_product,
-)
+from fecontact.bifurcation.orbits.floquet import Floquet, by_falling_modulus, floquet_of_product
 from fecontact.bifurcation.orbits.mesh import basis_at_points, rule
 from fecontact.core.types import Array
 

@@ -166,10 +166,9 @@ def start_of(
                                   found.scales, found.periods), limits=limits)
     phases = problem.series.times
     sampled = orbit_starts.at_phase(found, nodes, phases)
-    if problem.layout.memory:
-        problem = replace(problem, kept=problem.kept.left_by(sampled))
     u = unknowns(problem, sampled, found.period(nodes))
-    problem = replace(problem, reference=problem.coefficients(u).copy())
+    problem = replace(problem, kept=problem.kept.left_by(sampled),
+                      reference=problem.coefficients(u).copy())
     if leaving is None:
         return problem, u, None
     tangent = unknowns(problem, orbit_starts.at_phase(found, leaving, phases), 0.0)

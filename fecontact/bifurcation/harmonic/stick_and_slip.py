@@ -189,25 +189,15 @@ class Sums(NamedTuple):
     by_bend: Vector
 
 
-@borrowing
-def _add_begun(path, n, part, compliance, spring, s, sums):
-    """Add to forces, and to their derivatives, the means about a place where slip begins."""
-    r, rows, stuck = sums.forces, sums.rows, sums.stuck
+@helper
+def _add_means(n, part, jump, bend, spring, sums):
+    """Add to forces, and to their derivatives, the means about a place where their slope jumps.
+
+    ``jump`` and -``bend`` are the jumps of slope and curvature; their derivatives, and that of the
+    place, stand in the sums.
+    """
+    r, rows, shift = sums.forces, sums.rows, sums.shift
     N = len(r)
-    _, rate, bend, third = moved_at(path, n, part, s)
-    jump = compliance * pressing_at(path, n, part, 1) - rate
-    over = bend - compliance * pressing_at(path, n, part, 2)
-    shift, by_jump, by_bend = sums.shift, sums.by_jump, sums.by_bend
-    if len(rows) > 0:
-        for k in range(len(shift)):
-            shift[k], by_jump[k], by_bend[k] = stuck[k], 0.0, 0.0
-        add_row(path, n, part, 0, compliance, 1.0, shift)
-        add_row(path, n, part, 1, compliance, -1.0, by_jump)
-        add_row(path, n, part, 2, 0.0, -1.0, by_bend)
-        for k in range(len(shift)):
-            shift[k] = shift[k] / jump if jump != 0.0 else 0.0
-            by_jump[k] -= over * shift[k]
-            by_bend[k] -= third * shift[k]
     for i in range(-1, 3):
         place = (n + i) % N
         step, ramp, curve = _means(i - part)
@@ -215,34 +205,46 @@ def _add_begun(path, n, part, compliance, spring, s, sums):
         if len(rows) > 0:
             along = jump * step - bend * ramp
             for k in range(len(shift)):
-                rows[place, k] += spring * (ramp * by_jump[k] + curve * by_bend[k]
+                rows[place, k] += spring * (ramp * sums.by_jump[k] + curve * sums.by_bend[k]
                                             - along * shift[k])
+
+
+@borrowing
+def _add_begun(path, n, part, compliance, spring, s, sums):
+    """Add to forces, and to their derivatives, the means about a place where slip begins."""
+    _, rate, bend, third = moved_at(path, n, part, s)
+    jump = compliance * pressing_at(path, n, part, 1) - rate
+    over = bend - compliance * pressing_at(path, n, part, 2)
+    shift, by_jump, by_bend = sums.shift, sums.by_jump, sums.by_bend
+    if len(sums.rows) > 0:
+        for k in range(len(shift)):
+            shift[k], by_jump[k], by_bend[k] = sums.stuck[k], 0.0, 0.0
+        add_row(path, n, part, 0, compliance, 1.0, shift)
+        add_row(path, n, part, 1, compliance, -1.0, by_jump)
+        add_row(path, n, part, 2, 0.0, -1.0, by_bend)
+        for k in range(len(shift)):
+            shift[k] = shift[k] / jump if jump != 0.0 else 0.0
+            by_jump[k] -= over * shift[k]
+            by_bend[k] -= third * shift[k]
+    _add_means(n, part, jump, bend, spring, sums)
 
 
 @borrowing
 def _add_ended(path, n, part, compliance, spring, s, sums):
     """Add to forces, and to their derivatives, the means about a place where slip ends."""
-    r, rows = sums.forces, sums.rows
-    N = len(r)
     _, _, bend, third = moved_at(path, n, part, s)
     off, over = beyond(path, n, part, 1, compliance, 0.0, s)
     shift, by_bend = sums.shift, sums.by_bend
-    if len(rows) > 0:
+    if len(sums.rows) > 0:
         for k in range(len(shift)):
-            shift[k], by_bend[k] = 0.0, 0.0
+            shift[k], sums.by_jump[k], by_bend[k] = 0.0, 0.0, 0.0
         # Elsewhere slip ends because P jumps.
         if abs(off) < _CLOSE * abs(over):
             add_row(path, n, part, 1, compliance, -1.0 / over, shift)
         add_row(path, n, part, 2, 0.0, 1.0, by_bend)
         for k in range(len(shift)):
             by_bend[k] += third * shift[k]
-    for i in range(-1, 3):
-        place = (n + i) % N
-        _, ramp, curve = _means(i - part)
-        r[place] += spring * bend * curve
-        if len(rows) > 0:
-            for k in range(len(shift)):
-                rows[place, k] += spring * (curve * by_bend[k] - bend * ramp * shift[k])
+    _add_means(n, part, 0.0, -bend, spring, sums)
 
 
 @helper

@@ -194,10 +194,9 @@ def wheel_stability(
     scales = np.full(every.dimension + 2, largest)
     scales[-1], scales[-2] = 1.0, motion.period
     found = starts.problem_for(every, every.values, 0, method, scales)
-    if found.layout.memory:
-        rest = np.zeros(every.dimension)
-        rest[: whole.modes] = X[0]
-        found = replace(found, kept=found.kept.left_by(rest[None]))
+    rest = np.zeros(every.dimension)
+    rest[: whole.modes] = X[0]
+    found = replace(found, kept=found.kept.left_by(rest[None]))
     start = np.append(X.reshape(-1), every.values)
     found, orbit = starts.converged_orbit(found, start)
     floquet = found.linearise(orbit).floquet

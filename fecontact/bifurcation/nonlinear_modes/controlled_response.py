@@ -8,10 +8,7 @@ from types import NoneType
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.problem import (
-    ContinuationOptions,
-    options_of,
-)
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of
 from fecontact.bifurcation.continuation.pseudo_arclength import inside
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.fields.observed_row import observed_row

@@ -9,11 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.bifurcation.fields.contact_field import ContactField, contact_field
-from fecontact.bifurcation.harmonic.forced_starts import (
-    given_force,
-    require_excitation,
-    rest_state,
-)
+from fecontact.bifurcation.harmonic.forced_starts import given_force, require_excitation, rest_state
 from fecontact.bifurcation.harmonic.response import levels_of
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import NonlinearMode, with_point
 from fecontact.core.checks import require_kind

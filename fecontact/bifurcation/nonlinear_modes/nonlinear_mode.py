@@ -10,11 +10,7 @@ from numpy.typing import NDArray
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.problem import (
-    BranchStatus,
-    ContinuationOptions,
-    options_of,
-)
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, options_of
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches, starts
@@ -24,10 +20,6 @@ from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.series import complex_harmonics
 from fecontact.bifurcation.harmonic.stalled import stall_reason
-from fecontact.bifurcation.nonlinear_modes.by_shooting import (
-    followed_by_shooting,
-    leaving_by_shooting,
-)
 from fecontact.bifurcation.nonlinear_modes.linear_start import (
     CONSERVATIVE,
     LinearStart,
@@ -35,7 +27,12 @@ from fecontact.bifurcation.nonlinear_modes.linear_start import (
     linear_start,
     linear_start_of_field,
 )
-from fecontact.bifurcation.nonlinear_modes.mode_problem import PERIOD_SCALE, ModeProblem
+from fecontact.bifurcation.nonlinear_modes.mode_problem import (
+    PERIOD_SCALE,
+    ModeProblem,
+    followed_by_shooting,
+    leaving_by_shooting,
+)
 from fecontact.bifurcation.orbit_methods import Shooting
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.core.checks import as_floats, require_kind
@@ -71,8 +68,8 @@ _ENDS = ("largest amplitude", "smallest amplitude")
 class NonlinearMode(Summarised):
     """A periodic motion of a system without excitation, over its amplitude.
 
-    The points of its branch run over xi; they store 'period', 'mean_square_velocity',
-    'observed_amplitude' and 'observed_harmonics' as those of a
+    The points of its branch run over xi; they store 'period', 'minimum' and 'maximum' (d,),
+    'mean_square_velocity', 'observed_amplitude' and 'observed_harmonics' as those of a
     :class:`~fecontact.bifurcation.FrequencyResponse`, 'truncation_error' and 'residual' (by
     harmonic balance), and if nothing is lost 'multipliers' and 'stable'. A point of kind 'branch
     point', by harmonic balance, is where a mode meets another one.
@@ -517,8 +514,7 @@ def _leaving(
     problem = _mode_problem(
         plain, reference=plain.coefficients(leaving).copy(), limits=np.full(d, np.inf), row=row,
         conservative=start.lossless and not plain.layout.memory, loose=start.loose,
-        home=start.state[:m],
-        kept=plain.kept.left_by(start.state[None]) if plain.layout.memory else plain.kept)
+        home=start.state[:m], kept=plain.kept.left_by(start.state[None]))
     return problem, u, leaving / np.sqrt(problem.weights() @ leaving**2)
 
 

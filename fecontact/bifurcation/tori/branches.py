@@ -171,12 +171,10 @@ def _kept(field: VectorField, motion: PeriodicMotion) -> Array | None:
     return None if elements is None else elements.kept.left_by(motion.states).offsets
 
 
-def _of_orbit(
-    layout: Layout, motion: PeriodicMotion, orders: tuple[int, int]
-) -> tuple[Array, Array]:
-    """Coefficients (L, b) of a periodic motion as a torus, and amplitudes (d,) of its states."""
+def _of_orbit(layout: Layout, motion: PeriodicMotion, orders: tuple[int, int]) -> Array:
+    """Coefficients (L, b) of a periodic motion as a torus."""
     c = motion.harmonics(min(orders[0], max((len(motion.times) - 3) // 2, 0)))[:, layout.columns]
-    return with_orders(real_coefficients(c), (len(c) - 1, 0), orders), motion.amplitudes
+    return with_orders(real_coefficients(c), (len(c) - 1, 0), orders)
 
 
 def _from_neimark_sacker(
@@ -187,10 +185,10 @@ def _from_neimark_sacker(
     motion = point.orbit(field, _SAMPLES)
     assert motion.period is not None
     excitation = replace(excitation, periods=motion.periods)
-    X, amplitudes = _of_orbit(_layout(field), motion, method.orders)
+    X = _of_orbit(_layout(field), motion, method.orders)
     frequencies = (1.0 / motion.period, point.angle / (2.0 * np.pi * motion.period))
     values = point.parameter_values(field)
-    guess = _Guess(X, frequencies, amplitudes, _kept(field, motion))
+    guess = _Guess(X, frequencies, motion.amplitudes, _kept(field, motion))
     problem, u = _problem(excitation, values, free, method, guess, given)
     leaving = np.zeros_like(X)
     rows = np.arange(2 * method.orders[0] + 1, 6 * method.orders[0] + 3)
@@ -226,15 +224,15 @@ def _from_motion(
         raise InputError(f"torus_branch: the motion has {motion.states.shape[1]} states, but the "
                          f"field {field.dimension}.")
     if motion.period is not None:
-        X, amplitudes = _of_orbit(layout, motion, method.orders)
+        X = _of_orbit(layout, motion, method.orders)
         assert known[0] is not None
         assert known[1] is not None
         frequencies = known[0], known[1]
     else:
         fit, frequencies, orders = fitted(motion.times, motion.states[:, layout.columns], known,
                                           method.orders)
-        X, amplitudes = with_orders(fit, orders, method.orders), motion.amplitudes
-    guess = _Guess(X, frequencies, amplitudes, _kept(field, motion))
+        X = with_orders(fit, orders, method.orders)
+    guess = _Guess(X, frequencies, motion.amplitudes, _kept(field, motion))
     return _problem(excitation, values, free, method, guess, given)
 
 

@@ -22,11 +22,7 @@ from fecontact.bifurcation.harmonic.compiled.memoryless_forces import (
     memoryless_forces,
     project,
 )
-from fecontact.bifurcation.harmonic.elements import (
-    Displacements,
-    ElementForces,
-    element_forces_at,
-)
+from fecontact.bifurcation.harmonic.elements import Displacements, ElementForces, element_forces_at
 from fecontact.bifurcation.harmonic.memory import LEAK, difference, march, solve_around
 from fecontact.bifurcation.harmonic.series import fill_blocks
 from fecontact.core.addresses import function_at

@@ -8,11 +8,7 @@ together. What that neglects is made good by iteration with all derivatives at t
 import math
 
 from fecontact.bifurcation.continuation.inner_product import weighted_norm
-from fecontact.bifurcation.harmonic.compiled.evaluation import (
-    balance,
-    take_pushes,
-    take_states,
-)
+from fecontact.bifurcation.harmonic.compiled.evaluation import balance, take_pushes, take_states
 from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise, solve
 

@@ -15,11 +15,7 @@ from fecontact.bifurcation.continuation.newton import Solution, completed
 from fecontact.bifurcation.continuation.point import BranchHeader
 from fecontact.bifurcation.continuation.points import branch_points
 from fecontact.bifurcation.continuation.predictor import Bent
-from fecontact.bifurcation.continuation.problem import (
-    BranchStatus,
-    ContinuationOptions,
-    Stride,
-)
+from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, Stride
 from fecontact.bifurcation.harmonic.compiled import arrays
 from fecontact.bifurcation.harmonic.compiled.steps import BOUND, COUPLED, steps
 from fecontact.bifurcation.harmonic.layout import orbit_weights
