@@ -6,9 +6,6 @@ from fecontact.core.errors import MissingLibraryError
 from fecontact.core.types import Array
 from fecontact.integrate.reference.driver import Equations, Steps
 
-# Steps that do not advance time after which it is given up.
-_STALLED = 100
-
 
 class CvodeSteps(Steps):
     """Steps of CVODE's backward differentiation formulas.
@@ -39,21 +36,15 @@ class CvodeSteps(Steps):
                              atol=equations.tolerance, max_step=equations.longest)
         self._solver.init_step(begin, y)
 
-    def step(self) -> str | None:
-        """See :meth:`Steps.step`."""
-        for _ in range(_STALLED):
-            try:
-                found = self._solver.step(self._end, method="onestep", tstop=self._end)
-            except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError) as error:
-                return str(error)
-            if not found.success or not np.isfinite(found.y).all():
-                return str(found.message)
-            # After outputs within a step it first returns to its end.
-            if found.t > self.t:
-                self.begin, self.t = self.t, float(found.t)
-                self.y = np.array(found.y, dtype=float)
-                return None
-        return "The steps became shorter than numbers can tell apart."
+    def attempt(self) -> tuple[float, Array] | str:
+        """See :meth:`Steps.attempt`; after outputs within a step CVODE returns to its end first."""
+        try:
+            found = self._solver.step(self._end, method="onestep", tstop=self._end)
+        except (ValueError, RuntimeError, ArithmeticError, np.linalg.LinAlgError) as error:
+            return str(error)
+        if not found.success or not np.isfinite(found.y).all():
+            return str(found.message)
+        return float(found.t), np.array(found.y, dtype=float)
 
     def dense(self, t: float) -> Array:
         """See :meth:`Steps.dense`."""

@@ -34,6 +34,8 @@ from fecontact.system.elastic_sliders import (
 from fecontact.system.kernels import right_hand_side
 from fecontact.system.powers import NODE_POWERS, powers
 
+# Steps that do not advance time, which LSODA repeats forever, after which a run is given up.
+_STALLED = 100
 # Rows between outputs are kept at so many places of a step.
 _PLACES = 2
 
@@ -67,9 +69,20 @@ class Steps(ABC):
     t: float
     y: Array
 
-    @abstractmethod
     def step(self) -> str | None:
         """Take one; why it failed if it did, after which begin, t and y are as before."""
+        for _ in range(_STALLED):
+            found = self.attempt()
+            if isinstance(found, str):
+                return found
+            if found[0] > self.t:
+                self.begin, (self.t, self.y) = self.t, found
+                return None
+        return "The steps became shorter than numbers can tell apart."
+
+    @abstractmethod
+    def attempt(self) -> tuple[float, Array] | str:
+        """Time and state after a step of the library, or why it failed."""
 
     @abstractmethod
     def dense(self, t: float) -> Array:
@@ -97,7 +110,8 @@ def integrate(
     watched = Watched(task, t, y[:size]) if task.events else None
     try:
         for piece in pieces:
-            latest = before_break(piece.begin, piece.end)
+            # The last time before the break at its end, where signals may jump.
+            latest = float(np.nextafter(piece.end, piece.begin))
             within = equations._replace(rate=_within(equations.rate, piece.after, latest))
             t, steps = piece.begin, start_steps(within, piece.begin, y, piece.end)
             while t < piece.end and status is Status.FINISHED:
@@ -251,11 +265,6 @@ def smooth_pieces(system: ContactSystem, times: Array) -> list[Piece]:
     begins = np.append(first, groups[:-1, 1])
     return [Piece(float(begin), float(np.nextafter(begin, end)), float(low), float(high))
             for begin, (low, high) in zip(begins, groups, strict=True)]
-
-
-def before_break(t: float, end: float) -> float:
-    """The last time before a breakpoint at ``end``, where signals may jump, of a step from t."""
-    return float(np.nextafter(end, t))
 
 
 def pass_break(
