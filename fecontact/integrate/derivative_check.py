@@ -39,7 +39,8 @@ def doubts(
     value = None
     columns, most = transitions / scales[:, None], scales
     # A parameter that cannot be moved both ways is left out.
-    if at is not None and forced is not None and _moves(at):
+    if at is not None and forced is not None and at[1] not in perturbed_systems(
+            *at, _STEPS[0] * (abs(at[1]) or 1.0))[2:]:
         value = at[1]
         columns = np.concatenate([columns, (forced / scales)[:, :, None]], axis=2)
         most = np.append(scales, abs(value) or 1.0)
@@ -86,12 +87,15 @@ def _scales(system: ContactSystem, states: Array) -> Array:
     return np.asarray(scales)
 
 
-def _moves(at: SystemAt) -> bool:
-    """True if the parameter can be moved both ways."""
-    system_at, value = at
-    step = _STEPS[0] * (abs(value) or 1.0)
+def perturbed_systems(
+    system_at: Callable[[float], ContactSystem], value: float, move: float,
+) -> tuple[ContactSystem, ContactSystem, float, float]:
+    """The systems above and below a value of the parameter, and their values below and above."""
     try:
-        system_at(value + step), system_at(value - step)
+        return system_at(value + move), system_at(value - move), value - move, value + move
     except InputError:
-        return False
-    return True
+        # At a limit of the range, or an unknown parameter.
+        try:
+            return system_at(value + move), system_at(value), value, value + move
+        except InputError:
+            return system_at(value), system_at(value - move), value - move, value

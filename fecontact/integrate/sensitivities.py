@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from numbers import Real
 from typing import Any
 
@@ -15,7 +16,7 @@ from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate import step_loop
 from fecontact.integrate.collocation.workspace import chosen_collocation
-from fecontact.integrate.derivative_check import doubts
+from fecontact.integrate.derivative_check import doubts, perturbed_systems
 from fecontact.integrate.ensembles import Ensemble, ensemble
 from fecontact.integrate.field_runs.saltation import Passage, joined, passages, with_passages
 from fecontact.integrate.initial_state import Initial, initial_state
@@ -237,59 +238,49 @@ def _differences(
     largest = np.abs(found).reshape(len(close), 2, -1).max(axis=(0, 2))
     moves = np.repeat(_DIFFERENCE * np.where(largest > 0.0, largest, 1.0), size // 2)
     spans = np.stack([times[:-1], times[1:]], axis=1)
-    shifts = np.concatenate([np.diag(moves), -np.diag(moves)])
-    ends = _states(ensemble(system, np.repeat(spans, 2 * size, axis=0), **settings, initial=(
-        states[:-1, None] + shifts).reshape(-1, size)))[:, -1].reshape(pieces, 2, size, size)
-    columns = ((ends[:, 0] - ends[:, 1]) / (2.0 * moves[:, None])).swapaxes(1, 2)
-    sided = np.stack([ends[:, 0] - states[1:, None], states[1:, None] - ends[:, 1]]) / (
-        moves[:, None])
-    sided = sided.swapaxes(2, 3)
-    settings["rtol"] = max(settings["rtol"] / _FINER, 1e-12)
-    allowed, uncertain = max(_APART, _COARSE * rtol), []
-
-    def looked_at(piece: int, ends_at: EndsAt, apart: float, move: float, open_: Sides,
-                  what: str) -> tuple[Array, Array]:
-        derivative, quotients, certain = _closer(ends_at, moves, apart, allowed, open_)
-        if not certain:
-            uncertain.append(f"to {what} from t = {times[piece]:.6g} to {times[piece + 1]:.6g} s")
-        return derivative / move, quotients / move
-
-    for piece in range(pieces):
-        for i in range(size):
-            apart = _apart(ends[piece, 0, i], states[piece + 1], ends[piece, 1, i], moves)
-            if apart <= allowed:
-                continue
-            change = moves[i] * np.eye(size)[i]
-
-            def from_perturbed(offsets: Array, piece: int = piece, change: Array = change) -> Array:
-                return _states(ensemble(
-                    system, np.tile(spans[piece], (len(offsets), 1)), **settings,
-                    initial=states[piece] + offsets[:, None] * change))[:, -1]
-
-            columns[piece, :, i], sided[:, piece, :, i] = looked_at(
-                piece, from_perturbed, apart, float(moves[i]),
-                _open_sides(system, solver, float(times[piece]), states[piece], change), f"y[{i}]")
-    forced = None
+    # Changes of the state, and last that of the parameter, in these units.
+    changes, units = np.diag(moves), moves
+    both_ways = [True] * size
     if parameter is not None:
         system_at, value = _function_of(system, parameter)
-        above, below, width = _perturbed_systems(system_at, value, MOVE * (abs(value) or 1.0))
-        ends = _states(ensemble([above] * pieces + [below] * pieces, np.tile(spans, (2, 1)),
-                                initial=np.tile(states[:-1], (2, 1)), **settings))[:, -1]
-        forced = (ends[:pieces] - ends[pieces:]) / width
-        for piece in range(pieces):
-            apart = _apart(ends[piece], states[piece + 1], ends[pieces + piece], moves)
-            # At a limit of its range the parameter moves to one side alone.
-            if apart <= allowed or width < 1.5 * MOVE * (abs(value) or 1.0):
+        move = MOVE * (abs(value) or 1.0)
+        *_, low, high = perturbed_systems(system_at, value, move)
+        changes, units = np.vstack([changes, np.zeros(size)]), np.append(moves, 0.5 * (high - low))
+        # At a limit of its range the parameter moves to one side alone.
+        both_ways.append(value not in (low, high))
+
+    def ends_at(piece: Any, change: Any, offset: Any) -> Array:
+        """Ends (N, size) of runs over pieces with changes by so many units."""
+        piece, change, offset = np.broadcast_arrays(piece, change, offset)
+        systems = [system if k < size else system_at(min(max(
+            0.5 * (low + high) + units[-1] * by, low), high))
+                   for k, by in zip(change, offset, strict=True)]
+        return _states(ensemble(systems, spans[piece], **settings, initial=(
+            states[piece] + offset[:, None] * changes[change])))[:, -1]
+
+    every = np.meshgrid(range(pieces), range(len(units)), [1.0, -1.0], indexing="ij")
+    ends = ends_at(*map(np.ravel, every)).reshape(pieces, len(units), 2, size)
+    sided = np.stack([ends[:, :, 0] - states[1:, None], states[1:, None] - ends[:, :, 1]])
+    columns = 0.5 * (ends[:, :, 0] - ends[:, :, 1])
+    settings["rtol"] = max(settings["rtol"] / _FINER, 1e-12)
+    allowed, uncertain = max(_APART, _COARSE * rtol), []
+    for piece in range(pieces):
+        for k in range(len(units)):
+            apart = _apart(ends[piece, k, 0], states[piece + 1], ends[piece, k, 1], moves)
+            if apart <= allowed or not both_ways[k]:
                 continue
-
-            def at_parameter(offsets: Array, piece: int = piece) -> Array:
-                return _states(ensemble(
-                    [system_at(value + 0.5 * width * offset) for offset in offsets], spans[piece],
-                    initial=states[piece], **settings))[:, -1]
-
-            forced[piece], _ = looked_at(piece, at_parameter, apart, 0.5 * width, (True, True),
-                                         "the parameter")
-    return Sensitivity(times, states, columns, forced, sided, _note(uncertain))
+            open_ = (True, True) if k == size else _open_sides(
+                system, solver, float(times[piece]), states[piece], changes[k])
+            columns[piece, k], sided[:, piece, k], certain = _closer(
+                partial(ends_at, piece, k), moves, apart, allowed, open_)
+            if not certain:
+                what = "the parameter" if k == size else f"y[{k}]"
+                uncertain.append(f"to {what} from t = {times[piece]:.6g} to "
+                                 f"{times[piece + 1]:.6g} s")
+    columns, sided = (np.swapaxes(each / units[:, None], -1, -2) for each in (columns, sided))
+    forced = None if parameter is None else columns[:, :, size].copy()
+    return Sensitivity(times, states, np.ascontiguousarray(columns[:, :, :size]), forced,
+                       np.ascontiguousarray(sided[..., :size]), _note(uncertain))
 
 
 def _apart(above: Array, middle: Array, below: Array, moves: Array) -> float:
@@ -363,9 +354,10 @@ def _moved(
     if slider_counts(system).any():
         # Elements that have just begun or ceased to slide must not switch with the parameter.
         move *= _SLIDERS
-    return _perturbed_systems(system_at, value, move * min(
+    above, below, low, high = perturbed_systems(system_at, value, move * min(
         _slip_limit(system, system_at, value, move),
         _depth_limit(system, system_at, value, move, times, state)))
+    return above, below, high - low
 
 
 def _function_of(
@@ -387,20 +379,6 @@ def _function_of(
                          f"function of a system and a value, and the value: (function, 0.5).")
     function, number = parameter
     return (lambda at: function(system, at)), number
-
-
-def _perturbed_systems(
-    system_at: Callable[[float], ContactSystem], value: float, move: float,
-) -> tuple[ContactSystem, ContactSystem, float]:
-    """The systems above and below a value of the parameter, and the difference of both."""
-    try:
-        return system_at(value + move), system_at(value - move), 2.0 * move
-    except InputError:
-        # At a limit of the range, or an unknown parameter.
-        try:
-            return system_at(value + move), system_at(value), move
-        except InputError:
-            return system_at(value), system_at(value - move), move
 
 
 def _slip_limit(
@@ -428,7 +406,7 @@ def _depth_limit(
 
     A gap of zero has no size of its own of which a part could be taken.
     """
-    above, below, _ = _perturbed_systems(system_at, value, move)
+    above, below, *_ = perturbed_systems(system_at, value, move)
     shift = _deeper(above, below, times, state)
     return min(1.0, _DEPTH * system.penetration_scale / shift) if shift > 0.0 else 1.0
 
