@@ -135,33 +135,6 @@ def project_block(ends, shapes, y, places, speeds):
 
 
 @helper
-def project_one(blocks, q, places):
-    """Fill ``places`` as :func:`project`, from the coordinates q (m,) alone."""
-    shapes = blocks.shapes
-    count = blocks.used[0]
-    for first in range(0, shapes.shape[1], len(blocks.nodes)):
-        for j in range(first, first + count):
-            places[j] = 0.0
-    for tile in range(len(blocks.tiles)):
-        project_block_once(block_at(blocks.tiles, tile), shapes, q, places)
-
-
-@helper
-def project_block_once(ends, shapes, q, places):
-    """Add to ``places`` as :func:`project_block`, from the coordinates q (m,) alone."""
-    i, end, left, right = ends
-    while i + 3 < end:
-        for j in range(left, right):
-            places[j] += (shapes[i, j] * q[i] + shapes[i + 1, j] * q[i + 1]
-                          + shapes[i + 2, j] * q[i + 2] + shapes[i + 3, j] * q[i + 3])
-        i += 4
-    while i < end:
-        for j in range(left, right):
-            places[j] += shapes[i, j] * q[i]
-        i += 1
-
-
-@helper
 def change_of(row, j, n, w):
     """Change of what has the derivatives ``row`` (2 d,) by the motion of node j in w (3, d n)."""
     d, total = len(row) // 2, 0.0
@@ -173,19 +146,14 @@ def change_of(row, j, n, w):
 @helper
 def add_node_forces(blocks, forces, out):
     """Add to ``out`` (m,) the modal forces of the node forces (d n,): -T, F, across."""
+    shapes = blocks.shapes
     for tile in range(len(blocks.tiles)):
-        add_block_forces(block_at(blocks.tiles, tile), blocks.shapes, forces, out)
-
-
-@helper
-def add_block_forces(ends, shapes, forces, out):
-    """Add to ``out`` (m,) the modal forces by a block of the rows."""
-    top, bottom, left, right = ends
-    for i in range(top, bottom):
-        total = 0.0
-        for j in range(left, right):
-            total += shapes[i, j] * forces[j]
-        out[i] += total
+        top, bottom, left, right = block_at(blocks.tiles, tile)
+        for i in range(top, bottom):
+            total = 0.0
+            for j in range(left, right):
+                total += shapes[i, j] * forces[j]
+            out[i] += total
 
 
 @helper
@@ -442,9 +410,9 @@ def next_kink(moved, problem, progress, w, within):
     """
     s, blocks, g = problem.system, problem.blocks, progress.gradients
     depth, slow = problem.control.depth, problem.control.slow
-    m, n, d = len(blocks.position), len(s.gap), s.rows.shape[1]
+    n, d = len(s.gap), s.rows.shape[1]
     project(blocks, progress.state, w[0], w[1])
-    project_one(blocks, progress.rate[m : 2 * m], w[2])
+    project(blocks, progress.rate, w[1], w[2])
     first = within
     for j in range(n):
         u, v, a = -w[0, n + j] - s.gap[j], -w[1, n + j], -w[2, n + j]

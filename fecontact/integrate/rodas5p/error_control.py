@@ -140,9 +140,8 @@ def slip_error(error, problem, progress, workspace):
     Only where friction has no memory: there the force follows the slip velocity alone.
     """
     s, control = problem.system, problem.control
-    n, m = len(s.gap), len(control.largest)
-    near, slips = workspace.near, workspace.between[0]
-    dynamics.project_one(near, workspace.stages[tableau.STAGES - 1, m : 2 * m], slips)
+    n, near, slips = len(s.gap), workspace.near, workspace.between[1]
+    dynamics.project(near, workspace.stages[tableau.STAGES - 1], workspace.between[0], slips)
     moved = dynamics.motion_given(workspace.given)
     for at in range(near.used[0]):
         j = near.nodes[at]
