@@ -14,29 +14,15 @@ E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., secti
 """
 
 import numpy as np
-from numpy.polynomial import polynomial
 
 from fecontact.core.compiled import routine
 from fecontact.core.copies import put_rows
 from fecontact.core.dense_lu import factorise, solve_rows
+from fecontact.integrate.collocation.tableau import integrals, radau_points
 
 STAGES = 4
-
-
-def _nodes() -> np.ndarray:
-    """Roots of the third derivative of t^3 (t - 1)^4."""
-    given = polynomial.polymul(polynomial.polypow([0.0, 1.0], STAGES - 1),
-                               polynomial.polypow([-1.0, 1.0], STAGES))
-    found = np.sort(polynomial.polyroots(polynomial.polyder(given, STAGES - 1)).real)
-    found[-1] = 1.0
-    return found
-
-
-NODES = _nodes()
-# Integrals of the Lagrange polynomials of the nodes up to each node, and integrals of these.
-_POWERS = np.arange(1, STAGES + 1)
-_ONCE = (NODES[:, None] ** _POWERS / _POWERS) @ np.linalg.inv(
-    np.vander(NODES, STAGES, increasing=True))
+NODES = radau_points(STAGES)
+_ONCE = integrals(NODES)
 _TWICE = _ONCE @ _ONCE
 # 3! 4! / (7! 8!): the error of e^z is this times z^8.
 _ERROR = 144.0 / (5040.0 * 40320.0)

@@ -31,10 +31,10 @@ ERROR_POWER = STAGES + 2
 LOOKS = 2
 
 
-def _radau_points() -> Array:
-    """Zeros in (0, 1] of P_s - P_(s-1), with Legendre's polynomials of 2 s - 1."""
-    series = np.zeros(STAGES + 1)
-    series[STAGES - 1 :] = -1.0, 1.0
+def radau_points(stages: int) -> Array:
+    """Zeros (s,) in (0, 1] of P_s - P_(s-1), with Legendre's polynomials of 2 t - 1."""
+    series = np.zeros(stages + 1)
+    series[stages - 1 :] = -1.0, 1.0
     x = np.sort(legendre.legroots(series).real)
     for _ in range(3):
         x = x - legendre.legval(x, series) / legendre.legval(x, legendre.legder(series))
@@ -42,18 +42,18 @@ def _radau_points() -> Array:
     return np.asarray(0.5 * (x + 1.0))
 
 
-def _integrals(points: Array, ends: Array) -> Array:
-    """Integrals from 0 to each of the ends of the Lagrange polynomials of the points."""
+def integrals(points: Array) -> Array:
+    """Integrals (s, s) from 0 to each of the points of their Lagrange polynomials."""
     columns = []
     for k in range(len(points)):
         others = np.delete(points, k)
         whole = (Polynomial.fromroots(others) / np.prod(points[k] - others)).integ()
-        columns.append(whole(ends))
+        columns.append(whole(points))
     return np.ascontiguousarray(np.array(columns).T)
 
 
-POINTS = _radau_points()
-ONCE = _integrals(POINTS, POINTS)
+POINTS = radau_points(STAGES)
+ONCE = integrals(POINTS)
 TWICE = np.ascontiguousarray(ONCE @ ONCE)
 
 # The begin of the step, and the points of its stages.

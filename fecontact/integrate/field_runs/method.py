@@ -9,6 +9,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.copies import put, put_rows
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import Matrix, Vector
 from fecontact.core.types import Array, Integers
@@ -198,16 +199,14 @@ def _take(step, field, progress, workspace):
     for i in range(tableau.STAGES):
         u = workspace.stages[i]
         if i == 0:
-            for k in range(d):
-                u[k] = progress.rate[k]
+            put(progress.rate, u)
         else:
             tableau.combined(tableau.A[i], 1.0, progress.state, workspace.stages, workspace.stage)
             now = min(step.t + tableau.NODES[i] * step.h, step.target)
             evaluate(now, workspace.stage, field, workspace.base)
             tableau.combined(tableau.C[i], 1.0 / step.h, workspace.base, workspace.stages,
                              workspace.right)
-            for k in range(d):
-                u[k] = workspace.right[k]
+            put(workspace.right, u)
         for k in range(d):
             u[k] += tableau.TIME[i] * step.h * workspace.time_rate[k]
         solve(workspace.factors, workspace.pivots, u)
@@ -280,16 +279,15 @@ def _fill(row, output, step, data):
     """Fill a row of the output; the columns are stored and restarted there."""
     progress, workspace, varied = data.progress, data.workspace, data.varied
     if output.times[row] == step.target:
-        for k in range(len(workspace.after)):
-            output.states[row, k] = workspace.after[k]
+        put(workspace.after, output.states[row])
     else:
         part = (output.times[row] - step.t) / step.h
         tableau.interpolated(part, progress.state, workspace.after, workspace.dense,
                              output.states[row])
+    put_rows(varied.columns, varied.transitions[row])
     for i in range(len(varied.columns)):
-        for k in range(len(varied.columns)):
-            varied.transitions[row, i, k] = varied.columns[i, k]
-            varied.columns[i, k] = 1.0 if i == k else 0.0
+        varied.columns[i] = 0.0
+        varied.columns[i, i] = 1.0
 
 
 @routine
@@ -297,20 +295,18 @@ def _stop_at(part, step, data):
     """End the run at a part of the step."""
     progress, workspace = data.progress, data.workspace
     tableau.interpolated(part, progress.state, workspace.after, workspace.dense, workspace.right)
-    for k in range(len(progress.state)):
-        progress.state[k] = workspace.right[k]
+    put(workspace.right, progress.state)
 
 
 @routine
 def _go_on(step, h, data):
     """Make the end of the step the state of the run."""
     progress, workspace = data.progress, data.workspace
-    d = len(progress.state)
-    for i in range(d):
-        progress.state[i], progress.rate[i] = workspace.after[i], workspace.rate_after[i]
-        progress.sizes[i] = max(progress.sizes[i], abs(workspace.after[i]))
-        for k in range(d):
-            progress.J[i, k] = workspace.J_after[i, k]
+    put(workspace.after, progress.state)
+    put(workspace.rate_after, progress.rate)
+    put_rows(workspace.J_after, progress.J)
+    for i in range(len(progress.state)):
+        progress.sizes[i] = max(progress.sizes[i], abs(progress.state[i]))
     return RUNNING, h
 
 

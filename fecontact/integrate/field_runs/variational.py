@@ -17,20 +17,17 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.copies import put_rows
 from fecontact.core.dense_lu import factorise, solve_rows
 from fecontact.core.records import Block, Size
 from fecontact.core.types import Array, Integers
+from fecontact.integrate.collocation.tableau import integrals, radau_points
 from fecontact.integrate.rodas5p import tableau
 from fecontact.system.fields.one_place import derive_at
 
-_ROOT = np.sqrt(6.0)
-_NODES = np.array([0.4 - 0.1 * _ROOT, 0.4 + 0.1 * _ROOT, 1.0])
-_WEIGHTS = np.array([
-    [(88.0 - 7.0 * _ROOT) / 360.0, (296.0 - 169.0 * _ROOT) / 1800.0, (-2.0 + 3.0 * _ROOT) / 225.0],
-    [(296.0 + 169.0 * _ROOT) / 1800.0, (88.0 + 7.0 * _ROOT) / 360.0, (-2.0 - 3.0 * _ROOT) / 225.0],
-    [(16.0 - _ROOT) / 36.0, (16.0 + _ROOT) / 36.0, 1.0 / 9.0],
-])
-
+_STAGES = 3
+_NODES = radau_points(_STAGES)
+_WEIGHTS = integrals(_NODES)
 # Change of differences over a part of a step, at most, and the most parts.
 _LARGEST, _MOST_PARTS = 0.5, 64.0
 
@@ -56,11 +53,11 @@ class Varied(NamedTuple):
 
     columns: Annotated[Array, STATES, STATES]
     transitions: Block
-    J: Annotated[Array, 3, STATES, STATES]
-    slopes: Annotated[Array, 3, STATES, STATES]
-    factors: Annotated[Array, 3 * STATES, 3 * STATES]
-    increments: Annotated[Array, 3 * STATES, STATES]
-    pivots: Annotated[Integers, 3 * STATES]
+    J: Annotated[Array, _STAGES, STATES, STATES]
+    slopes: Annotated[Array, _STAGES, STATES, STATES]
+    factors: Annotated[Array, _STAGES * STATES, _STAGES * STATES]
+    increments: Annotated[Array, _STAGES * STATES, STATES]
+    pivots: Annotated[Integers, _STAGES * STATES]
     x: Annotated[Array, STATES]
     f: Annotated[Array, STATES]
 
@@ -81,16 +78,16 @@ def steepest(J, sizes):
 def _solve(h, varied):
     """Carry the columns over a step h with the Jacobians at its stages."""
     d, J, slopes, factors = len(varied.columns), varied.J, varied.slopes, varied.factors
-    for stage in range(3):
+    for stage in range(_STAGES):
         for i in range(d):
             for c in range(d):
                 total = 0.0
                 for k in range(d):
                     total += J[stage, i, k] * varied.columns[k, c]
                 slopes[stage, i, c] = total
-    for row in range(3):
+    for row in range(_STAGES):
         for i in range(d):
-            for column in range(3):
+            for column in range(_STAGES):
                 factor = h * _WEIGHTS[row, column]
                 for k in range(d):
                     factors[row * d + i, column * d + k] = -factor * J[column, i, k]
@@ -99,11 +96,12 @@ def _solve(h, varied):
                 varied.increments[row * d + i, c] = h * (
                     _WEIGHTS[row, 0] * slopes[0, i, c] + _WEIGHTS[row, 1] * slopes[1, i, c]
                     + _WEIGHTS[row, 2] * slopes[2, i, c])
-    factorise(factors, 3 * d, varied.pivots)
+    factorise(factors, _STAGES * d, varied.pivots)
     solve_rows(factors, varied.pivots, varied.increments)
+    last = (_STAGES - 1) * d
     for i in range(d):
         for c in range(d):
-            varied.columns[i, c] += varied.increments[2 * d + i, c]
+            varied.columns[i, c] += varied.increments[last + i, c]
 
 
 @routine
@@ -116,12 +114,10 @@ def propagate(step, field, progress, workspace, varied):
     steep = max(steepest(progress.J, progress.sizes), steepest(workspace.J_after, progress.sizes))
     parts = int(min(max(np.ceil(step.h * steep / _LARGEST), 1.0), _MOST_PARTS))
     for part in range(parts):
-        for stage in range(3):
+        for stage in range(_STAGES):
             J = varied.J[stage]
-            if part == parts - 1 and stage == 2:
-                for i in range(len(J)):
-                    for k in range(len(J)):
-                        J[i, k] = workspace.J_after[i, k]
+            if part == parts - 1 and stage == _STAGES - 1:
+                put_rows(workspace.J_after, J)
             else:
                 at = (part + _NODES[stage]) / parts
                 tableau.interpolated(at, progress.state, workspace.after, workspace.dense, varied.x)
