@@ -58,7 +58,7 @@ _PARTS = {
         "fecontact.integrate.simd.step_loop:SMALL",
         "fecontact.integrate.collocation.method:SMALL",
         "fecontact.integrate.collocation.columns:SMALL",
-        "fecontact.integrate.rodas5p.propagation:SMALL", "fecontact.integrate.reference.watched",
+        "fecontact.integrate.rodas5p.variational:SMALL", "fecontact.integrate.reference.watched",
         *_STEPS),
 }
 # Packages whose modules hold the functions of laws.

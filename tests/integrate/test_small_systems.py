@@ -7,7 +7,7 @@ from systems import TURN, friction_oscillator, two_mass_system
 from fecontact import ContactSystem, Drive, Ground, Load, ModalBasis
 from fecontact.core.simd.kinds import WIDTH
 from fecontact.integrate import small_systems
-from fecontact.integrate.rodas5p import driver, method, propagation
+from fecontact.integrate.rodas5p import driver, method, variational
 from fecontact.integrate.rodas5p.state import Output
 from fecontact.integrate.rodas5p.variational import Variation
 from fecontact.integrate.simd import step_loop as lanes_loop
@@ -97,7 +97,7 @@ def test_same_results_as_by_the_step_loop_of_all_systems(modes, nodes):
 
 @pytest.mark.parametrize("modes", [1, 2, 3])
 def test_what_derivatives_take_for_granted(modes):
-    said = propagation.SMALL.values(modes, 1)
+    said = variational.SMALL.values(modes, 1)
     run = run_of(system(modes, 1), vary=True)
     tuples = (run.problem, run.progress, run.workspace, run.output, run.variation)
     found = sum(assert_as_said(values, said) for values in tuples)
@@ -113,9 +113,9 @@ def test_same_derivatives_as_by_the_code_of_all_systems(modes, monkeypatch):
     found = []
     for small, parts in ((True, False), (False, False), (False, True)):
         if not small:
-            monkeypatch.setattr(propagation, "is_small", lambda problem: False)
+            monkeypatch.setattr(variational, "is_small", lambda problem: False)
             monkeypatch.setattr(method, "is_small", lambda problem: False)
-            monkeypatch.setattr(propagation, "in_parts", lambda problem, parts=parts: parts)
+            monkeypatch.setattr(variational, "in_parts", lambda problem, parts=parts: parts)
             monkeypatch.setattr(driver, "in_parts", lambda problem, parts=parts: parts)
         run = run_of(block, vary=vary, vary_rtol=1e9, max_step=2e-5)
         run.advance(300)

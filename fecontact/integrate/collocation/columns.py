@@ -20,7 +20,7 @@ import numpy as np
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, kernel, routine
-from fecontact.core.dense_lu import backward, factorise, forward
+from fecontact.core.dense_lu import factorise, solve
 from fecontact.integrate.collocation.stages import (
     move_back,
     place_scale,
@@ -28,26 +28,27 @@ from fecontact.integrate.collocation.stages import (
     set_stage,
     speed_scale,
 )
-from fecontact.integrate.collocation.step_polynomials import look
+from fecontact.integrate.collocation.step_polynomials import factorise_defect, look
 from fecontact.integrate.collocation.tableau import (
     AT_PLACES,
     LOOKS,
-    ONCE,
-    PLACE_PART,
     PLACES,
     PLACES_AT,
     POINTS,
-    SPEED_PART,
     SPEEDS_AT,
     STAGES,
-    TWICE,
 )
 from fecontact.integrate.collocation.workspace import Collocation, Step
 from fecontact.integrate.rodas5p import dynamics, stage_solver
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import tableau as rows
-from fecontact.integrate.rodas5p.propagation import RECORDS, open_nodes
-from fecontact.integrate.rodas5p.variational import DIRECTIONS, Vary, add_matrices
+from fecontact.integrate.rodas5p.variational import (
+    DIRECTIONS,
+    RECORDS,
+    Vary,
+    add_matrices,
+    open_nodes,
+)
 from fecontact.integrate.small_systems import USUAL, Sized
 from fecontact.system.node_forces import (
     node_forces,
@@ -153,20 +154,13 @@ def _set_columns(h, problem, progress, c, v):
         for i in range(STAGES):
             for k in range(m):
                 c.right[i * m + k] = own[i + 1, k]
-        forward(c.matrix, STAGES * m, c.pivots, c.right)
-        backward(c.matrix, STAGES * m, c.right, c.right)
+        solve(c.matrix, c.pivots, c.right)
         for i in range(STAGES):
             for k in range(m):
                 own[i + 1, k] = c.right[i * m + k]
-        x, after, size = v.columns[column], v.after[column], v.norms[0, column]
-        for k in range(m):
-            place, speed = 0.0, 0.0
-            for i in range(STAGES):
-                place += TWICE[STAGES - 1, i] * own[i + 1, k]
-                speed += ONCE[STAGES - 1, i] * own[i + 1, k]
-            after[k] = x[k] + h * (x[m + k] + h * place)
-            after[m + k] = x[m + k] + h * speed
-        v.norms[1, column] = max(size, _size(after, speeds, problem, progress))
+        after = v.after[column]
+        set_stage(STAGES - 1, h, v.columns[column], own, after)
+        v.norms[1, column] = max(v.norms[0, column], _size(after, speeds, problem, progress))
 
 
 @helper
@@ -184,12 +178,7 @@ def _error_at(at, h, problem, progress, workspace, c, v):
     """Largest relative error of a column, by what its polynomial misses at one of the places."""
     m, J = c.accelerations.shape[1], workspace.reduced.J
     speeds, largest = speed_scale(problem, progress), 0.0
-    g, to_place = SPEED_PART[at] * h, PLACE_PART[at] * h * h
-    for k in range(m):
-        for l in range(m):
-            c.small[k, l] = -g * J[k, m + l] - to_place * J[k, l]
-        c.small[k, k] += 1.0
-    factorise(c.small, m, c.small_pivots)
+    g, to_place = factorise_defect(at, h, J, c)
     for column in range(len(v.columns)):
         own = v.stages[rows.STAGES * column : rows.STAGES * (column + 1)]
         x, y = v.columns[column], v.vectors[0]
@@ -210,8 +199,7 @@ def _error_at(at, h, problem, progress, workspace, c, v):
         if column == len(v.columns) - 1:
             for k in range(m):
                 c.small_right[k] += v.column_forces[column, k]
-        forward(c.small, m, c.small_pivots, c.small_right)
-        backward(c.small, m, c.small_right, c.small_right)
+        solve(c.small, c.small_pivots, c.small_right)
         error = 0.0
         for k in range(m):
             missing = abs(c.small_right[k])
@@ -304,7 +292,7 @@ def propagate(
                vary, forced)
     _set_rates(0, 0.0, J, v)
     for i in range(STAGES):
-        set_stage(i, h, progress, c)
+        set_stage(i, h, progress.state, c.accelerations, c.y)
         if i == STAGES - 1 and before > 0.0:
             move_back(before, h, c)
         _linearise(min(t + POINTS[i] * h, latest), c.y, dynamics.motion_given(c.given[i]), problem,

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.copies import put
 from fecontact.integrate.collocation.columns import propagate_at
 from fecontact.integrate.collocation.stages import extrapolate, solve_stages
 from fecontact.integrate.collocation.step_polynomials import (
@@ -13,6 +14,7 @@ from fecontact.integrate.collocation.step_polynomials import (
     keep_rates,
     powers_at,
     set_polynomials,
+    set_state,
     step_error,
     value_at,
     work_error,
@@ -20,7 +22,6 @@ from fecontact.integrate.collocation.step_polynomials import (
 from fecontact.integrate.collocation.tableau import (
     ERROR_POWER,
     POINTS,
-    SPEED_TERMS,
     STAGES,
 )
 from fecontact.integrate.collocation.workspace import (
@@ -43,7 +44,7 @@ from fecontact.integrate.rodas5p.step_length import (
     predicted,
     target_of,
 )
-from fecontact.integrate.rodas5p.variational import Vary, keep, restart_columns, write_columns
+from fecontact.integrate.rodas5p.variational import Vary, keep, write_columns
 from fecontact.integrate.small_systems import Sized
 from fecontact.integrate.step_loop import (
     CUT,
@@ -98,8 +99,7 @@ def _set_begin(t, end, problem, progress, workspace, c):
     dynamics.set_given(after, s, workspace.given, workspace.load)
     dynamics.set_rate_and_gradients(progress.state, s, problem.blocks, workspace.given,
                                     workspace.load, workspace.nodes, workspace.scratch, c.rate)
-    for k in range(c.accelerations.shape[1]):
-        c.accelerations[0, k] = c.rate[len(c.rate) // 2 + k]
+    put(c.rate[len(c.rate) // 2 :], c.accelerations[0])
     if control.work:
         powers_at(after, progress.state, problem, workspace, progress.power)
     progress.counts[RATES] += 1
@@ -118,10 +118,7 @@ def _set_given(step, after, s, c):
 def _set_work(x, c, out):
     """Fill ``out`` (P,) with the works at x = 2 s - 1."""
     for k in range(len(out)):
-        out[k] = 0.0
-    for power in range(SPEED_TERMS - 1, -1, -1):
-        for k in range(len(out)):
-            out[k] = out[k] * x + c.work[power, k]
+        out[k] = value_at(c.work, k, x)
 
 
 @routine
@@ -151,18 +148,14 @@ def _close(step, writes, data):
         keep(variation)
         if writes:
             write_columns(variation, data.vary.transitions[data.progress.counts[OUTPUTS]])
-            restart_columns(variation)
 
 
 @routine
 def _fill(row, output, step, data):
     """Fill a row of the output."""
     c = data.collocation
-    m = c.accelerations.shape[1]
     x = 2.0 * (output.times[row] - step.t) / step.h - 1.0
-    for k in range(m):
-        output.states[row, k] = value_at(c.places, k, x)
-        output.states[row, m + k] = value_at(c.rates, k, x)
+    set_state(x, c, output.states[row])
     if data.problem.control.work:
         _set_work(x, c, output.work[row])
 
@@ -171,11 +164,9 @@ def _fill(row, output, step, data):
 def _go_on(step, h, data):
     """Make the end of the step the state of the run."""
     problem, progress, output, c = data.problem, data.progress, data.output, data.collocation
-    for k in range(len(progress.state)):
-        progress.state[k] = c.after[k]
+    put(c.after, progress.state)
     if problem.control.work:
-        for k in range(len(progress.work)):
-            progress.power[k] = c.powers[STAGES, k]
+        put(c.powers[STAGES], progress.power)
         _set_work(1.0, c, progress.work)
         if step.at_break:
             add_jump(step, c.after, problem, progress, output)

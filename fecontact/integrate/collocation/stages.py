@@ -3,7 +3,7 @@
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.dense_lu import backward, factorise, forward
+from fecontact.core.dense_lu import factorise, solve
 from fecontact.integrate.collocation.tableau import ONCE, POINTS, RATE_TERMS, STAGES, TWICE
 from fecontact.integrate.collocation.workspace import BEGINS, ITERATIONS, JACOBIANS
 from fecontact.integrate.rodas5p import dynamics, stage_solver
@@ -22,16 +22,19 @@ _FARTHEST = 3.0
 
 
 @routine
-def set_stage(i, h, progress, c):
-    """Put the state at stage i into ``c.y``."""
-    m = c.accelerations.shape[1]
+def set_stage(i, h, y, accelerations, out):
+    """Fill ``out`` (2 m,) with the state at stage i of a step from y, or with that of a column.
+
+    ``accelerations`` are those at the begin, which does not count, and at the stages.
+    """
+    m = len(out) // 2
     for k in range(m):
         speed, place = 0.0, 0.0
         for other in range(STAGES):
-            speed += ONCE[i, other] * c.accelerations[other + 1, k]
-            place += TWICE[i, other] * c.accelerations[other + 1, k]
-        c.y[m + k] = progress.state[m + k] + h * speed
-        c.y[k] = progress.state[k] + h * (POINTS[i] * progress.state[m + k] + h * place)
+            speed += ONCE[i, other] * accelerations[other + 1, k]
+            place += TWICE[i, other] * accelerations[other + 1, k]
+        out[m + k] = y[m + k] + h * speed
+        out[k] = y[k] + h * (POINTS[i] * y[m + k] + h * place)
 
 
 @helper
@@ -99,7 +102,7 @@ def _improve(h, before, anew, problem, progress, workspace, c):
     s, blocks = problem.system, problem.blocks
     m = c.accelerations.shape[1]
     for i in range(STAGES):
-        set_stage(i, h, progress, c)
+        set_stage(i, h, progress.state, c.accelerations, c.y)
         if i == STAGES - 1 and before > 0.0:
             move_back(before, h, c)
         dynamics.set_rate_and_gradients(c.y, s, blocks, c.given[i], c.load[i], workspace.nodes,
@@ -112,8 +115,7 @@ def _improve(h, before, anew, problem, progress, workspace, c):
     if anew:
         factorise(c.matrix, STAGES * m, c.pivots)
         c.flags[JACOBIANS] += 1
-    forward(c.matrix, STAGES * m, c.pivots, c.right)
-    backward(c.matrix, STAGES * m, c.right, c.right)
+    solve(c.matrix, c.pivots, c.right)
     progress.counts[RATES] += STAGES
     size, speeds = 0.0, speed_scale(problem, progress)
     for k in range(m):

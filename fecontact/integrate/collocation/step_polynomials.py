@@ -3,7 +3,8 @@
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.dense_lu import backward, factorise, forward
+from fecontact.core.copies import put
+from fecontact.core.dense_lu import factorise, solve
 from fecontact.integrate import bernstein
 from fecontact.integrate.collocation.stages import move_back, place_scale, set_stage, speed_scale
 from fecontact.integrate.collocation.tableau import (
@@ -53,49 +54,66 @@ def value_at(c, k, x):
     return total
 
 
+@helper
+def set_state(x, c, out):
+    """Fill ``out`` (2 m,) with the state at x = 2 s - 1."""
+    m = len(out) // 2
+    for k in range(m):
+        out[k] = value_at(c.places, k, x)
+        out[m + k] = value_at(c.rates, k, x)
+
+
+@helper
+def _set_powers(factor, table, values, out):
+    """Fill the coefficients ``out`` (p, k) by values (s + 1, k) at the begin and the stages."""
+    for power in range(len(out)):
+        for k in range(out.shape[1]):
+            total = 0.0
+            for i in range(RATE_TERMS):
+                total += table[power, i] * values[i, k]
+            out[power, k] = factor * total
+
+
 @routine
 def set_polynomials(h, progress, c):
     """Fill the coefficients of displacements and velocities over a step, and its end."""
     m = c.accelerations.shape[1]
+    _set_powers(h * h, PLACE_POWERS, c.accelerations, c.places)
+    _set_powers(h, SPEED_POWERS, c.accelerations, c.rates)
     for k in range(m):
-        for power in range(PLACE_TERMS):
-            total = 0.0
-            for i in range(RATE_TERMS):
-                total += PLACE_POWERS[power, i] * c.accelerations[i, k]
-            c.places[power, k] = h * h * total
-        for power in range(SPEED_TERMS):
-            total = 0.0
-            for i in range(RATE_TERMS):
-                total += SPEED_POWERS[power, i] * c.accelerations[i, k]
-            c.rates[power, k] = h * total
         c.rates[0, k] += progress.state[m + k]
         # The begin is at x = -1.
         c.places[0, k] += progress.state[k] + 0.5 * h * progress.state[m + k]
         c.places[1, k] += 0.5 * h * progress.state[m + k]
-    set_stage(STAGES - 1, h, progress, c)
-    for k in range(2 * m):
-        c.after[k] = c.y[k]
+    set_stage(STAGES - 1, h, progress.state, c.accelerations, c.after)
 
 
 @helper
 def keep_rates(c):
     """Keep the coefficients of the accelerations for the next step, which begins at the end."""
-    for k in range(c.accelerations.shape[1]):
-        for power in range(RATE_TERMS):
-            total = 0.0
-            for i in range(RATE_TERMS):
-                total += RATE_POWERS[power, i] * c.accelerations[i, k]
-            c.before[power, k] = total
-        c.accelerations[0, k] = c.accelerations[STAGES, k]
+    _set_powers(1.0, RATE_POWERS, c.accelerations, c.before)
+    put(c.accelerations[STAGES], c.accelerations[0])
 
 
 @helper
 def look(place, c):
     """Put the state at one of the places into ``c.y``."""
-    m, x = c.accelerations.shape[1], 2.0 * PLACES[place] - 1.0
+    set_state(2.0 * PLACES[place] - 1.0, c, c.y)
+
+
+@helper
+def factorise_defect(at, h, J, c):
+    """Factorise ``c.small``, which makes the velocity that is missing at a place of a defect there.
+
+    Return by what this is multiplied for the errors of velocities and displacements.
+    """
+    m, g, to_place = len(J), SPEED_PART[at] * h, PLACE_PART[at] * h * h
     for k in range(m):
-        c.y[k] = value_at(c.places, k, x)
-        c.y[m + k] = value_at(c.rates, k, x)
+        for l in range(m):
+            c.small[k, l] = -g * J[k, m + l] - to_place * J[k, l]
+        c.small[k, k] += 1.0
+    factorise(c.small, m, c.small_pivots)
+    return g, to_place
 
 
 @routine
@@ -115,18 +133,13 @@ def step_error(step, problem, progress, workspace, c):
         dynamics.set_rate_and_gradients(c.y, s, blocks, workspace.given, workspace.load,
                                         workspace.nodes, workspace.scratch, c.rate)
         stage_solver.assemble(s, blocks, workspace.scratch, workspace.reduced)
-        J, g, to_place = workspace.reduced.J, SPEED_PART[at] * h, PLACE_PART[at] * h * h
+        g, to_place = factorise_defect(at, h, workspace.reduced.J, c)
         for k in range(m):
             missing = c.rate[m + k]
             for i in range(RATE_TERMS):
                 missing -= AT_PLACES[at, i] * c.accelerations[i, k]
             c.small_right[k] = missing
-            for l in range(m):
-                c.small[k, l] = -g * J[k, m + l] - to_place * J[k, l]
-            c.small[k, k] += 1.0
-        factorise(c.small, m, c.small_pivots)
-        forward(c.small, m, c.small_pivots, c.small_right)
-        backward(c.small, m, c.small_right, c.small_right)
+        solve(c.small, c.small_pivots, c.small_right)
         for k in range(m):
             missing = abs(c.small_right[k])
             # Comparisons with NaN are false, and the larger of it and a number is the number.
@@ -171,10 +184,9 @@ def work_error(step, before, problem, progress, workspace, c):
     The last powers are taken that part of the step ``before`` its end, as the forces are.
     """
     h, count = step.h, len(c.looked)
-    for k in range(count):
-        c.powers[0, k] = progress.power[k]
+    put(progress.power, c.powers[0])
     for i in range(STAGES):
-        set_stage(i, h, progress, c)
+        set_stage(i, h, progress.state, c.accelerations, c.y)
         if i == STAGES - 1 and before > 0.0:
             move_back(before, h, c)
         powers_at(min(step.t + POINTS[i] * h, step.latest), c.y, problem, workspace,
@@ -193,12 +205,8 @@ def work_error(step, before, problem, progress, workspace, c):
             missing = max(missing, abs(power) * SPEED_PART[at])
             if not abs(power) < np.inf:
                 missing = np.inf
+    _set_powers(h, SPEED_POWERS, c.powers, c.work)
     for k in range(count):
-        for power in range(SPEED_TERMS):
-            total = 0.0
-            for i in range(RATE_TERMS):
-                total += SPEED_POWERS[power, i] * c.powers[i, k]
-            c.work[power, k] = h * total
         c.work[0, k] += progress.work[k]
     return h * missing / (c.tolerance * energy)
 

@@ -23,7 +23,6 @@ from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p.blocks import FEW, blocks_of
 from fecontact.integrate.rodas5p.checkpoint import Checkpoint
 from fecontact.integrate.rodas5p.missed_contacts import first_missed
-from fecontact.integrate.rodas5p.propagation import in_parts, propagate_for
 from fecontact.integrate.rodas5p.run import Run
 from fecontact.integrate.rodas5p.sliders import attend
 from fecontact.integrate.rodas5p.state import (
@@ -35,7 +34,12 @@ from fecontact.integrate.rodas5p.state import (
     progress_for,
     workspace_for,
 )
-from fecontact.integrate.rodas5p.variational import Vary, variation_for
+from fecontact.integrate.rodas5p.variational import (
+    Vary,
+    in_parts,
+    propagate_for,
+    variation_for,
+)
 from fecontact.integrate.run_limits import (
     breaks,
     energy_scale,

@@ -49,7 +49,6 @@ from fecontact.integrate.rodas5p.variational import (
     Vary,
     keep,
     propagate_at,
-    restart_columns,
     write_columns,
 )
 from fecontact.integrate.small_systems import Sized, is_small
@@ -379,7 +378,6 @@ def _close(step, writes, data):
         set_creeps(step, problem, progress, workspace)
     if writes and len(variation.columns) > 0:
         write_columns(variation, vary.transitions[progress.counts[OUTPUTS]])
-        restart_columns(variation)
 
 
 @routine

@@ -191,14 +191,6 @@ def _add_by_twos(a, b, ends, columns, out):
 
 
 @helper
-def products(a, b, out):
-    """Fill out[i, k] with the products of the rows a_i and b_k."""
-    out[:] = 0.0
-    add_products(a, b, (0, len(a), 0, len(b)),
-                 (np.uint64(0), np.uint64(a.shape[1])), out)
-
-
-@helper
 def set_force_jacobian(blocks, g, w, force_jacobian):
     """Fill the answers of the node forces to the motion of each mode, (2 m, 2 n) or (2 m, 3 n).
 

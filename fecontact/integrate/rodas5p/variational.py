@@ -20,7 +20,8 @@ import numpy as np
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import helper, kernel, routine
-from fecontact.core.records import Block, Size, allocate
+from fecontact.core.copies import put, put_rows
+from fecontact.core.records import Block, Size, allocate, shapes
 from fecontact.core.types import Array
 from fecontact.integrate import collocated_columns as collocation
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
@@ -28,6 +29,7 @@ from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
 from fecontact.integrate.rodas5p.blocks import block_at
 from fecontact.integrate.rodas5p.memory_saltation import switch_memory
+from fecontact.integrate.small_systems import USUAL, Sized, Values, is_small, sizes_of
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import keep_sides, set_sides, widen_scales
 from fecontact.system.nodes import (
@@ -71,20 +73,19 @@ class Variation(NamedTuple):
     tolerance, error_floor : float
         Largest error of a column in a step that is allowed, relative to its size, or to the part
         ``error_floor`` of its largest size so far where that is more.
-    moved, right : (k, 2 size), (k, size) arrays
-        [X_i, x] and the right sides of a stage, column by column.
-    pushed : (k, m) array
-        Accelerations by X_i and by H_i; solutions u_v.
-    answers, both, solver : (4 m, d n), (m, 4 m), (m, 2 m) arrays
-        Answers of the node forces inside a stage and ahead; what makes these of [X_i, x], and of
-        the right sides.
+    column_forces : (k, m) array
+        Accelerations by the parameter, in the last row; for steps by collocation.
+    vectors : (7, size) array
+        Work arrays of states.
+    nodes : (3, d n) array
+        Work array: displacements, velocities and forces of the nodes.
     given, load : (2, GIVEN), (2, m) arrays
         Motions and loads that are prescribed at a stage in the systems above and below.
     forces : (d n,) array
         Work array of node forces.
     paths : (STAGES, D, n) array
         Displacements of the nodes by the stages along each of their directions.
-    inside, ahead, behind, usual, between, bends : Gradients
+    inside, ahead, behind, usual, between, second_derivatives : Gradients
         Gradients inside a stage, their change along it, work array, their usual sizes, their
         derivatives to the parameter, and their change along each direction of each node.
     """
@@ -96,12 +97,7 @@ class Variation(NamedTuple):
     stages: Annotated[Array, tableau.STAGES * COLUMNS, SIZE]
     tolerance: float
     error_floor: float
-    moved: Annotated[Array, COLUMNS, 2 * SIZE]
     column_forces: Annotated[Array, COLUMNS, MODES]
-    right: Annotated[Array, COLUMNS, SIZE]
-    force_jacobian: Annotated[Array, 4 * MODES, AXES * NODES]
-    both: Annotated[Array, MODES, 4 * MODES]
-    solver: Annotated[Array, MODES, 2 * MODES]
     vectors: Annotated[Array, 7, SIZE]
     nodes: Annotated[Array, 3, AXES * NODES]
     given: Annotated[Array, 2, dynamics.GIVEN]
@@ -297,12 +293,9 @@ def propagate(
     """
     s, blocks, v = problem.system, problem.blocks, vary.variation
     state, gradients, stages = progress.state, progress.gradients, workspace.stages
-    size = len(state)
     m = len(v.none)
     Y = v.vectors[0]
     varies = vary.width != 0.0
-    if size == 2 * m:
-        stage_solver.set_solver(1.0 / (step.h * tableau.GAMMA), blocks, workspace.reduced, v.solver)
     acceleration = dynamics.ground_acceleration(step.t, dynamics.t_plus(step), step.moved, s)
     columns.learn(gradients, v.usual)
     columns.set_paths(step, acceleration, s, blocks, stages, v)
@@ -336,11 +329,8 @@ def propagate(
         if varies:
             _set_forced(tableau.TIME[i] * step.h, Y, stages[i], blocks, vary, v.vectors[3])
         columns.set_ahead(i, state, s, stages, v)
-        if size > 2 * m:
-            columns.one_by_one(i, step.h, problem, progress, workspace, vary)
-        else:
-            columns.all_at_once(i, step.h, problem, workspace, vary)
-    if size > 2 * m:
+        columns.solve_stage(i, step.h, problem, progress, workspace, vary)
+    if len(state) > 2 * m:
         switch_memory(step, acceleration, problem, progress, workspace, vary)
     if sliders:
         moved = ground_motion(min(step.target, step.latest), s)
@@ -421,14 +411,14 @@ def propagate_in_parts(
     parts, expected = _parts(step, scale, x, forced, workspace.reduced.J, v)
     if expected > v.tolerance:
         return expected
-    force_jacobian = v.force_jacobian[: 2 * m]
     for part in range(parts):
         for i in range(collocation.STAGES):
             place = (part + collocation.NODES[i]) / parts
             now = min(step.t + place * step.h, step.latest)
             tableau.interpolated(place, progress.state, workspace.after, workspace.dense, Y)
             dynamics.set_gradients(Y, s, blocks, ground_motion(now, s), v.nodes, v.inside)
-            columns.set_derivatives(s, blocks, v.inside, workspace.reduced, force_jacobian, J[i])
+            stage_solver.assemble(s, blocks, v.inside, workspace.reduced)
+            put_rows(workspace.reduced.J, J[i])
             if varies:
                 _set_accelerations(now, Y, blocks, vary, forced[i])
         collocation.collocate(step.h / parts, J, forced, x)
@@ -444,23 +434,14 @@ def propagate_in_parts(
 @helper
 def keep(v):
     """Take the columns at the end of the step for those of the next."""
-    for c in range(len(v.columns)):
-        for k in range(v.columns.shape[1]):
-            v.columns[c, k] = v.after[c, k]
-        v.norms[0, c] = v.norms[1, c]
+    put_rows(v.after, v.columns)
+    put(v.norms[1], v.norms[0])
 
 
 @helper
 def write_columns(v, out):
-    """Fill out (k, size) with the columns."""
-    for c in range(len(v.columns)):
-        for k in range(v.columns.shape[1]):
-            out[c, k] = v.columns[c, k]
-
-
-@helper
-def restart_columns(v):
-    """Let the columns be the unit matrix again."""
+    """Fill out (k, size) with the columns, which are the unit matrix again from then on."""
+    put_rows(v.columns, out)
     v.columns[:] = 0.0
     for k in range(v.columns.shape[1]):
         v.norms[0, k], v.norms[1, k] = v.least[k], v.least[k]
@@ -468,3 +449,32 @@ def restart_columns(v):
 
 
 propagate_at = function_at(propagate)
+
+
+def open_nodes(modes: int, nodes: int) -> Values:
+    """Gradients of any number of nodes: of all, or in a workspace for those of each of them."""
+    known = shapes(sizes_of(modes, nodes), dynamics.Gradients)[dynamics.Gradients]
+    return {dynamics.Gradients: {name: (None, *shape[1:]) for name, shape in known.items()
+                                 if name != "polynomial"}}
+
+
+RECORDS = (run_arrays.Problem, run_arrays.Progress, run_arrays.Workspace, run_arrays.Output,
+           Variation)
+SMALL = Sized(propagate.for_values, RECORDS, USUAL, open_nodes, lambda nodes: {DIRECTIONS: 4})
+
+
+def propagate_for(problem: run_arrays.Problem) -> int:
+    """Address of the kernel that carries derivatives over a step, for this size or for all.
+
+    For the same systems as the step loops, with any number of columns; other systems without
+    internal variables go in parts of steps.
+    """
+    if is_small(problem):
+        n, _, m = problem.system.rows.shape
+        return int(SMALL.of(m, n).address)
+    return int((propagate_in_parts if in_parts(problem) else propagate).address)
+
+
+def in_parts(problem: run_arrays.Problem) -> bool:
+    """Whether derivatives go over a step in parts, which leaves the steps to the motion."""
+    return not (is_small(problem) or problem.system.memory.any())

@@ -1,15 +1,12 @@
 """Stages of the columns of derivatives in a step of the integrator.
 
 The stage systems are those of :mod:`fecontact.integrate.rodas5p.variational`, with the derivatives
-of the node forces ``inside`` a stage and ``ahead``, along it. Without internal variables all
-columns go at once, by dense matrices of the size of the modes; else each goes from node to node.
+of the node forces ``inside`` a stage and ``ahead``, along it. A column goes from node to node.
 
 Forces of a node depend on its own motion and internal variables only. So the derivatives ``ahead``
 are sums, over these few directions, of what a stage moves the node and how its derivatives bend
 there; this is found once a step, by differences.
 """
-
-import numpy as np
 
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
@@ -19,13 +16,10 @@ from fecontact.system.node_forces import friction_entry, node_gradients, slip_en
 from fecontact.system.nodes import NodeMotion, ground_moved, memory_of, node_contact
 from fecontact.system.polynomial_forces import (
     add_polynomial_product,
-    add_polynomial_stiffness,
     has_polynomial,
     set_polynomial_change,
 )
 
-# Products of matrices with more multiplications than these go to BLAS.
-_LARGE = 2000
 # Differences are taken over this part of the scales of the laws.
 _PART = 1e-4
 # Shorter ones, as of internal variables that have decayed, would overflow the quotients.
@@ -276,82 +270,6 @@ def set_between(above, here, below, width, central, usual, out):
 
 
 @helper
-def _products(a, b, out):
-    """Fill ``out`` as :func:`stage_solver.products` does; large matrices by BLAS."""
-    if len(a) * len(b) * a.shape[1] > _LARGE:
-        np.dot(a, b.T, out)
-    else:
-        stage_solver.products(a, b, out)
-
-
-@routine
-def set_derivatives(s, blocks, g, reduced, force_jacobian, out):
-    """Fill out (m, 2 m) with [Jq, Jv], the derivatives of the accelerations, by gradients g.
-
-    For systems without internal variables; ``force_jacobian`` (2 m, d n) is workspace.
-    """
-    m = len(out)
-    stage_solver.set_force_jacobian(blocks, g, reduced, force_jacobian)
-    _products(blocks.shapes, force_jacobian, out)
-    for row in range(m):
-        for k in range(m):
-            out[row, k] -= s.stiffness[row, k]
-            out[row, m + k] -= s.damping[row, k]
-    if has_polynomial(s):
-        add_polynomial_stiffness(-1.0, g.polynomial, s, out)
-
-
-@routine
-def all_at_once(i, h, problem, workspace, vary):
-    """Solve stage i of all columns; systems without internal variables and polynomial forces.
-
-    Columns of those with polynomial forces go in parts of the step. v.vectors[3] holds what the
-    parameter adds to the rates of its column.
-    """
-    s, blocks, reduced, v = problem.system, problem.blocks, workspace.reduced, vary.variation
-    G, forced = 1.0 / (h * tableau.GAMMA), v.vectors[3]
-    count, size = v.columns.shape
-    m = len(v.none)
-    stage_solver.set_force_jacobian(blocks, v.inside, reduced, v.force_jacobian)
-    stage_solver.set_force_jacobian(blocks, v.ahead, reduced, v.force_jacobian[2 * m :])
-    _products(blocks.shapes, v.force_jacobian, v.both)
-    for row in range(m):
-        for k in range(m):
-            v.both[row, k] -= s.stiffness[row, k]
-            v.both[row, m + k] -= s.damping[row, k]
-    for c in range(count):
-        own = v.stages[tableau.STAGES * c : tableau.STAGES * (c + 1)]
-        moved, right = v.moved[c], v.right[c]
-        tableau.combined_twice(i, h, v.columns[c], own, moved[:size], right)
-        if i == 0:
-            for k in range(size):
-                moved[size + k] = v.columns[c, k]
-    _products(v.moved, v.both, v.column_forces)
-    for c in range(count):
-        moved, right, column_forces = v.moved[c, m:], v.right[c], v.column_forces[c]
-        faster = right[m:]
-        for k in range(m):
-            right[k] += moved[k]
-        for k in range(m):
-            faster[k] += column_forces[k]
-    if vary.width != 0.0:
-        for k in range(size):
-            v.right[count - 1, k] += forced[k]
-    _products(v.right, v.solver, v.column_forces)
-    time = 1.0 / G
-    for c in range(count):
-        out, right, column_forces = v.stages[tableau.STAGES * c + i], v.right[c], v.column_forces[c]
-        faster = out[m:]
-        for k in range(m):
-            out[k] = time * (right[k] + column_forces[k])
-        for k in range(m):
-            faster[k] = column_forces[k]
-        if i == tableau.STAGES - 1:
-            for k in range(size):
-                v.after[c, k] = v.moved[c, k] + out[k]
-
-
-@helper
 def add_node_forces(g, s, blocks, x, w, rate):
     """Add to w[2] (d n,) the node forces, and to ``rate`` the z', that x makes by gradients g."""
     n, states, _ = g.rates.shape
@@ -378,8 +296,11 @@ def add_node_forces(g, s, blocks, x, w, rate):
 
 
 @routine
-def one_by_one(i, h, problem, progress, workspace, vary):
-    """Solve stage i of all columns; with v.vectors[3] as in :func:`all_at_once`."""
+def solve_stage(i, h, problem, progress, workspace, vary):
+    """Solve stage i of all columns, one by one.
+
+    v.vectors[3] holds what the parameter adds to the rates of its column.
+    """
     s, blocks, v = problem.system, problem.blocks, vary.variation
     G, forced = 1.0 / (h * tableau.GAMMA), v.vectors[3]
     count, size = v.columns.shape
@@ -387,7 +308,7 @@ def one_by_one(i, h, problem, progress, workspace, vary):
     w, right, X, rate = v.nodes, v.vectors[1], v.vectors[2], v.vectors[4]
     for c in range(count):
         own = v.stages[tableau.STAGES * c : tableau.STAGES * (c + 1)]
-        tableau.combined(tableau.A[i], 1.0, v.columns[c], own, X)
+        tableau.combined_twice(i, h, v.columns[c], own, X, right)
         w[2, :] = 0.0
         rate[2 * m :] = 0.0
         add_node_forces(v.ahead, s, blocks, v.columns[c], w, rate)
@@ -396,10 +317,11 @@ def one_by_one(i, h, problem, progress, workspace, vary):
         if has_polynomial(s):
             add_polynomial_product(-1.0, v.inside.polynomial, X, s, rate[m : 2 * m])
             add_polynomial_product(-1.0, v.ahead.polynomial, v.columns[c], s, rate[m : 2 * m])
+        for k in range(size):
+            right[k] += rate[k]
         if vary.width != 0.0 and c == count - 1:
             for k in range(size):
-                rate[k] += forced[k]
-        tableau.combined(tableau.C[i], 1.0 / h, rate, own, right)
+                right[k] += forced[k]
         stage_solver.solve_stage(G, s, blocks, progress.gradients, workspace.reduced, right, w,
                                  own[i])
         if i == tableau.STAGES - 1:
