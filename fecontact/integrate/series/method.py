@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.copies import put
 from fecontact.integrate.rodas5p import state
-from fecontact.integrate.rodas5p.error_control import take_scales
+from fecontact.integrate.rodas5p.error_control import largest_energy, take_scales
 from fecontact.integrate.rodas5p.event_kernels import (
     FOUND,
     NODES,
@@ -25,7 +26,7 @@ from fecontact.integrate.rodas5p.event_kernels import (
     first_stop,
     note_zone,
 )
-from fecontact.integrate.rodas5p.state import ENERGY, SPEED_SCALE, SWITCHES, WORST_NODE
+from fecontact.integrate.rodas5p.state import SPEED_SCALE, SWITCHES, WORST_NODE
 from fecontact.integrate.series.branches import (
     ACTS,
     MET,
@@ -61,7 +62,6 @@ from fecontact.system.powers import (
     DRIVE,
     LOAD,
     MODAL_DAMPING,
-    POWER_COUNT,
 )
 
 # Columns of the work in the order of `Series.powers`.
@@ -120,8 +120,7 @@ def _length(control, progress, series, h):
     last, before = 0.0, 0.0
     speed = max(progress.numbers[SPEED_SCALE], control.speed_scale)
     for i in range(len(series.q)):
-        size = max(max(progress.extremes[i], abs(progress.state[i])),
-                   control.displacement_scale[i])
+        size = max(progress.extremes[i], control.displacement_scale[i])
         size = min(size, speed / control.largest[i] * h / DEGREE) * series.tolerance
         last = max(last, abs(series.q[i, DEGREE]) / size)
         before = max(before, abs(series.q[i, DEGREE - 1]) / size)
@@ -144,13 +143,7 @@ def _within(last, before):
 @helper
 def _work_length(control, progress, series, h):
     """Part of h until the last terms of the work are within the tolerance."""
-    kinetic = 0.0
-    for i in range(len(series.q)):
-        kinetic += 0.5 * series.v[i, 0] ** 2
-    energy = max(max(progress.numbers[ENERGY], kinetic), control.energy_scale)
-    for k in range(POWER_COUNT):
-        energy = max(energy, abs(progress.work[k]))
-    progress.numbers[ENERGY] = energy
+    energy = largest_energy(progress.state, control, progress)
     last, before = 0.0, 0.0
     for row in range(len(series.powers)):
         last = max(last, abs(series.powers[row, DEGREE]))
@@ -236,12 +229,19 @@ def _set_speeds(x, h, series):
 
 
 @helper
-def _set_state(step, series, state):
-    """Put the state at the end of the step into ``state``."""
+def _set_state(x, series, out):
+    """Fill ``out`` (2 m,) with the state at the part x of the expanded length."""
     m = len(series.q)
     for i in range(m):
-        state[i] = value_at(series.q[i], step.part)
-        state[m + i] = value_at(series.v[i], step.part)
+        out[i] = value_at(series.q[i], x)
+        out[m + i] = value_at(series.v[i], x)
+
+
+@helper
+def _add_work(x, series, out):
+    """Add to ``out`` (P,) the work up to the part x of the expanded length."""
+    for k in range(len(_WORKS)):
+        out[_WORKS[k]] += value_at(series.powers[k], x)
 
 
 @helper
@@ -249,7 +249,7 @@ def _note_change(change, step, series, watch):
     """Note that the force of the node begins or ends; whether the run stops there."""
     row = watch.counts[FOUND]
     state = watch.states[row]
-    _set_state(step, series, state)
+    _set_state(step.part, series, state)
     watch.zones[step.node] = OPEN if change > 0 else STICKING
     note_zone(step.node, STICKING if change > 0 else OPEN, step.target, state, watch)
     return first_stop(row, watch) < np.inf
@@ -323,17 +323,11 @@ def _attempt(step, last, smallest, data):
 @routine
 def _fill(row, output, step, data):
     """Fill a row of the output."""
-    progress, series = data.progress, data.series
-    m = len(series.q)
     x = (output.times[row] - step.t) / step.unit
-    for i in range(m):
-        output.states[row, i] = value_at(series.q[i], x)
-        output.states[row, m + i] = value_at(series.v[i], x)
+    _set_state(x, data.series, output.states[row])
     if data.problem.control.work:
-        for k in range(len(progress.work)):
-            output.work[row, k] = progress.work[k]
-        for k in range(len(_WORKS)):
-            output.work[row, _WORKS[k]] += value_at(series.powers[k], x)
+        put(data.progress.work, output.work[row])
+        _add_work(x, data.series, output.work[row])
 
 
 @routine
@@ -353,10 +347,9 @@ def _find_end(step, data):
 def _go_on(step, h, data):
     """Make the end of the step the state of the run."""
     progress, series = data.progress, data.series
-    _set_state(step, series, progress.state)
+    _set_state(step.part, series, progress.state)
     if data.problem.control.work:
-        for k in range(len(_WORKS)):
-            progress.work[_WORKS[k]] += value_at(series.powers[k], step.part)
+        _add_work(step.part, series, progress.work)
     return RUNNING, h
 
 

@@ -18,6 +18,7 @@ import math
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.copies import put
 
 # Highest power of the series.
 DEGREE = 23
@@ -134,8 +135,7 @@ def first_zero(p, limit, workspace):
                 # The right half waits in the row of its depth.
                 _apply(_RIGHT, b, workspace[depth])
                 _apply(_LEFT, b, half)
-                for i in range(len(b)):
-                    b[i] = half[i]
+                put(half, b)
                 depth += 1
                 width *= 0.5
                 waiting |= 1 << depth
@@ -150,5 +150,4 @@ def first_zero(p, limit, workspace):
         if depth == 0:
             return 2.0 * limit
         waiting &= ~(1 << depth)
-        for i in range(COEFFICIENTS):
-            b[i] = workspace[depth - 1, i]
+        put(workspace[depth - 1], b)
