@@ -15,11 +15,10 @@ from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate import step_loop
-from fecontact.integrate.collocation.workspace import chosen_collocation
 from fecontact.integrate.derivative_check import doubts, perturbed_systems
 from fecontact.integrate.ensembles import Ensemble, ensemble
-from fecontact.integrate.field_runs.saltation import Passage, joined, passages, with_passages
 from fecontact.integrate.initial_state import Initial, initial_state
+from fecontact.integrate.jumping_nodes import jumping_nodes
 from fecontact.integrate.rodas5p.driver import start
 from fecontact.integrate.rodas5p.variational import MOVE
 from fecontact.integrate.simulate import output_times, require_max_step
@@ -193,23 +192,16 @@ def differentiated(
     if not isinstance(solver, CompiledSolver):
         return _differences(system, times, state, parameter, solver, rtol, max_step)
     vary = True if parameter is None else _moved(system, parameter, times, state)
-    passed: list[Passage] = []
-    if solver.method == "rodas5p" or chosen_collocation(
-            system, rtol, (), solver.method == "radau") is None:
-        passed = passages(system, state, times, rtol, max_step,
-                          None if isinstance(vary, bool) else vary)
-    run = start(system, state, with_passages(times, passed), rtol=rtol, max_step=max_step,
-                work=False, vary=vary, vary_rtol=derivative_rtol, method=solver.method)
+    run = start(system, state, times, rtol=rtol, max_step=max_step, work=False, vary=vary,
+                vary_rtol=derivative_rtol, method=solver.method)
     result = finish(run)
     if result != step_loop.FINISHED:
         raise AnalysisError(f"The run ended at t = {run.time:.9g} s, before t_end = "
                             f"{times[-1]:.9g}: {ENDS[result].value}")
     columns, states, size = run.transitions[1:], run.states, len(state)
-    if passed:
-        columns = joined(columns, times, passed)
-        states = states[np.searchsorted(run.times, times)]
     forced = None if parameter is None else columns[:, :, size].copy()
-    if passed and not isinstance(vary, bool) and _deeper(vary[0], vary[1], times, state) > 0.0:
+    if (not isinstance(vary, bool) and run.collocation is None and jumping_nodes(system).any()
+            and _deeper(vary[0], vary[1], times, state) > 0.0):
         # Differences at a state would mix forces from both sides of a jump.
         above, below, width = vary
         pieces, spans = len(times) - 1, np.stack([times[:-1], times[1:]], axis=1)

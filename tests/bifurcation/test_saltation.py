@@ -24,7 +24,7 @@ from fecontact.bifurcation import (
     orbit_branch,
 )
 from fecontact.integrate import ContactEvents, Rodas5P
-from fecontact.integrate.field_runs.saltation import jumping_nodes
+from fecontact.integrate.jumping_nodes import jumping_nodes
 from fecontact.laws import (
     ConstantFriction,
     LinearContact,
@@ -93,6 +93,24 @@ def test_touch_downs_of_several_nodes():
     assert run.events.kind.count("touch-down") >= 3
     found = sensitivity(system, T, initial=start, rtol=1e-10)
     assert off(found.monodromy, differences(system, start)) < 1e-5
+
+
+@pytest.mark.parametrize("settings", [{"solver": NEVER}, {}], ids=["Rodas5P", "collocation"])
+def test_touch_down_beside_a_law_with_more_levels(settings):
+    """Forces of stops begin at two penetrations, that of a spring with a dashpot at one."""
+    rows = np.zeros((3, 3, 2))
+    rows[:, 1] = [1.0, 0.3], [0.2, 1.0], [1.0, 0.0]
+    modes = basis_from_matrices(
+        np.eye(2), np.diag([1e3, 2e3]),
+        {"contact": {"floor": rows[:1], "stops": rows[1:2]}, "B": rows[2], "C": rows[2]},
+        damping=np.eye(2))
+    system = ContactSystem(modes, normal={"floor": DAMPED, "stops": TwoSidedStop(1e4, 1e-2)},
+                           friction=ConstantFriction(0.0))
+    start = np.array([5e-3, 1e-3, -0.1, 0.05])
+    run = simulate(system, T, initial=start, outputs=2, events=[ContactEvents()])
+    assert "touch-down" in run.events.kind
+    found = sensitivity(system, T, initial=start, **settings)
+    assert off(found.monodromy, differences(system, start)) < 1e-7
 
 
 @pytest.mark.parametrize("settings", [{"solver": NEVER}, {}], ids=["Rodas5P", "collocation"])

@@ -24,12 +24,10 @@ from fecontact.core.resources.memory import require_memory
 from fecontact.core.types import Array
 from fecontact.integrate import step_loop
 from fecontact.integrate.field_runs.field_run import FieldRun
-from fecontact.integrate.field_runs.saltation import joined, passages, with_passages
 from fecontact.integrate.field_runs.start import start_any, start_state
 from fecontact.integrate.initial_state import Initial
 from fecontact.integrate.simulate import require_resolved_span
 from fecontact.integrate.step_runs import ENDS, finish
-from fecontact.system.contact_system import ContactSystem
 from fecontact.system.fields.in_time import Moving, in_time, state_size
 from fecontact.system.fields.vector_field import VectorField
 from fecontact.system.forcing_period import forcing_period
@@ -150,14 +148,10 @@ def lyapunov_exponents(
         growth = np.empty((steps, count))
         for first in range(0, steps, _INTERVALS):
             piece = instants[first : first + _INTERVALS + 1]
-            passed = passages(moving, state, piece, rtol) if isinstance(
-                moving, ContactSystem) else []
-            run = start_any(moving, state, with_passages(piece, passed), rtol=rtol, vary=True)
+            run = start_any(moving, state, piece, rtol=rtol, vary=True)
             _reach_end(finish(run, tell), run.time)
             state = run.states[-1]
-            transitions = joined(run.transitions[1:], piece, passed) if passed else (
-                run.transitions[1:])
-            for k, transition in enumerate(transitions, first):
+            for k, transition in enumerate(run.transitions[1:], first):
                 Q, R = np.linalg.qr(transition @ Q)
                 growth[k] = np.log(np.maximum(np.abs(np.diag(R)), np.finfo(float).tiny))
     lost = growth.min(axis=1) - growth[:, 0] < np.log(_LOST)

@@ -7,7 +7,8 @@ import numpy as np
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.errors import InputError
-from fecontact.integrate.field_runs.saltation import jumping_nodes, touch_down_on_jumps
+from fecontact.integrate.jumping_nodes import jumping_nodes
+from fecontact.system import columns
 from fecontact.system.elastic_sliders import slider_counts
 from fecontact.system.fields.vector_field import VectorField
 
@@ -47,7 +48,10 @@ def _jumps(field: ContactField, point: BranchPoint) -> bool:
 
 
 def _touches_down(field: ContactField, point: BranchPoint) -> bool:
+    """True if a node whose normal force jumps is open at a sample and closed at the next one."""
     system = field.system(point.parameter_values(field))
     motion = point.orbit(field, samples=_SAMPLES)
-    return touch_down_on_jumps(system, np.ascontiguousarray(motion.times),
-                               np.ascontiguousarray(motion.states))
+    closed = system.contact_history(
+        np.ascontiguousarray(motion.times), np.ascontiguousarray(motion.states))[
+            :, jumping_nodes(system), columns.NORMAL_FORCE] != 0.0
+    return bool((np.roll(closed, 1, axis=0) != closed).any())

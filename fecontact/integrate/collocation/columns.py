@@ -42,6 +42,7 @@ from fecontact.integrate.collocation.workspace import Collocation, Step
 from fecontact.integrate.rodas5p import dynamics, stage_solver
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import tableau as rows
+from fecontact.integrate.rodas5p.saltation import contact_at, cross_level
 from fecontact.integrate.rodas5p.variational import (
     DIRECTIONS,
     RECORDS,
@@ -51,20 +52,11 @@ from fecontact.integrate.rodas5p.variational import (
 )
 from fecontact.integrate.small_systems import USUAL, Sized
 from fecontact.system.node_forces import (
-    node_forces,
     normal_force,
     plane_friction,
     pressing_force,
 )
-from fecontact.system.nodes import (
-    NodeMotion,
-    ground_motion,
-    node_contact,
-    node_motion,
-)
-
-# A change of a force at once by more than this part of it is a jump.
-_JUMP = 1e-3
+from fecontact.system.nodes import ground_motion, node_contact
 
 
 @routine
@@ -214,60 +206,21 @@ def _error_at(at, h, problem, progress, workspace, c, v):
     return largest
 
 
-@helper
-def _deeper(motion, offset):
-    """A motion of a node that is so much further on the other side."""
-    places = motion.places
-    return NodeMotion((places[0], places[1] - offset, places[2]), motion.speeds)
-
-
-@helper
-def _contact(j, y, moved, s):
-    """A node against the ground at a state y."""
-    return node_contact(j, node_motion(j, y, s), moved, s)
-
-
 @routine
-def _cross(t, near, problem, c, vary):
+def _cross_levels(t, near, problem, c, vary):
     """Add to the columns at the end of a step what forces that jump there make of them.
 
-    If the penetration u of a node passes a level at the rate u', where the accelerations jump by
-    da, a motion beside it, whose penetration differs by du, passes it by -du / u' later: its
-    velocities differ by da du / u' after both have passed (saltation). The level is passed at the
-    end of the step if the time ``near`` brings the node there.
+    A level is passed at the end of the step if the time ``near`` brings the node there.
     """
-    s, v, levels = problem.system, vary.variation, problem.control.levels
-    m, count = c.accelerations.shape[1], len(v.columns)
+    s, levels = problem.system, problem.control.levels
     moved = ground_motion(t, s)
     for j in range(len(s.gap)):
-        contact = _contact(j, c.after, moved, s)
-        u, rate = contact.penetration, contact.rate
-        reach = near * abs(rate)
-        for level in range(len(levels)):
-            if not abs(u - levels[level, j]) < reach:
-                continue
-            # Both sides of the level, in the order in which they are passed.
-            jump, slip_jump, largest = 0.0, 0.0, 0.0
-            for side in (-1.0, 1.0):
-                offset = levels[level, j] + side * (reach if rate > 0.0 else -reach) - u
-                force = v.inside.force[0]
-                F = node_forces(j, _deeper(node_motion(j, c.after, s), offset), moved,
-                                c.after[2 * m :], s, force, v.inside.rates[0]).normal
-                jump += side * F
-                slip_jump += side * force[0]
-                largest = max(largest, abs(F))
-            if abs(jump) < _JUMP * largest:
-                continue
-            for column in range(count):
-                x, ahead = v.after[column], 0.0
-                for k in range(m):
-                    ahead -= s.rows[j, 1, k] * x[k]
-                if column == count - 1 and vary.width != 0.0:
-                    ahead += (_contact(j, c.after, moved, vary.above).penetration
-                              - _contact(j, c.after, moved, vary.below).penetration) / vary.width
-                ahead /= rate
-                for k in range(m):
-                    x[m + k] += (s.rows[j, 1, k] * jump - s.rows[j, 0, k] * slip_jump) * ahead
+        contact = contact_at(j, c.after, moved, s)
+        for k in range(len(levels)):
+            # Laws with fewer levels than others repeat their first one.
+            if abs(contact.penetration - levels[k, j]) < near * abs(contact.rate) and (
+                    k == 0 or levels[k, j] != levels[0, j]):
+                cross_level(j, levels[k, j], t, c.after, problem, vary)
 
 
 @kernel(by_address=True)
@@ -311,7 +264,7 @@ def propagate(
         error = _error_at(at, h, problem, progress, workspace, c, v)
         largest = max(largest, error) if error < np.inf else np.inf
     if before > 0.0:
-        _cross(min(t + h, latest), near * h, problem, c, vary)
+        _cross_levels(min(t + h, latest), near * h, problem, c, vary)
     return largest
 
 

@@ -28,7 +28,7 @@ from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
 from fecontact.integrate.rodas5p.blocks import block_at
-from fecontact.integrate.rodas5p.memory_saltation import switch_memory
+from fecontact.integrate.rodas5p.saltation import cross_levels, switch_memory
 from fecontact.integrate.small_systems import USUAL, Sized, Values, is_small, sizes_of
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import keep_sides, set_sides, widen_scales
@@ -332,6 +332,7 @@ def propagate(
         columns.solve_stage(i, step.h, problem, progress, workspace, vary)
     if len(state) > 2 * m:
         switch_memory(step, acceleration, problem, progress, workspace, vary)
+    cross_levels(step, problem, progress, workspace.after, vary)
     if sliders:
         moved = ground_motion(min(step.target, step.latest), s)
         widen_scales(moved, workspace.after, s, counts, force, rates, workspace.right)
@@ -423,10 +424,13 @@ def propagate_in_parts(
                 _set_accelerations(now, Y, blocks, vary, forced[i])
         collocation.collocate(step.h / parts, J, forced, x)
     for c in range(count):
+        for k in range(size):
+            v.after[c, k] = x[k, c]
+    cross_levels(step, problem, progress, workspace.after, vary)
+    for c in range(count):
         largest = v.norms[0, c]
         for k in range(size):
-            largest = max(largest, max(abs(v.columns[c, k]), abs(x[k, c])) / scale[k])
-            v.after[c, k] = x[k, c]
+            largest = max(largest, max(abs(v.columns[c, k]), abs(v.after[c, k])) / scale[k])
         v.norms[1, c] = largest
     return 0.0
 
