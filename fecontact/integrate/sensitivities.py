@@ -346,9 +346,14 @@ def _moved(
     if slider_counts(system).any():
         # Elements that have just begun or ceased to slide must not switch with the parameter.
         move *= _SLIDERS
-    above, below, low, high = perturbed_systems(system_at, value, move * min(
-        _slip_limit(system, system_at, value, move),
-        _depth_limit(system, system_at, value, move, times, state)))
+    above, below, low, high = perturbed_systems(system_at, value, move)
+    # A relative change of 1e-5 of a belt speed of 0.2 m/s exceeds a velocity scale of 1 um/s, and a
+    # gap of zero has no size of its own of which a part could be taken.
+    scale = min((law.velocity_scale for _, _, law in system.law_groups("friction")), default=np.inf)
+    faster = np.abs(_passing(above) - _passing(below)).max(initial=0.0) * move / (high - low)
+    deeper = _deeper(above, below, times, state)
+    above, below, low, high = perturbed_systems(system_at, value, move / max(
+        1.0, faster / (_SLIP * scale), deeper / (_DEPTH * system.penetration_scale)))
     return above, below, high - low
 
 
@@ -371,36 +376,6 @@ def _function_of(
                          f"function of a system and a value, and the value: (function, 0.5).")
     function, number = parameter
     return (lambda at: function(system, at)), number
-
-
-def _slip_limit(
-    system: ContactSystem, system_at: Callable[[float], ContactSystem], value: float, move: float,
-) -> float:
-    """Factor that keeps the change of the parameter small relative to the friction smoothing.
-
-    A relative change of 1e-5 of a belt speed of 0.2 m/s exceeds a velocity scale of 1 um/s, so that
-    the difference would not approximate the derivative.
-    """
-    try:
-        shift = np.abs(_passing(system_at(value + move)) - _passing(system_at(value))).max(
-            initial=0.0)
-    except InputError:
-        return 1.0
-    scales = [law.velocity_scale for _, _, law in system.law_groups("friction")]
-    return float(min(1.0, _SLIP * min(scales) / shift)) if shift > 0.0 and scales else 1.0
-
-
-def _depth_limit(
-    system: ContactSystem, system_at: Callable[[float], ContactSystem], value: float, move: float,
-    times: Array, state: Array,
-) -> float:
-    """Factor that keeps changes of penetrations small relative to the scale of the normal laws.
-
-    A gap of zero has no size of its own of which a part could be taken.
-    """
-    above, below, *_ = perturbed_systems(system_at, value, move)
-    shift = _deeper(above, below, times, state)
-    return min(1.0, _DEPTH * system.penetration_scale / shift) if shift > 0.0 else 1.0
 
 
 def _deeper(above: ContactSystem, below: ContactSystem, times: Array, state: Array) -> float:
