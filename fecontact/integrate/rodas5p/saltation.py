@@ -40,6 +40,8 @@ _NEAR, _BESIDE = 1e-6, 1e-9
 _JUMP = 1e-3
 # A level counts as passed this part of a step, or of the time, before it is.
 _AHEAD, _BRIEFEST = 1e-5, 1e-13
+# A node that passes a level in a step is no further from it than so many steps would bring it.
+_FAR = 4.0
 
 
 @helper
@@ -152,7 +154,7 @@ def cross_level(j, level, t, y, problem, vary):
         if node.normal == 0.0 and problem.control.slider_counts[j] > 0:
             # Elastic elements begin without deflection; in the open they have followed the slip.
             z[:] = 0.0
-    if abs(jump[1]) <= _JUMP * largest:
+    if abs(jump[1]) <= _JUMP * largest or contact.rate == 0.0:
         return
     for c in range(count):
         x = v.after[c]
@@ -177,22 +179,23 @@ def _ahead(h, t):
 
 @routine
 def cross_levels(step, problem, progress, y, vary):
-    """Add to the columns at the end y of a step what forces that jump in it make of them.
+    """Add to the columns at the end y of a step what forces that jump there make of them.
 
     Steps end where forces jump, within the part 1e-6 of a step, before or after. What is just ahead
     of the end counts as passed, and is not passed again in the next step.
     """
     s, levels, last = problem.system, problem.control.levels, progress.numbers[LAST_STEP]
-    end = min(step.target, step.latest)
-    now = ground_motion(end, s)
-    begun, ahead = _ahead(last if last > 0.0 else step.h, step.t), _ahead(step.h, step.target)
+    end, begun = min(step.target, step.latest), _ahead(last if last > 0.0 else step.h, step.t)
+    now, ahead = ground_motion(end, s), _ahead(step.h, step.target)
     for j in range(len(s.gap)):
-        before = contact_at(j, progress.state, step.moved, s)
         after = contact_at(j, y, now, s)
-        low = before.penetration + begun * before.rate
-        high = after.penetration + ahead * after.rate
         for k in range(len(levels)):
             level = levels[k, j]
             # Laws with fewer levels than others repeat their first one.
-            if (low < level) != (high < level) and (k == 0 or level != levels[0, j]):
+            if (abs(after.penetration - level) > _FAR * step.h * abs(after.rate)
+                    or (k > 0 and level == levels[0, j])):
+                continue
+            before = contact_at(j, progress.state, step.moved, s)
+            if (before.penetration + begun * before.rate < level) != (
+                    after.penetration + ahead * after.rate < level):
                 cross_level(j, level, end, y, problem, vary)

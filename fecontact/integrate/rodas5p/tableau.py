@@ -141,21 +141,6 @@ next_stage = by_kind(_by_sums, _by_stages)
 
 
 @helper
-def combined_twice(i, h, base, stages, place, right):
-    """Fill place = base + sum_j A_ij stages_j and right = sum_j C_ij stages_j / h of stage i."""
-    row, r = A[i], 1.0 / h
-    a0, a1, a2, a3, a4, a5, a6 = row[0], row[1], row[2], row[3], row[4], row[5], row[6]
-    row = C[i]
-    c0, c1, c2, c3 = r * row[0], r * row[1], r * row[2], r * row[3]
-    c4, c5, c6 = r * row[4], r * row[5], r * row[6]
-    for k in range(len(base)):
-        u0, u1, u2, u3 = stages[0, k], stages[1, k], stages[2, k], stages[3, k]
-        u4, u5, u6 = stages[4, k], stages[5, k], stages[6, k]
-        place[k] = (base[k] + a0 * u0 + a1 * u1 + a2 * u2 + a3 * u3 + a4 * u4 + a5 * u5 + a6 * u6)
-        right[k] = c0 * u0 + c1 * u1 + c2 * u2 + c3 * u3 + c4 * u4 + c5 * u5 + c6 * u6
-
-
-@helper
 def dense_coefficients(stages, out):
     """Fill out (3, size) with the coefficients k_1, k_2, k_3 of the interpolant."""
     for row in range(3):

@@ -308,20 +308,21 @@ def solve_stage(i, h, problem, progress, workspace, vary):
     w, right, X, rate = v.nodes, v.vectors[1], v.vectors[2], v.vectors[4]
     for c in range(count):
         own = v.stages[tableau.STAGES * c : tableau.STAGES * (c + 1)]
-        tableau.combined_twice(i, h, v.columns[c], own, X, right)
-        w[2, :] = 0.0
-        rate[2 * m :] = 0.0
+        tableau.combined(tableau.A[i], 1.0, v.columns[c], own, X)
+        for k in range(w.shape[1]):
+            w[2, k] = 0.0
+        for k in range(2 * m, size):
+            rate[k] = 0.0
         add_node_forces(v.ahead, s, blocks, v.columns[c], w, rate)
         add_node_forces(v.inside, s, blocks, X, w, rate)
         dynamics.gather(X, s, blocks, v.none, w[2], rate)
         if has_polynomial(s):
             add_polynomial_product(-1.0, v.inside.polynomial, X, s, rate[m : 2 * m])
             add_polynomial_product(-1.0, v.ahead.polynomial, v.columns[c], s, rate[m : 2 * m])
-        for k in range(size):
-            right[k] += rate[k]
         if vary.width != 0.0 and c == count - 1:
             for k in range(size):
-                right[k] += forced[k]
+                rate[k] += forced[k]
+        tableau.combined(tableau.C[i], 1.0 / h, rate, own, right)
         stage_solver.solve_stage(G, s, blocks, progress.gradients, workspace.reduced, right, w,
                                  own[i])
         if i == tableau.STAGES - 1:
