@@ -1,5 +1,7 @@
 """Collocation systems with border rows, such as phase condition and arclength condition."""
 
+from contextlib import suppress
+
 import numpy as np
 
 from fecontact.bifurcation.linalg import bordered_kernels
@@ -45,20 +47,6 @@ def expand_open(factors: CondensedFactors, start: Array, end: Array) -> Array:
     return out
 
 
-def solve_turned(factors: CondensedFactors, rhs: Array, closing: complex) -> ComplexArray:
-    """All nodes (N m d,) with x(1) = closing x(0), the common unknowns zero.
-
-    ``rhs`` (N m d,) are the right-hand sides of the collocation rows; both are complex. The
-    solution of a singular system is not finite.
-    """
-    parts, out = np.empty((2, len(rhs))), np.empty((2, len(rhs)))
-    parts[0], parts[1] = rhs.real, rhs.imag
-    bordered_kernels.solve_turned(factors, parts, closing.real, closing.imag, out)
-    found = np.empty(len(rhs), dtype=complex)
-    found.real, found.imag = out
-    return found
-
-
 def open_side(factors: CondensedFactors, rhs: Array) -> tuple[ComplexArray, ComplexArray]:
     """Complex right-hand sides (N m d,) over the pivot rows, and for the rows of both ends (d,)."""
     parts = [np.array(part, dtype=float) for part in (np.real(rhs), np.imag(rhs))]
@@ -81,6 +69,20 @@ def open_solution(
         pivots, *ends = (np.array(of(one)) for one in (reduced, start, end))
         bordered_kernels.expand(factors, pivots, *ends, np.zeros(columns - 2 * d), nodes)
     return np.asarray(out[0] + 1j * out[1])
+
+
+def solve_turned(factors: CondensedFactors, rhs: Array, closing: complex) -> ComplexArray:
+    """All nodes (N m d,) with x(1) = closing x(0), the common unknowns zero.
+
+    ``rhs`` (N m d,) are the right-hand sides of the collocation rows; both are complex. The
+    solution of a singular system is not finite.
+    """
+    d = len(factors.end)
+    reduced, side = open_side(factors, rhs)
+    start: ComplexArray = np.full(d, np.nan, dtype=complex)
+    with suppress(np.linalg.LinAlgError):
+        start[:] = np.linalg.solve(factors.end[:, :d] + closing * factors.end[:, d : 2 * d], side)
+    return open_solution(factors, reduced, start, closing * start)
 
 
 class Bordered:

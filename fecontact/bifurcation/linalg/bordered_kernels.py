@@ -309,36 +309,3 @@ def solve(
     for c in range(d, columns):
         out[N * size + c - d] = side[c]
     expand(factors, reduced, side[:d], end, side[d:], out[: N * size])
-
-
-@kernel
-def solve_turned(
-    factors: CondensedFactors, rhs: Matrix, real: float, imaginary: float, out: Matrix,
-) -> None:
-    """Fill out (2, N m d) with the nodes for x(1) = (real + i imaginary) x(0), no common unknowns.
-
-    Real parts stand in the first row and imaginary ones in the second, as in the right-hand sides
-    (2, N m d) of the collocation rows. The solution of a singular system is not finite.
-    """
-    groups, size, _, _ = factors.inner.shape
-    _, d, columns = factors.local.shape
-    count = (groups * (size - d) + (groups - 1) * d) * WIDTH + len(factors.top) * d
-    reduced, side = np.empty((2, count)), np.empty(2 * d)
-    for part in range(2):
-        reduce_side(factors, rhs[part], reduced[part], side[part * d : (part + 1) * d])
-    a, pivots = np.empty((2 * d, 2 * d)), np.empty(2 * d, dtype=np.int64)
-    for i in range(d):
-        for c in range(d):
-            end = factors.end[i, d + c]
-            a[i, c] = a[d + i, d + c] = factors.end[i, c] + real * end
-            a[d + i, c] = imaginary * end
-            a[i, d + c] = -imaginary * end
-    factorise(a, 2 * d, pivots)
-    solve_dense(a, pivots, side)
-    ends, nothing = np.empty((2, d)), np.zeros(columns - 2 * d)
-    for c in range(d):
-        ends[0, c] = real * side[c] - imaginary * side[d + c]
-        ends[1, c] = imaginary * side[c] + real * side[d + c]
-    for part in range(2):
-        expand(factors, reduced[part], side[part * d : (part + 1) * d], ends[part], nothing,
-               out[part])
