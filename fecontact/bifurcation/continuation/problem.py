@@ -386,11 +386,14 @@ def sizes_of(given: ArrayLike | None, found: Array) -> tuple[Array, Array | None
     return sizes, None
 
 
-def enlarged(scales: Array, sizes: Array, limits: Array) -> Array:
+def enlarged(scales: Array, sizes: Array, limits: Array | None) -> Array:
     """Scales of states, period and parameter, enlarged to the sizes (d,) of the states of an orbit.
 
-    They grow up to ``limits`` (d,); scales that are nearly large enough are returned as they are.
+    They grow up to ``limits`` (d,); scales that are nearly large enough, or without limits, are
+    returned as they are.
     """
+    if limits is None:
+        return scales
     d = len(sizes)
     larger = np.clip(sizes, scales[:d], limits)
     if (larger <= _NEARLY * scales[:d]).all():

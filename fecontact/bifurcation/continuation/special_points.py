@@ -27,8 +27,9 @@ _HIDDEN_CHANGE = 2
 # Slope of the parameter, in widths of the diagram, which rounding and errors of the mesh do not
 # reach where multipliers are lost.
 _STEEP = 1e-6
-# Distance within which a fold belongs to a branch point, in the precision of either.
-_BESIDE = 30.0
+# Distance within which a fold belongs to a branch point, in the precision of either, and the kinds
+# of such points.
+_BESIDE, _FORKS = 30.0, ("branch point", "period halving")
 
 
 def located_on(step: Step, strict: bool = True) -> tuple[Solution, list[BranchPoint]] | None:
@@ -270,7 +271,7 @@ def _off_cubic(step: Step, located: Solution | None) -> bool:
 
 def _without_turns(step: Step, found: list[BranchPoint], near: float) -> list[BranchPoint]:
     """Without folds that lie on a branch point, where a bent branch turns but does not end."""
-    forks = [point for point in found if point.kind == "branch point"]
+    forks = [point for point in found if point.kind in _FORKS]
     return [point for point in found if point.kind != "fold"
             or all(abs(step.along(point.u) - step.along(fork.u)) > near for fork in forks)]
 

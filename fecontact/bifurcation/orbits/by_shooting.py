@@ -1,18 +1,22 @@
 """Branches of orbits by shooting, from motions, Hopf points and period doublings."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import continue_branch
-from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.predictor import BENT
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbit_methods import Shooting
-from fecontact.bifurcation.orbits.discretisation import Discretisation, Request, follow_orbits
+from fecontact.bifurcation.orbits.discretisation import (
+    Discretisation,
+    Request,
+    follow_orbits,
+    stepped_off,
+)
 from fecontact.bifurcation.orbits.mesh import interpolate
 from fecontact.bifurcation.orbits.orbit_points import ShotPoints
 from fecontact.bifurcation.orbits.restored import rescaled, restored_shooting
@@ -23,16 +27,11 @@ from fecontact.bifurcation.orbits.shooting import (
     shooting_from,
 )
 from fecontact.bifurcation.orbits.starts import Begun, MotionStart, Start
-from fecontact.core.errors import AnalysisError, FecontactError, InputError
+from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.ties import first_largest
 from fecontact.core.types import Array
 from fecontact.integrate.solvers import SetValued
 from fecontact.system.fields.vector_field import VectorField
-
-# Distance of the two halves of an orbit, relative to the largest one, at which a branch of doubled
-# orbits ends. Single orbits solve the equations too: closer to them the corrector may find either,
-# so the end is located on the branch of single orbits.
-_CLOSE = 0.1
 
 
 class ByShooting(ShotPoints, Discretisation):
@@ -241,102 +240,18 @@ def doubled(problem: ShootingProblem, u: Array, request: Request) -> Branch:
     single orbit, the branch ends with a point 'period halving': beyond it lie the same orbits with
     their halves exchanged.
     """
-    options = request.options
     twice, start, tangent = _doubled(problem, u)
-    tangent = request.sign * heading(tangent, twice.weights())
-    twice, start, tangent = twice.adapted(start + options.step * tangent, tangent)
-    found = follow_orbits(twice, start, options, tangent=tangent)
-    return _ended(found, problem, options)
-
-
-def _halves(u: Array, common: int) -> tuple[Array, Array]:
-    first, second = np.split(u[:-common], 2)
-    return first, second
-
-
-@dataclass(frozen=True, eq=False)
-class _Doubled(ShootingProblem):
-    """Doubled orbits with a test function for their return to single orbits.
-
-    ``apart`` (K d / 2,) is the difference of the halves of the last orbit, ``largest`` the largest
-    length of such a difference so far.
-    """
-
-    apart: Array = field(default_factory=lambda: np.zeros(0))
-    largest: float = 0.0
-
-    def length(self, apart: Array) -> float:
-        """Norm of a difference of the halves."""
-        return float(np.sqrt(self.weights()[: len(apart)] @ apart**2))
-
-    def adapted(self, u: Array, tangent: Array) -> "tuple[_Doubled, Array, Array]":
-        first, second = _halves(u, self.common)
-        return replace(self, reference=self.starts(u)[0].copy(), values=self.parameters(u),
-                       apart=first - second,
-                       largest=max(self.largest, self.length(first - second))), u, tangent
-
-    def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
-        first, second = _halves(u, self.common)
-        along = self.weights()[: len(first)] * self.apart @ (first - second)
-        return {**super().tests(u, linearisation, tangent), HALVING: float(
-            along / (self.length(self.apart) * self.largest) - _CLOSE)}
-
-    def examine(
-        self, kind: str, u: Array, linearisation: Any, tangent: Array
-    ) -> dict[str, Any] | None:
-        return {} if kind == HALVING else super().examine(kind, u, linearisation, tangent)
-
-
-def _ended(branch: Branch, single: ShootingProblem, options: ContinuationOptions) -> Branch:
-    """Complete a branch that returns to single orbits by its end point.
-
-    Points beyond it, reached within one step, are single orbits and are dropped.
-    """
-    common = single.common
-    weights = single.weights()[:-common]
-    sizes = np.array([np.sqrt(weights @ np.subtract(*_halves(point.u, common)) ** 2)
-                      for point in branch.points])
-    close = np.flatnonzero(sizes <= 1.1 * _CLOSE * np.maximum.accumulate(sizes))
-    if not len(close):
+    branch = stepped_off((twice, start, tangent), request, lambda u, tangent, options: (
+        follow_orbits(twice, u, options, tangent=tangent)))
+    *before, end = branch.points
+    if end.kind != HALVING:
         return branch
-    points = branch.points[: close[0] + 1]
-    branch = replace(branch, status=BranchStatus.CLOSED, message="")
-    before, last = points[-2:]
-    # The parameter is an even function of the distance of the halves.
-    one, other = sizes[close[0] - 1 : close[0] + 1] ** 2
-    there = last.parameter + other * (last.parameter - before.parameter) / (other - one)
-    first, second = _halves(last.u, common)
-    tail = last.u[-common:].copy()
-    tail[:-1] /= 2.0
-    tail[-1] = there
-    near = _doublings_near(single, np.concatenate([(first + second) / 2.0, tail]), options,
-                           abs(there - last.parameter), branch.parameter_name)
-    if not near:
-        return replace(branch, points=points[:-1])
-    closest = min(near, key=lambda point: abs(point.parameter - there))
-    start, tail = closest.u[:-common], closest.u[-common:].copy()
-    tail[:-1] *= 2.0
-    end = replace(last, kind=HALVING, u=np.concatenate([start, start, tail]), values={
-        **last.values, "period": 2.0 * closest.values["period"],
-        "multipliers": closest.values["multipliers"] ** 2})
-    return replace(branch, points=(*points[:-1], end))
+    half = twice.starts(end.u).reshape(2, -1).mean(axis=0)
+    whole = np.concatenate([half, half, end.u[-twice.common :]])
+    return replace(branch, points=(*before, replace(end, u=whole)))
 
 
-def _doublings_near(
-    single: ShootingProblem, u: Array, options: ContinuationOptions, off: float, name: str
-) -> tuple[BranchPoint, ...]:
-    """Period doublings of single orbits near u, within about ``off`` in the parameter."""
-    step = max(4.0 * off / float(single.scales[-1]), options.step)
-    low, high = options.bounds
-    beside = replace(options, step=step, largest_step=step, points=4, stop_at=(),
-                     bounds=(min(low, u[-1] - 20.0 * off), max(high, u[-1] + 20.0 * off)))
-    try:
-        return continue_branch(single, u, beside, name=name, both=True).of_kind("period doubling")
-    except FecontactError:
-        return ()
-
-
-def _doubled(problem: ShootingProblem, u: Array) -> tuple[_Doubled, Array, Array]:
+def _doubled(problem: ShootingProblem, u: Array) -> tuple[ShootingProblem, Array, Array]:
     """The orbit traversed twice, and the direction in which its halves separate."""
     starts = problem.starts(u)
     rounds = [run.monodromy for run in ShootingLinearisation(problem, u).runs]
@@ -356,8 +271,7 @@ def _doubled(problem: ShootingProblem, u: Array) -> tuple[_Doubled, Array, Array
         tail[0] *= 2.0
     start = np.concatenate([starts.reshape(-1), starts.reshape(-1), tail])
     shape = np.concatenate(carried)
-    twice = _Doubled(problem.field, problem.values, problem.free, mesh, problem.reference, scales,
-                     2 * problem.periods, problem.rtol, problem.derivative_rtol,
-                     problem.solver)
+    twice = replace(problem, mesh=mesh, scales=scales, periods=2 * problem.periods, limits=None,
+                    predictor=BENT)
     tangent = np.concatenate([shape, -shape, np.zeros(problem.common)])
     return twice, start, tangent

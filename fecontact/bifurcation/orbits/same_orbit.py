@@ -23,7 +23,7 @@ from fecontact.system.fields.vector_field import VectorField
 _SAMPLES = 512
 # Largest relative difference of halves that coincide, and smallest fraction of the tangent that
 # separates them.
-_HALVES_MEET, _HALVES_PART = 0.02, 0.9
+HALVES_MEET, HALVES_PART = 0.02, 0.9
 
 # How far behind the step, in twice its length, its bend may make a point ahead appear.
 _BEHIND = 0.25
@@ -129,8 +129,8 @@ def halves_meet(problem: CollocationEquations, u: Array, tangent: Array) -> bool
         return float((weights * (vector - interpolate(problem.mesh, vector, times)) ** 2).sum() / 4)
 
     motion = float((weights * (nodes - nodes.mean(axis=0)) ** 2).sum())
-    return (apart(nodes) < _HALVES_MEET**2 * motion
-            and apart(along) > _HALVES_PART * float((weights * along**2).sum()))
+    return (apart(nodes) < HALVES_MEET**2 * motion
+            and apart(along) > HALVES_PART * float((weights * along**2).sum()))
 
 
 def vanishing(problem: CollocationEquations, u: Array, least: float = _VANISHED) -> float:
@@ -164,7 +164,7 @@ def halves_apart(problem: CollocationEquations, u: Array) -> float:
     sums = np.empty(3)
     compare_halves(problem.mesh, problem.weights(), problem.nodes(u), problem.reference, sums)
     mixed, square, whole = sums.tolist()
-    if square < _HALVES_MEET**4 * whole:
+    if square < HALVES_MEET**4 * whole:
         return 1.0
     return float(mixed / square) - VANISHED_ON_CURVES
 

@@ -22,7 +22,15 @@ from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests, floquet_of, require_same
 from fecontact.bifurcation.orbits.mesh import interpolate, require_segments
 from fecontact.bifurcation.orbits.multiplier_rounding import MultiplierRounding
-from fecontact.bifurcation.orbits.same_orbit import VANISHING, near_saddle, same_place, shrunk
+from fecontact.bifurcation.orbits.same_orbit import (
+    HALVES_MEET,
+    HALVES_PART,
+    HALVING,
+    VANISHING,
+    near_saddle,
+    same_place,
+    shrunk,
+)
 from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns, by_differences
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array
@@ -161,9 +169,7 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
     def _grown(self, u: Array) -> Array:
         """Scales of states, period and parameter, enlarged with the orbit."""
         found = next((sizes for known, sizes in self.noted if known is u), None)
-        if self.limits is None or found is None:
-            return self.scales
-        return enlarged(self.scales, found, self.limits)
+        return self.scales if found is None else enlarged(self.scales, found, self.limits)
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Period, stability, segments and the extremes of the states."""
@@ -193,6 +199,29 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
         shares = np.repeat(np.diff(self.mesh) / _SAMPLES, _SAMPLES)
         near = self.autonomous and near_saddle(self, self.parameters(u), states, shares, tangent)
         return BranchStatus.HOMOCLINIC if near else None
+
+    def examine(
+        self, kind: str, u: Array, linearisation: Any, tangent: Array
+    ) -> dict[str, Any] | None:
+        """The kind of a torus bifurcation; None for a neutral saddle.
+
+        A branch point at which a doubled orbit becomes a single one is a period halving.
+        """
+        if kind == "branch point" and self._halves_meet(u, linearisation, tangent):
+            return {"kind": HALVING}
+        return super().examine(kind, u, linearisation, tangent)
+
+    def _halves_meet(self, u: Array, linearisation: Any, tangent: Array) -> bool:
+        """Whether an orbit is a single one traversed twice, whose halves the branch separates."""
+        if len(self.mesh) % 2 == 0:
+            return False
+        sizes = self.scales[: self.field.dimension]
+        apart, separating = (np.subtract(*np.split(self.starts(one) / sizes, 2))
+                             for one in (u, tangent))
+        motion = np.ptp(linearisation.paths, axis=(0, 1)) / sizes
+        along = np.linalg.norm(self.starts(tangent) / sizes)
+        return bool(np.linalg.norm(apart) < HALVES_MEET * np.linalg.norm(motion)
+                    and 0.5 * np.linalg.norm(separating) ** 2 > HALVES_PART * along**2)
 
     def _require_return(self, u: Array) -> None:
         """Raise AnalysisError unless the runs from u meet; a jump looks like a solution."""
