@@ -79,6 +79,8 @@ class BranchSettings(RangeSettings):
         for none.
     """
 
+    section = "branch"
+
     parameter: str | None = None
     bounds: tuple[float, float] | None = None
     start: float | None = None
@@ -127,14 +129,6 @@ class BranchSettings(RangeSettings):
             if getattr(self, name) > most:
                 raise InputError(f"BranchSettings: {name} = {getattr(self, name)} must be at most "
                                  f"{most}.")
-
-    @property
-    def checked_bounds(self) -> tuple[float, float]:
-        """The bounds; InputError where there are none."""
-        if self.bounds is None:
-            raise InputError("[branch] lacks the key 'bounds', the least and largest value of the "
-                             "parameter; give it, or --bounds LOW HIGH.")
-        return self.bounds
 
     @property
     def checked_parameter(self) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from fecontact.bifurcation.continuation.follow import regular
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
 from fecontact.bifurcation.harmonic.engine_order import EngineOrder
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import (
@@ -31,7 +32,7 @@ def unfinished(mode: NonlinearMode, points: int) -> bool:
     """Whether a mode was interrupted, or has fewer points than are asked for now."""
     status = mode.branch.status
     return status is BranchStatus.INTERRUPTED or (
-        status is BranchStatus.POINTS and _regular(mode) < points)
+        status is BranchStatus.POINTS and regular(mode.branch.points) < points)
 
 
 def follow_mode(
@@ -71,7 +72,7 @@ def follow_mode(
     parts = not method.refines
     mode = _whole_parts(earlier) if earlier is not None and parts else None
     while True:
-        done = 0 if mode is None else _regular(mode)
+        done = 0 if mode is None else regular(mode.branch.points)
         most = min(wanted.points, done + _PART) if parts else wanted.points
         options = replace(mode_options(most), progress=_counted(progress, done))
         try:
@@ -82,14 +83,11 @@ def follow_mode(
             if mode is None:
                 raise
             return _interrupted(mode)
-        if mode.branch.status is not BranchStatus.POINTS or _regular(mode) >= wanted.points:
+        branch = mode.branch
+        if branch.status is not BranchStatus.POINTS or regular(branch.points) >= wanted.points:
             return mode
         if keep is not None:
             keep(_interrupted(mode))
-
-
-def _regular(mode: NonlinearMode) -> int:
-    return sum(point.kind is None for point in mode.branch.points)
 
 
 def _whole_parts(mode: NonlinearMode) -> NonlinearMode | None:

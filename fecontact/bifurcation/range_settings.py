@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 class RangeSettings:
     """Checks and options of settings in which a parameter goes through a range in steps."""
 
+    section = ""  # of a study file
+    parameter: str | None
     bounds: tuple[float, float] | None
     start: float | None
     step: float
@@ -39,7 +41,11 @@ class RangeSettings:
     @property
     def checked_bounds(self) -> tuple[float, float]:
         """The bounds; InputError where there are none."""
-        raise NotImplementedError
+        if self.bounds is None:
+            raise InputError(f"[{self.section}] lacks the key 'bounds', the least and largest "
+                             f"value of {self.parameter or 'the parameter'}; give it, or --bounds "
+                             f"LOW HIGH.")
+        return self.bounds
 
     @property
     def first(self) -> float:

@@ -84,6 +84,8 @@ class ResponseSettings(RangeSettings):
         ``["C x", "B y"]``: a point or number of a contact node, and a component.
     """
 
+    section = "response"
+
     parameter: str = "drive.frequency_hz"
     bounds: tuple[float, float] | None = None
     start: float | None = None
@@ -175,14 +177,6 @@ class ResponseSettings(RangeSettings):
     def over_frequency(self) -> bool:
         """Whether the parameter is a frequency [Hz]."""
         return self.parameter.rpartition(".")[2] == _FREQUENCY
-
-    @property
-    def checked_bounds(self) -> tuple[float, float]:
-        """The bounds; InputError where there are none."""
-        if self.bounds is None:
-            raise InputError(f"[response] lacks the key 'bounds', the least and largest value of "
-                             f"{self.parameter}; give it, or --bounds LOW HIGH.")
-        return self.bounds
 
     @property
     def also_observed(self) -> tuple[tuple[str | int, str], ...]:

@@ -68,7 +68,7 @@ def test_arrays_between_two_systems_are_those_of_systems_made_there(names, dashp
     assert multilinear(names, system.drive, system.load)
     ranges = tuple((name, (0.4, 2.9)) for name in names)
     field, rng = field_between(system, ranges), np.random.default_rng(1)
-    assert field._family.varying
+    assert field.family.varying
     for _ in range(5):
         values = rng.uniform(0.35, 2.95, len(names))
         made = system.with_(**dict(zip(names, values.tolist(), strict=True))).arrays
@@ -155,7 +155,7 @@ def test_a_function_of_the_user_may_have_the_name_of_a_parameter():
 
     system = masses(drive=driven())
     field = contact_field(system, {FREQUENCY: (1.3, in_radians)})
-    assert not field._family.multilinear
+    assert not field.family.multilinear
     turn, period = timing_of(field, np.array([1.3]), 0)
     assert (turn, period) == (pytest.approx(TURN, rel=1e-14), None)
 

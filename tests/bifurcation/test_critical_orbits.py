@@ -68,7 +68,7 @@ def other_test(problem, u, direction):
     """A function of the multipliers, or of the tangent, that is zero on the curve."""
     orbit = problem.orbit.linearise(u)
     if problem.kind != "fold":
-        minus, _, pairs = orbit.floquet.products
+        minus, _, pairs = orbit.floquet.products()
         return minus if problem.kind == "period doubling" else pairs
     # The parameter's component in the tangent at a fixed second parameter.
     side = np.eye(len(u))[-2]

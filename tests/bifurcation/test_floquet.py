@@ -132,9 +132,9 @@ def test_test_functions_change_sign_where_they_should():
         return Floquet(np.array([1.0, *mu], dtype=complex), 0)
 
     pair = 0.6 + 0.79j
-    assert at(-0.99, 0.2).products[0] * at(-1.01, 0.2).products[0] < 0.0
-    assert at(0.99, 0.2).products[1] * at(1.01, 0.2).products[1] < 0.0
+    assert at(-0.99, 0.2).products()[0] * at(-1.01, 0.2).products()[0] < 0.0
+    assert at(0.99, 0.2).products()[1] * at(1.01, 0.2).products()[1] < 0.0
     inside, outside = pair / abs(pair) * 0.99, pair / abs(pair) * 1.01
-    assert (at(inside, inside.conjugate(), 0.3).products[2]
-            * at(outside, outside.conjugate(), 0.3).products[2]) < 0.0
+    assert (at(inside, inside.conjugate(), 0.3).products()[2]
+            * at(outside, outside.conjugate(), 0.3).products()[2]) < 0.0
     assert at(outside, outside.conjugate(), 0.3).unstable == 2

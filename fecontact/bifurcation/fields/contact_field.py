@@ -1,7 +1,7 @@
 """A contact system as a vector field of some of its parameters."""
 
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from copy import copy
 from functools import cached_property
 from types import MappingProxyType
@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.fields.corners import AffineArrays
 from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
 from fecontact.core.checks import as_texts, require_kind
 from fecontact.core.types import Array
@@ -36,10 +35,10 @@ _FORCING = frozenset({"drive_parameters", "drive_shapes", "load_parameters", "lo
 
 
 class ContactField(VectorField):
-    """See :func:`contact_field`."""
+    """See :func:`contact_field`; its systems are those of ``family``."""
 
     def __init__(self, family: ParametrisedSystem) -> None:
-        self._family = family
+        self.family = family
         self.parameters = MappingProxyType(dict(family.parameters))
         self._base_values = self.values
         base = family.base
@@ -53,8 +52,8 @@ class ContactField(VectorField):
 
     def _moves_forcing(self, varying: frozenset[str]) -> bool:
         moved = varying & _FORCING
-        ground = self._family.base.ground
-        steady = self._family.base.prescribed_motion.constant
+        ground = self.family.base.ground
+        steady = self.family.base.prescribed_motion.constant
         flat = not ground.wavy and ground.friction_variation is None and steady
         if flat and "profile_parameters" not in moved:
             moved = moved - {"ground_motion_parameters", "second_motion_parameters", "sliding",
@@ -77,7 +76,7 @@ class ContactField(VectorField):
         InputError
             If a value is out of its parameter's range.
         """
-        return self._family.system(self.values if values is None else values)
+        return self.family.system(self.values if values is None else values)
 
     def parameter_label(self, name: str) -> str:
         """Label of a parameter, such as ``force at B x [N]`` for ``load.forces.0...amplitude``."""
@@ -89,7 +88,7 @@ class ContactField(VectorField):
 
     def arrays(self, values: Array) -> SystemArrays:
         """Arrays of the system for kernels, for parameter values (k,)."""
-        found = self._family.arrays(values)
+        found = self.family.arrays(values)
         return without_elements(found) if self._bare else found
 
     def without_elements(self) -> "ContactField":
@@ -98,7 +97,7 @@ class ContactField(VectorField):
         It has the same parameters, those of friction too.
         """
         found = copy(self)
-        found._bare, found.state_names = True, self.state_names[: 2 * self._family.base.basis.modes]
+        found._bare, found.state_names = True, self.state_names[: 2 * self.family.base.basis.modes]
         return found
 
     @property
@@ -126,7 +125,7 @@ class ContactField(VectorField):
         columns = []
         for index in chosen:
             column = np.empty((n, d))
-            slopes = self._family.slopes(values, index, _STEP * (abs(float(values[index])) or 1.0))
+            slopes = self.family.slopes(values, index, _STEP * (abs(float(values[index])) or 1.0))
             kernels.batch_derivatives(t, x, arrays, slopes, self._step(values, index), f, J, column)
             columns.append(column)
         P = columns[0][:, :, np.newaxis] if len(columns) == 1 else np.stack(columns, axis=2)
@@ -155,7 +154,7 @@ class ContactField(VectorField):
         AnalysisError
             If what is given in time is not periodic.
         """
-        if DRIVE_FREQUENCY in self._family.own or (
+        if DRIVE_FREQUENCY in self.family.own or (
                 list(self.parameters)[index] != DRIVE_FREQUENCY):
             return False
         return drive_sets_period(self.system() if len(values) == 1 else self.system(values))
@@ -175,7 +174,7 @@ class ContactField(VectorField):
         InputError
             For a point or a component that does not exist.
         """
-        basis = self._family.base.basis
+        basis = self.family.base.basis
         row = np.zeros(self.dimension)
         row[: basis.modes] = basis.point_row(point, component)
         return row
@@ -197,31 +196,6 @@ def field_between(
     while len(kept) > _KEPT:
         kept.popitem(last=False)
     return found
-
-
-def affine_arrays(field: ContactField, values: Array, index: int) -> AffineArrays | None:
-    """Arrays of a field over one parameter; see :meth:`ParametrisedSystem.affine`."""
-    return field._family.affine(values, index)
-
-
-def made_values(field: ContactField, values: Array, index: int) -> list[float]:
-    """Further values of one parameter for which a field has systems already."""
-    return [value for value in field._family.made_for(values, index) if value != values[index]]
-
-
-def with_parameter(
-    field: ContactField, name: str, value: float,
-    setter: Callable[[ContactSystem, float], ContactSystem],
-) -> ContactField:
-    """The field with a further parameter, the last one, that a function sets."""
-    return ContactField(field._family.with_parameter(name, value, setter))
-
-
-def family_on(
-    field: ContactField, make: Callable[[ContactSystem], ContactSystem]
-) -> ParametrisedSystem:
-    """The parameters of a field for another system, made from its own."""
-    return field._family.on(make(field._family.base))
 
 
 def contact_field(

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.fields.contact_field import ContactField, family_on
+from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.parametrised_system import ParametrisedSystem
 from fecontact.core.checks import require_kind
 from fecontact.core.errors import AnalysisError, InputError
@@ -145,7 +145,7 @@ class EngineOrder:
             return field
         if not isinstance(field, ContactField):
             raise InputError("EngineOrder: only contact systems have sectors.")
-        return WaveField(family_on(field, self.system), self)
+        return WaveField(field.family.on(self.system(field.family.base)), self)
 
     def excited(self, field: ContactField, values: Array) -> "WaveField":
         """The field of the part of the harmonic forces that acts, its only parameter."""

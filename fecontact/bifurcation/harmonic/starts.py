@@ -11,7 +11,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.newton import damped_newton
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.predictor import BENT
-from fecontact.bifurcation.fields.contact_field import ContactField, made_values
+from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.compiled.balance import CompiledBalance
 from fecontact.bifurcation.harmonic.engine_order import WaveField, Waves
 from fecontact.bifurcation.harmonic.layout import kept_by, layout_of
@@ -82,8 +82,8 @@ def timing_of(
             return 1.0, None
     except FecontactError:
         return None, None
-    made = made_values(field, values, free) if isinstance(field, ContactField) else []
-    places = [value for value in made if value * here > 0.0][: 1 + len(_BESIDE)]
+    made = field.family.made_for(values, free) if isinstance(field, ContactField) else []
+    places = [value for value in made if value * here > 0.0 and value != here][: 1 + len(_BESIDE)]
     if len(places) <= len(_BESIDE) or np.ptp(places) < _APART * abs(here):
         places = [here, *(here * factor for factor in _BESIDE)]
     periods, products = [], []

@@ -95,24 +95,19 @@ class Floquet:
 
         ``slope`` is the derivative of the parameter along the branch, in widths of the diagram.
         """
-        doubling, unit, torus = self.products
+        doubling, unit, torus = self.products()
         # A multiplier also passes one at a fold, but there the parameter turns.
         return {"period doubling": doubling, "torus": torus,
                 "branch point": -unit if slope <= -FLAT else unit}
 
-    @property
-    def products(self) -> tuple[float, float, float]:
+    def products(self, *critical: complex) -> tuple[float, float, float]:
         """Functions that change sign where a multiplier passes -1, where one passes 1, and where
         a pair passes the unit circle, or the product of two real ones passes one (neutral saddle).
+
+        Multipliers next to the critical ones are left out.
         """
         out = np.empty(3)
-        multiplier_tests(self.multipliers, -1 if self.trivial is None else self.trivial, out)
-        return float(out[0]), float(out[1]), float(out[2])
-
-    def rest_products(self, *critical: complex) -> tuple[float, float, float]:
-        """The :attr:`products` without the multipliers next to the critical ones."""
-        rest, out = self.noncritical(*critical), np.empty(3)
-        multiplier_tests(np.ascontiguousarray(rest), -1, out)
+        multiplier_tests(self.noncritical(*critical), out)
         return float(out[0]), float(out[1]), float(out[2])
 
     def noncritical(self, *critical: complex) -> NDArray[np.complex128]:
@@ -122,29 +117,27 @@ class Floquet:
             rest = np.delete(rest, np.argmin(np.abs(rest - one)))
         return rest
 
-    def turning(self, *critical: complex) -> bool:
-        """Whether a complex pair beside the critical multipliers lies on the unit circle."""
+    def turning(self, *critical: complex) -> complex | None:
+        """The multiplier beside the critical ones, with Im mu > 0, that lies on the unit circle."""
         rest = self.noncritical(*critical)
         pairs = rest[rest.imag > 1e-6]
-        return bool(len(pairs)) and float(np.abs(np.abs(pairs) - 1.0).min()) <= _NEAR
+        away = np.abs(np.abs(pairs) - 1.0)
+        return complex(pairs[np.argmin(away)]) if away.min(initial=np.inf) <= _NEAR else None
 
     def confirmed(self, kind: str) -> dict[str, Any] | None:
         """Classify a zero of a test function by the multipliers; None if it is no special point.
 
         A torus bifurcation becomes 'Neimark-Sacker', with the angle of the pair.
         """
-        mu = self.others
         if kind in ("period doubling", "torus") and self.trivial_error > LOST:
             return None
         if kind == "period doubling":
-            return {} if np.abs(mu + 1.0).min() <= _NEAR else None
+            return {} if np.abs(self.others + 1.0).min() <= _NEAR else None
         if kind != "torus":
             return {}
-        pairs = mu[mu.imag > 1e-6]
-        if not len(pairs) or np.abs(np.abs(pairs) - 1.0).min() > _NEAR:
-            return None
-        critical = pairs[np.argmin(np.abs(np.abs(pairs) - 1.0))]
-        return {"kind": "Neimark-Sacker", "angle": float(np.angle(critical))}
+        critical = self.turning()
+        return None if critical is None else {
+            "kind": "Neimark-Sacker", "angle": float(np.angle(critical))}
 
 
 def floquet_of(factors: CondensedFactors, autonomous: bool) -> Floquet:
@@ -199,22 +192,18 @@ _PAIR = 1e-6
 
 
 @kernel
-def multiplier_tests(mu: ComplexVector, trivial: int, out: Vector) -> None:
+def multiplier_tests(mu: ComplexVector, out: Vector) -> None:
     """Fill out (3,) with the products of mu + 1, mu - 1 and, over pairs, mu_i mu_k - 1, scaled.
 
-    The multiplier ``trivial`` is excluded unless it is negative. The products change sign where a
-    multiplier passes -1, where one passes 1, and where a complex pair crosses the unit circle.
+    They change sign where a multiplier passes -1, where one passes 1, and where a complex pair
+    crosses the unit circle.
     """
     minus, plus, pairs = 1.0 + 0.0j, 1.0 + 0.0j, 1.0 + 0.0j
     for i in range(len(mu)):
-        if i == trivial:
-            continue
         size = 1.0 + abs(mu[i])
         minus *= (mu[i] + 1.0) / size
         plus *= (mu[i] - 1.0) / size
         for k in range(i + 1, len(mu)):
-            if k == trivial:
-                continue
             both = mu[i] * mu[k]
             if abs(both) < np.inf:
                 pairs *= (both - 1.0) / (abs(both) + 1.0)

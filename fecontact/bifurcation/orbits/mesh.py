@@ -43,11 +43,15 @@ class Rule:
     fine: Array
 
 
-def basis_polynomials(degree: int) -> list[np.polynomial.Polynomial]:
-    """Polynomials that are one at one of m + 1 equidistant nodes in [0, 1], zero at the others."""
-    nodes = np.linspace(0.0, 1.0, degree + 1)
-    found = [np.polynomial.Polynomial.fromroots(np.delete(nodes, k)) for k in range(degree + 1)]
+def lagrange(nodes: Array) -> list[np.polynomial.Polynomial]:
+    """Polynomials that are one at one of some nodes, and zero at the others."""
+    found = [np.polynomial.Polynomial.fromroots(np.delete(nodes, k)) for k in range(len(nodes))]
     return [p / p(node) for p, node in zip(found, nodes, strict=True)]
+
+
+def basis_polynomials(degree: int) -> list[np.polynomial.Polynomial]:
+    """Those of m + 1 equidistant nodes in [0, 1]."""
+    return lagrange(np.linspace(0.0, 1.0, degree + 1))
 
 
 def basis_at_points(degree: int, points: Array) -> tuple[Array, Array]:

@@ -20,7 +20,7 @@ from fecontact.bifurcation.orbits.collocation_kernels import (
     fill_smooth_errors,
     integrate_defect,
 )
-from fecontact.bifurcation.orbits.mesh import rule
+from fecontact.bifurcation.orbits.mesh import basis_at_points, lagrange, rule
 from fecontact.core.types import Array
 
 # Factor between integrated defect and smooth error from which on the error itself counts, and the
@@ -64,18 +64,12 @@ class _Halves:
 def _halves(degree: int) -> _Halves:
     gauss = rule(degree).points
     points = np.concatenate([gauss, 1.0 + gauss]) / 2.0
-    nodes = np.linspace(0.0, 1.0, degree + 1)
-    basis = [np.polynomial.Polynomial.fromroots(np.delete(nodes, k)) for k in range(degree + 1)]
-    basis = [p / p(node) for p, node in zip(basis, nodes, strict=True)]
-    through = [np.polynomial.Polynomial.fromroots(np.delete(gauss, k)) for k in range(degree)]
-    through = [(p / p(c)).integ() for p, c in zip(through, gauss, strict=True)]
+    through = [p.integ() for p in lagrange(gauss)]
     ends = np.concatenate([np.arange(1, 2 * degree + 1) / (2 * degree), gauss])
     both = np.clip(2.0 * ends[:, None] - np.arange(2.0), 0.0, 1.0)
     integrals = 0.5 * np.concatenate(
         [np.array([p(place) - p(0.0) for p in through]).T for place in both.T], axis=1)
-    return _Halves(points, np.array([[p(x) for p in basis] for x in points]),
-                   np.array([[p.deriv()(x) for p in basis] for x in points]),
-                   np.ascontiguousarray(integrals))
+    return _Halves(points, *basis_at_points(degree, points), np.ascontiguousarray(integrals))
 
 
 def state_error(

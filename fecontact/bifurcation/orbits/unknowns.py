@@ -6,6 +6,7 @@ unknown, which it is if rates do not depend on time.
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -32,8 +33,9 @@ def by_differences(
 
 
 class FreeParameters:
-    """Values (k,) of parameters, of which one is followed, ``free``, or a ``second`` one too."""
+    """Values (k,) of parameters of a field, ``free`` followed, and perhaps a ``second`` one."""
 
+    field: Any
     values: Array
     free: int
     second: int | None = None
@@ -43,6 +45,11 @@ class FreeParameters:
         """Indices of the parameters that are unknowns, in their order in u."""
         return (self.free,) if self.second is None else (self.second, self.free)
 
+    @property
+    def parameter_name(self) -> str:
+        """Name of the parameter that is followed."""
+        return list(self.field.parameters)[self.free]
+
     def parameters(self, u: Array) -> Array:
         """Parameter values (k,)."""
         values = self.values.copy()
@@ -51,17 +58,18 @@ class FreeParameters:
             values[self.second] = u[-2]
         return values
 
+    def named(self, u: Array) -> dict[str, float]:
+        """Values of the parameters that are unknowns, by name."""
+        names, count = list(self.field.parameters), len(self.active)
+        return {names[index]: float(value)
+                for index, value in zip(self.active, u[-count:], strict=True)}
+
 
 class OrbitUnknowns(FreeParameters):
     """Period and parameters of an orbit over ``periods`` periods of the forcing of a field."""
 
     field: VectorField
     periods: int
-
-    @property
-    def parameter_name(self) -> str:
-        """Name of the parameter that is followed."""
-        return list(self.field.parameters)[self.free]
 
     @cached_property
     def autonomous(self) -> bool:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.fields.contact_field import ContactField, with_parameter
+from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.tori.method import SecondExcitation
 from fecontact.core.errors import InputError, choices
 from fecontact.core.types import Array
@@ -123,7 +123,7 @@ def excitation_of(field: VectorField, second: SecondExcitation | str | None) -> 
                          f"system; for a field of your own give SecondExcitation(phase, "
                          f"frequency_hz).")
     _names(field.system(), second)
-    shifted = with_parameter(field, _PHASE, 0.0, partial(_delayed, second))
+    shifted = ContactField(field.family.with_parameter(_PHASE, 0.0, partial(_delayed, second)))
     return Excitation(field, partial(_frequency_of, field, second, False),
                       partial(_frequency_of, field, second, True), shifted)
 

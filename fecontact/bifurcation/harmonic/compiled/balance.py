@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.fields.contact_field import ContactField, affine_arrays
+from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.corners import AffineArrays
 from fecontact.bifurcation.harmonic.compiled import arrays
 from fecontact.bifurcation.harmonic.compiled.evaluation import (
@@ -82,7 +82,8 @@ class CompiledBalance:
             self.held = held
             values = problem.values.copy()
             values[problem.free] = value
-            near = self.affine = affine_arrays(self.contact_field, values, problem.free)
+            near = self.affine = self.contact_field.family.affine(
+                values, problem.free)
             self.known.clear()
         if near is None:
             return None

@@ -128,10 +128,7 @@ class OrbitCurve(Problem):
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Both parameters and the values stored on a branch of orbits."""
-        names = list(self.orbit.field.parameters)
-        assert self.orbit.second is not None
-        return {names[self.orbit.second]: float(u[-2]), names[self.orbit.free]: float(u[-1]),
-                **self.orbit.point_of(u, linearisation.orbit,
+        return {**self.orbit.named(u), **self.orbit.point_of(u, linearisation.orbit,
                                       lambda _, side: linearisation.orbit_change(side, tangent)),
                 "unstable": 0}
 
@@ -151,7 +148,7 @@ class OrbitCurve(Problem):
         if self.kind == "period":
             return {}
         floquet = linearisation.orbit.floquet
-        flip, unit, pair = floquet.rest_products(*linearisation.critical)
+        flip, unit, pair = floquet.products(*linearisation.critical)
         if self.kind == "fold":
             return {"cusp": linearisation.bend, "resonance 1:1": unit, "fold-flip": flip,
                     "fold-Neimark-Sacker": pair}
@@ -190,7 +187,7 @@ class OrbitCurve(Problem):
         if kind != "fold":
             floquet, pair = linearisation.orbit.floquet, _PAIRS.get(self.kind)
             # The product of two real multipliers may be one too.
-            if kind == pair and not floquet.turning(*linearisation.critical):
+            if kind == pair and floquet.turning(*linearisation.critical) is None:
                 return None
             return orbit_form(kind, self.orbit, u, linearisation.orbit,
                               *self._pairs(linearisation, kind))
