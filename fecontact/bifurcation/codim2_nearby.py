@@ -227,10 +227,7 @@ def _hopf_at(
     found = hopf(field, state, values, default_scales(there), 1j * w)
     header = BranchHeader(over, attributes_of(field, values))
     u = np.append(state, values[field.index(over)])
-    made = special_point(u, np.zeros_like(u), {"state": state}, "Hopf", {
-        "angular_frequency": found.angular_frequency, "eigenvector": found.eigenvector,
-        "frequency_hz": found.angular_frequency / (2.0 * np.pi),
-        "period": 2.0 * np.pi / found.angular_frequency, "criticality": found.criticality}, header)
+    made = special_point(u, np.zeros_like(u), {"state": state}, "Hopf", found.details, header)
     assert isinstance(made, HopfPoint)
     return made
 

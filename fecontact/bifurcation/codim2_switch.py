@@ -56,13 +56,7 @@ def values_at(field: VectorField, point: BranchPoint, parameter: str) -> Array:
     if "widths" not in known:
         raise InputError(f"{point.place} does not know the other parameters of its field: follow "
                          f"its curve once more.")
-    values = field.values
-    for name, value in zip(known["parameter_names"], np.asarray(known["parameter_values"]),
-                           strict=True):
-        values[field.index(str(name))] = value
-    for name, value in zip(both, point.u[[-1, -2]].tolist(), strict=True):
-        values[field.index(name)] = value
-    return values
+    return point._curve_values(field)
 
 
 def tangent_at(problem: Problem, u: Array, direction: float) -> Array:

@@ -202,17 +202,14 @@ class BranchPoint(Summarised):
             another number of states.
         """
         require_field(field)
-        known, values = self.branch.attributes, field.values
+        known = self.branch.attributes
         if "condition" in known:
             return self._curve_values(field)
         if "parameters" in known or "parameter_values" not in known:
             raise InputError(f"{self.place} is on no branch of equilibria or orbits over one "
                              f"parameter; at a value on a curve over two an event of "
                              f"ContinuationOptions gives a point.")
-        names = known.get("parameter_names", list(field.parameters))
-        for name, value in zip(names, np.asarray(known["parameter_values"]), strict=True):
-            values[field.index(str(name))] = value
-        values[field.index(self.branch.parameter_name)] = self.parameter
+        values = self._values_of(field, self.branch.parameter_name)
         states = len(known.get("state_names", field.state_names))
         if states != field.dimension:
             raise InputError(f"{self.place} has {states} states, but the field {field.dimension}.")
@@ -220,11 +217,15 @@ class BranchPoint(Summarised):
 
     def _curve_values(self, field: VectorField) -> Array:
         """Values (k,) of all parameters of a field at a point of a curve over two of them."""
+        return self._values_of(field, *self.branch.attributes["parameters"])
+
+    def _values_of(self, field: VectorField, *unknown: str) -> Array:
+        """Values (k,) of the parameters of the branch, the last unknowns those of these names."""
         known, values = self.branch.attributes, field.values
-        for name, value in zip(known["parameter_names"], np.asarray(known["parameter_values"]),
-                               strict=True):
+        names = known.get("parameter_names", list(field.parameters))
+        for name, value in zip(names, np.asarray(known["parameter_values"]), strict=True):
             values[field.index(str(name))] = value
-        for name, value in zip(known["parameters"], self.u[[-1, -2]].tolist(), strict=True):
+        for name, value in zip(unknown, self.u[::-1].tolist(), strict=False):
             values[field.index(str(name))] = value
         return values
 

@@ -170,4 +170,4 @@ def _problem(
     width = width_of(width, chosen, begin.values[index])
     sizes = default_scales(begin) if scales is None else sizes_of(scales, begin.state)[0]
     limits = _GROWTH * sizes if scales is None else None
-    return EquilibriumProblem(field, begin.values, index, sizes, width, limits), chosen
+    return EquilibriumProblem(field, begin.values, index, np.append(sizes, width), limits), chosen

@@ -14,17 +14,17 @@ W. Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, SIAM 20
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from fecontact.bifurcation.continuation.problem import Problem
 from fecontact.bifurcation.equilibria.codim2_forms import codim2_form
-from fecontact.bifurcation.equilibria.equilibrium import solution
+from fecontact.bifurcation.equilibria.equilibrium import DenseEquations
 from fecontact.bifurcation.equilibria.normal_forms import hopf, null_vectors
 from fecontact.bifurcation.equilibria.problem import pair_test
 from fecontact.bifurcation.fields.multilinear_forms import bend
+from fecontact.bifurcation.orbits.unknowns import FreeParameters
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array, ComplexArray
 from fecontact.system.complex_modes import sorted_eigenvalues
@@ -34,20 +34,7 @@ from fecontact.system.fields.vector_field import VectorField
 _NEAR_ZERO = 1e-12
 
 
-@dataclass(frozen=True, eq=False)
-class _Augmented:
-    """Residual and derivative (N, N + 1) of an augmented system, with intermediate results."""
-
-    residual: Array
-    matrix: Array
-    jacobian: Array
-    made: dict[str, Any]
-
-    def solve(self, row: Array, rhs: Array) -> Array:
-        return solution(np.vstack([self.matrix, row]), rhs)
-
-
-class PlaneCurve(Problem):
+class PlaneCurve(FreeParameters, Problem):
     """Equilibria with a border at zero; u = [x, (w^2,) second parameter, first parameter].
 
     ``active`` are the indices of both parameters, in the order in which they stand in u.
@@ -57,16 +44,10 @@ class PlaneCurve(Problem):
         self, field: VectorField, values: Array, active: tuple[int, int], sizes: Array,
         limits: Array, b: Array, c: Array,
     ) -> None:
-        self.field, self.active = field, active
+        self.field, (self.second, self.free) = field, active
         self.scales = sizes[: field.dimension]
         self._sizes, self._limits = sizes, limits
-        self._values, self._b, self._c = values.copy(), b, c
-
-    def values(self, u: Array) -> Array:
-        """Parameter values (k,) at u."""
-        values = self._values.copy()
-        values[list(self.active)] = u[-2:]
-        return values
+        self.values, self._b, self._c = values.copy(), b, c
 
     def weights(self) -> Array:
         """Weights of states, (w^2,) and parameters in the inner product."""
@@ -75,7 +56,7 @@ class PlaneCurve(Problem):
     def evaluated(self, u: Array) -> tuple[Array, Array, Array, Array]:
         """State, f, J and df/dp to both parameters."""
         x = np.ascontiguousarray(u[: self.field.dimension])
-        f, J, P = self.field.derivatives(np.zeros(1), x[None], self.values(u), self.active)
+        f, J, P = self.field.derivatives(np.zeros(1), x[None], self.parameters(u), self.active)
         if not (np.isfinite(J).all() and np.isfinite(f).all()):
             raise AnalysisError("The rates are not finite there.")
         return x, f[0], J[0], P[0]
@@ -93,27 +74,25 @@ class PlaneCurve(Problem):
 
     def curvature(self, x: Array, u: Array, direction: Array) -> Array:
         """Directional derivative (d, d + 2) of [J, P] along a direction (d,)."""
-        return bend(self.field, x, self.values(u), np.ascontiguousarray(direction), self.scales,
+        return bend(self.field, x, self.parameters(u), np.ascontiguousarray(direction), self.scales,
                     self.active, every=4)[0].first
 
     def renewed(self, u: Array, b: Array, c: Array) -> "PlaneCurve":
         """Curve with new borders, and with scales that grow with the states."""
         larger = np.clip(np.abs(u), self._sizes, self._limits)
         sizes = np.where(larger > 1.5 * self._sizes, larger, self._sizes)
-        return type(self)(self.field, self._values, self.active, sizes, self._limits, b, c)
+        active = self.active[0], self.active[1]
+        return type(self)(self.field, self.values, active, sizes, self._limits, b, c)
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
         """State, parameters by name, and the values of :meth:`stored`."""
-        names = list(self.field.parameters)
-        named = {names[index]: float(value)
-                 for index, value in zip(self.active, u[-2:], strict=True)}
-        return {"state": u[: self.field.dimension].copy(), **named,
+        return {"state": u[: self.field.dimension].copy(), **self.named(u),
                 **self.stored(u, linearisation)}
 
     def form(self, kind: str, u: Array, w: float = 0.0, other: float = 0.0) -> dict[str, Any]:
         """Normal form of a point of codimension two with pairs of these angular frequencies."""
         x = np.ascontiguousarray(u[: self.field.dimension])
-        return codim2_form(kind, self.field, x, self.values(u), self.scales, w, other)
+        return codim2_form(kind, self.field, x, self.parameters(u), self.scales, w, other)
 
     @abstractmethod
     def stored(self, u: Array, linearisation: Any) -> Mapping[str, Any]:
@@ -123,13 +102,14 @@ class PlaneCurve(Problem):
 class FoldCurve(PlaneCurve):
     """f = 0, g(0) = 0."""
 
-    def linearise(self, u: Array) -> _Augmented:
+    def linearise(self, u: Array) -> DenseEquations:
         """The augmented equations about u."""
         x, f, J, P = self.evaluated(u)
         v, w, g = self.bordered(J, 0.0)
         curvature = self.curvature(x, u, v)
         matrix = np.vstack([np.hstack([J, P]), -w @ curvature])
-        return _Augmented(np.append(f, g), matrix, J, {"v": v, "w": w, "curvature": curvature})
+        return DenseEquations(np.append(f, g), matrix, len(x),
+                              {"v": v, "w": w, "curvature": curvature})
 
     def adapted(self, u: Array, tangent: Array) -> tuple[Problem, Array, Array]:
         """Curve with borders computed at u; u and the tangent are unchanged."""
@@ -167,7 +147,7 @@ class FoldCurve(PlaneCurve):
 class HopfCurve(PlaneCurve):
     """f = 0 and, l = sqrt(-w^2), the even and the odd part of g(l): (g(l) +- g(-l)) / (2, 2 l)."""
 
-    def linearise(self, u: Array) -> _Augmented:
+    def linearise(self, u: Array) -> DenseEquations:
         """The augmented equations about u."""
         x, f, J, P = self.evaluated(u)
         d = len(x)
@@ -198,7 +178,7 @@ class HopfCurve(PlaneCurve):
                                      (d + 1, 0.5 * (gradient[0] - gradient[1]) / root, odd_slope)):
             matrix[row, :d], matrix[row, d + 1 :] = part.real[:d], part.real[d:]
             matrix[row, d] = its_slope.real
-        return _Augmented(np.append(f, [even.real, odd.real]), matrix, J, {"square": square})
+        return DenseEquations(np.append(f, [even.real, odd.real]), matrix, d)
 
     def adapted(self, u: Array, tangent: Array) -> tuple[Problem, Array, Array]:
         """Curve with borders computed at u; u and the tangent are unchanged."""
@@ -227,7 +207,7 @@ class HopfCurve(PlaneCurve):
             found["zero-Hopf"] = float(sign * np.linalg.svd(J, compute_uv=False)[-1])
         return found
 
-    def _lyapunov(self, u: Array, linearisation: _Augmented) -> float:
+    def _lyapunov(self, u: Array, linearisation: DenseEquations) -> float:
         """First Lyapunov coefficient, computed once; NaN beyond a Bogdanov-Takens point."""
         made = linearisation.made
         if "lyapunov" not in made:
@@ -235,7 +215,7 @@ class HopfCurve(PlaneCurve):
             square = u[self.field.dimension]
             if square > 0.0 and (np.linalg.eigvals(linearisation.jacobian).imag > 0.0).any():
                 x = np.ascontiguousarray(u[: self.field.dimension])
-                made["lyapunov"] = hopf(self.field, x, self.values(u), self.scales,
+                made["lyapunov"] = hopf(self.field, x, self.parameters(u), self.scales,
                                         1j * np.sqrt(square)).first_lyapunov
         return float(made["lyapunov"])
 

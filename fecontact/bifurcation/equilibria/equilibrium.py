@@ -1,8 +1,10 @@
 """Equilibria of vector fields and contact systems, their stability and modes."""
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +37,34 @@ def solution(matrix: Array, rhs: Array) -> Array:
         raise AnalysisError("The equations are singular and have no solution there: nothing "
                             "holds the solution in some direction.")
     return np.asarray(x)
+
+
+@dataclass(frozen=True, eq=False)
+class DenseEquations:
+    """Equations about some unknowns: the residual (N,) and its derivative (N, N + 1).
+
+    The first rows and columns of the latter are the Jacobian of ``states`` states. ``made`` are
+    intermediate results.
+    """
+
+    residual: Array
+    matrix: Array
+    states: int
+    made: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    def solve(self, row: Array, rhs: Array) -> Array:
+        """Solution (N + 1,) of ``[[matrix], [row]] x = rhs``."""
+        return solution(np.vstack([self.matrix, row]), rhs)
+
+    @property
+    def jacobian(self) -> Array:
+        """Derivative of the rates to the states."""
+        return self.matrix[: self.states, : self.states]
+
+    @cached_property
+    def eigenvalues(self) -> ComplexArray:
+        """Eigenvalues of the Jacobian, the largest real part first."""
+        return sorted_eigenvalues(self.jacobian)
 
 
 _ITERATIONS = 60

@@ -48,6 +48,19 @@ class Hopf:
             return "undecided"
         return "supercritical" if self.first_lyapunov < 0.0 else "subcritical"
 
+    @property
+    def details(self) -> dict[str, Any]:
+        """Data of the point by the names of :class:`fecontact.bifurcation.HopfPoint`."""
+        return {
+            "angular_frequency": self.angular_frequency,
+            "frequency_hz": self.angular_frequency / (2.0 * np.pi),
+            "period": 2.0 * np.pi / self.angular_frequency,
+            "eigenvector": self.eigenvector,
+            "first_lyapunov": self.first_lyapunov,
+            "first_lyapunov_error": self.error,
+            "criticality": self.criticality,
+        }
+
 
 def critical_pair(
     J: Array, near: complex | None = None

@@ -1,21 +1,19 @@
 """Continuation problem of equilibria over one parameter."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
-from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, Problem, enlarged
 from fecontact.bifurcation.continuation.rounding import Rounding
 from fecontact.bifurcation.equilibria.equilibrium import (
+    DenseEquations,
     Equilibrium,
     default_scales,
     require_autonomous,
-    solution,
 )
 from fecontact.bifurcation.equilibria.normal_forms import (
     branching_tangents,
@@ -26,9 +24,10 @@ from fecontact.bifurcation.equilibria.normal_forms import (
     null_vectors,
 )
 from fecontact.bifurcation.fields.multilinear_forms import bend
+from fecontact.bifurcation.orbits.unknowns import FreeParameters
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ComplexArray
-from fecontact.system.complex_modes import sorted_eigenvalues, unstable_count
+from fecontact.system.complex_modes import unstable_count
 from fecontact.system.fields.vector_field import VectorField
 
 # Cosine between df/dp and the range of the Jacobian below which a fold is a branch point.
@@ -42,25 +41,6 @@ _CROSSING = 1e-11
 _STRAIGHT, _RESTS = 0.02, 1e-8
 
 
-@dataclass(frozen=True, eq=False)
-class _Bordered:
-    """f and [df/dx, df/dp] at one u."""
-
-    residual: Array
-    matrix: Array
-
-    def solve(self, row: Array, rhs: Array) -> Array:
-        return solution(np.vstack([self.matrix, row]), rhs)
-
-    @property
-    def jacobian(self) -> Array:
-        return self.matrix[:, :-1]
-
-    @cached_property
-    def eigenvalues(self) -> ComplexArray:
-        return sorted_eigenvalues(self.jacobian)
-
-
 class _EigenvalueRounding(Rounding):
     def unstable(self, linearisation: Any, values: Mapping[str, Any]) -> tuple[int, int]:
         """Eigenvalues on the imaginary axis, to rounding, may lie on either side."""
@@ -68,33 +48,27 @@ class _EigenvalueRounding(Rounding):
         return int(values["unstable"]), len(eigenvalues) - int(unstable_count(-eigenvalues))
 
 
-class EquilibriumProblem(Problem):
+class EquilibriumProblem(FreeParameters, Problem):
     """f(x, p) = 0 with one parameter of the field free; unknowns u = [x, p]."""
 
     rounding = _EigenvalueRounding()
 
     def __init__(
-        self, field: VectorField, values: Array, index: int, scales: Array, width: float,
+        self, field: VectorField, values: Array, free: int, sizes: Array,
         limits: Array | None = None,
     ) -> None:
-        self.field, self.index, self.scales = field, index, scales
-        self._values, self._width, self._limits = values.copy(), width, limits
-        self._weights = np.append(scales, width) ** -2.0
+        self.field, self.values, self.free = field, values.copy(), free
+        self.scales, self._sizes, self._limits = sizes[:-1], sizes, limits
+        self._weights = sizes**-2.0
 
-    def values(self, u: Array) -> Array:
-        """Parameter values (k,) at u."""
-        values = self._values.copy()
-        values[self.index] = u[-1]
-        return values
-
-    def linearise(self, u: Array) -> _Bordered:
+    def linearise(self, u: Array) -> DenseEquations:
         """The rates and their derivatives at u."""
         f, J, P = self.field.derivatives(np.zeros(1), np.ascontiguousarray(u[None, :-1]),
-                                         self.values(u), (self.index,))
+                                         self.parameters(u), self.active)
         matrix = np.concatenate([J[0], P[0]], axis=1)
         if not max(np.abs(f).max(), np.abs(matrix).max()) < _OVERFLOW:
             raise AnalysisError("The rates are not finite there.")
-        return _Bordered(f[0], matrix)
+        return DenseEquations(f[0], matrix, len(u) - 1)
 
     def weights(self) -> Array:
         """From the scales of the states and the width of the diagram."""
@@ -109,13 +83,9 @@ class EquilibriumProblem(Problem):
 
     def adapted(self, u: Array, tangent: Array) -> tuple[Problem, Array, Array] | None:
         """Problem with scales that grow with the states; None if scales were given, or suffice."""
-        if self._limits is None:
-            return None
-        larger = np.clip(np.abs(u[:-1]), self.scales, self._limits)
-        if (larger <= 1.5 * self.scales).all():
-            return None
-        return EquilibriumProblem(self.field, self._values, self.index, larger, self._width,
-                                  self._limits), u, tangent
+        larger = enlarged(self._sizes, np.abs(u[:-1]), self._limits)
+        return None if larger is self._sizes else (EquilibriumProblem(
+            self.field, self.values, self.free, larger, self._limits), u, tangent)
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
         """State, stability and eigenvalues."""
@@ -140,7 +110,7 @@ class EquilibriumProblem(Problem):
         """Data of a fold, Hopf or branch point; None if it is none."""
         if kind == "Hopf":
             return self._hopf(u, linearisation, tangent)
-        x, values = np.ascontiguousarray(u[:-1]), self.values(u)
+        x, values = np.ascontiguousarray(u[:-1]), self.parameters(u)
         v, w = null_vectors(linearisation.jacobian)
         if kind == "fold":
             P = linearisation.matrix[:, -1]
@@ -149,7 +119,7 @@ class EquilibriumProblem(Problem):
             return {"null_vector": v,
                     "coefficient": fold_coefficient(self.field, x, values, self.scales)}
         if kind == "branch point":
-            other = branching_tangents(self.field, x, values, self.index, self.scales, tangent)
+            other = branching_tangents(self.field, x, values, self.free, self.scales, tangent)
             return {"null_vector": v, **crossing_form(self.field, x, values, self.scales)} | (
                 {} if other is None else {"other_tangent": heading(other, self._weights)})
         return {}
@@ -162,24 +132,16 @@ class EquilibriumProblem(Problem):
         speed = self._crossing_speed(u, linearisation, tangent)
         if abs(speed) <= _CROSSING * np.abs(linearisation.eigenvalues).max():
             return None
-        found = hopf(self.field, x, self.values(u), self.scales)
-        return {
-            "angular_frequency": found.angular_frequency,
-            "frequency_hz": found.angular_frequency / (2.0 * np.pi),
-            "period": 2.0 * np.pi / found.angular_frequency,
-            "crossing_speed": speed / float(tangent[-1]) if tangent[-1] else np.inf,
-            "eigenvector": found.eigenvector,
-            "first_lyapunov": found.first_lyapunov,
-            "first_lyapunov_error": found.error,
-            "criticality": found.criticality,
-        }
+        found = hopf(self.field, x, self.parameters(u), self.scales)
+        return found.details | {
+            "crossing_speed": speed / float(tangent[-1]) if tangent[-1] else np.inf}
 
     def _crossing_speed(self, u: Array, linearisation: Any, tangent: Array) -> float:
         """Rate of the critical pair's real part along the branch: Re p^H (dJ/ds) q."""
         _, q, p = critical_pair(linearisation.jacobian)
-        values = self.values(u)
+        values = self.parameters(u)
         shift = np.zeros(len(values))
-        shift[self.index] = tangent[-1]
+        shift[self.free] = tangent[-1]
         bent, _ = bend(self.field, np.ascontiguousarray(u[:-1]), values,
                        np.ascontiguousarray(tangent[:-1]), self.scales, (), shift, every=4)
         return float(np.vdot(p, bent.first @ q).real)
@@ -236,5 +198,6 @@ def restored_equilibrium(
     """Problem, unknowns and tangent of a point of a branch, in a diagram of some width."""
     begin = equilibrium_at(field, point)
     index = field.index(point.branch.parameter_name)
-    problem = EquilibriumProblem(field, begin.values, index, default_scales(begin), width)
+    problem = EquilibriumProblem(field, begin.values, index,
+                                 np.append(default_scales(begin), width))
     return problem, point.u, point.tangent

@@ -10,6 +10,7 @@ from fecontact.bifurcation.homoclinic.saddle import left_subspaces, like
 from fecontact.bifurcation.linalg import bordered_kernels, condensation
 from fecontact.bifurcation.linalg.bordered import Border
 from fecontact.bifurcation.orbits.mesh import rule
+from fecontact.bifurcation.orbits.unknowns import FreeParameters
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
@@ -19,15 +20,15 @@ _DIFFERENCE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class OpenOrbit:
+class OpenOrbit(FreeParameters):
     """A homoclinic orbit; u = [nodes ((N m + 1) d), saddle (d), second, first parameter].
 
     Attributes
     ----------
     field, values : VectorField, (k,) array
         Both free parameters are taken from u.
-    active : (int, int)
-        Indices of the second and the first parameter.
+    free, second : int
+        Indices of the first and the second parameter.
     mesh : (N + 1,) array
         Ends of the intervals, from 0 to 1.
     degree : int
@@ -44,13 +45,14 @@ class OpenOrbit:
 
     field: VectorField
     values: Array
-    active: tuple[int, int]
+    free: int
     mesh: Array
     degree: int
     time: float
     reference: Array
     scales: Array
     rows: tuple[Array, Array]
+    second: int | None = None
 
     @property
     def sizes(self) -> Array:
@@ -69,12 +71,6 @@ class OpenOrbit:
     def rest(self, u: Array) -> Array:
         """The saddle (d,)."""
         return np.ascontiguousarray(u[self.size : -2])
-
-    def parameters(self, u: Array) -> Array:
-        """Parameter values (k,)."""
-        values = self.values.copy()
-        values[list(self.active)] = u[-2:]
-        return values
 
 
 class HomoclinicLinearised:

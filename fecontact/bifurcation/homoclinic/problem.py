@@ -121,11 +121,8 @@ class HomoclinicProblem(OpenOrbit, Problem):
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
         """Both parameters, the saddle, the interval, extremes, and the error of the truncation."""
-        names = list(self.field.parameters)
         nodes = self.nodes(u)
-        return {**{names[index]: float(value)
-                   for index, value in zip(self.active, u[-2:], strict=True)},
-                "saddle": self.rest(u).copy(),
+        return {**self.named(u), "saddle": self.rest(u).copy(),
                 "eigenvalues": sorted_eigenvalues(linearisation.jacobian), "time": self.time,
                 "mesh": self.mesh, "minimum": nodes.min(axis=0), "maximum": nodes.max(axis=0),
                 "end_distance": max(self.distances(u)),

@@ -73,9 +73,9 @@ def homoclinic_curve(
     _, J, _ = field.derivatives(np.zeros(1), rest[None], values)
     jacobian = J[0] * sizes / sizes[:, None]
     saddle_of(jacobian)
-    problem = HomoclinicProblem(field, values, active, mesh, degree, time, nodes,
+    problem = HomoclinicProblem(field, values, active[1], mesh, degree, time, nodes,
                                 np.concatenate([sizes, width]), left_subspaces(jacobian),
-                                (None, None), len(mesh) - 1)
+                                active[0], intervals=len(mesh) - 1)
     u = np.concatenate([nodes.reshape(-1), rest, values[list(active)]])
     problem, u = _converged(problem, u, point)
     attributes = {"parameter_names": list(field.parameters), "parameter_values": values,

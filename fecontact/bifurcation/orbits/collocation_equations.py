@@ -288,24 +288,25 @@ class CollocationLinearisation:
         self._last = None
         self.__dict__.pop("_phase", None)
 
+    def _with_borders(self, *borders: Border, closing: float = 1.0) -> Bordered:
+        """The equations with the phase condition, where there is one, and borders."""
+        phase = [self._phase] if self.problem.autonomous else []
+        return Bordered(self.factors, [*phase, *borders], closing)
+
     def with_rows(self, rows: list[Array]) -> Bordered:
         """The matrix [[G_u], [row], [row], ...]."""
-        borders = [self._phase] if self.problem.autonomous else []
-        return Bordered(self.factors, [*borders, *(Border(self.factors, row) for row in rows)], 1.0)
+        return self._with_borders(*(Border(self.factors, row) for row in rows))
 
     def at_fixed_parameters(self) -> Bordered:
         """The matrix [[G_u], [rows of all parameters]]."""
-        borders = [self._phase] if self.problem.autonomous else []
-        return Bordered(self.factors, [*borders, *(
-            Border.of_unknown(self.factors, place)
-            for place in range(-len(self.problem.active), 0))], 1.0)
+        return self._with_borders(*(Border.of_unknown(self.factors, place)
+                                    for place in range(-len(self.problem.active), 0)))
 
     def bordered(self, row: Array, closing: float = 1.0) -> "Bordered":
         """The matrix [[G_u], [row]]; ``closing`` = -1 is for x(1) = -x(0)."""
         if self._last is not None and self._last[0] is row and self._last[1] == closing:
             return self._last[2]
-        borders = [self._phase] if self.problem.autonomous else []
-        bordered = Bordered(self.factors, [*borders, Border(self.factors, row)], closing)
+        bordered = self._with_borders(Border(self.factors, row), closing=closing)
         self._last = row, closing, bordered
         return bordered
 
