@@ -205,10 +205,11 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
     ) -> dict[str, Any] | None:
         """The kind of a torus bifurcation; None for a neutral saddle.
 
-        A branch point at which a doubled orbit becomes a single one is a period halving.
+        A branch point at which a doubled orbit becomes a single one is a period halving. The
+        parameter turns there, too.
         """
-        if kind == "branch point" and self._halves_meet(u, linearisation, tangent):
-            return {"kind": HALVING}
+        if kind in ("fold", "branch point") and self._halves_meet(u, linearisation, tangent):
+            return {"kind": HALVING} if kind == "branch point" else None
         return super().examine(kind, u, linearisation, tangent)
 
     def _halves_meet(self, u: Array, linearisation: Any, tangent: Array) -> bool:
