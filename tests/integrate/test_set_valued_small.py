@@ -51,7 +51,7 @@ def finished(go):
 def test_what_runs_of_small_systems_take_for_granted(modes, nodes):
     said, found = SMALL.values(modes, nodes), 0
     given = run_of(system(modes, nodes)).loop.args
-    for values in (*given[0], given[0].problem.system):
+    for values in (*given[0], given[0].problem.system, given[0].workspace.flights):
         for field, expected in said.get(type(values), {}).items():
             value = getattr(values, field)
             if isinstance(expected, tuple):

@@ -14,6 +14,7 @@ from fecontact.bifurcation.events.conditions import (
     WITHIN,
     Condition,
     crosses,
+    crossing_event,
 )
 from fecontact.bifurcation.events.orbit import EventOrbit
 from fecontact.bifurcation.events.phases import PERIOD, Motion, Phase
@@ -64,21 +65,20 @@ def border_of(problem: EventOrbit, u: Array, condition: Condition) -> str:
 def _holds(problem: EventOrbit, u: Array, condition: Condition, motion: Motion) -> bool:
     """Whether the force that slip through zero would stick with leaves its limit."""
     i, cluster = condition.phase, condition.event // 2
-    held = _with(problem.phases[i], cluster, STICK, condition.event)
+    held = problem.phases[i].with_status(cluster, STICK)
     begin, start = float(problem.begins(u)[i]), problem.starts(u)[i]
     times = np.array([0.0, _SOON * problem.period(u)])
-    states = np.vstack([start, motion.run(begin, times[1:], start, held)[0]])
+    states = motion.run(begin, times, start, held)[0]
     here, there = motion.observed(begin + times, states, held)[0][:, condition.event]
     return bool(there > here)
 
 
 def _of_duration(before: Phase, phase: Phase, behind: Phase) -> str:
-    k, cluster = len(phase.status), phase.cluster()
+    cluster = phase.cluster()
     if _of_others(before, phase):
         return "corner"
     if cluster is None:
-        stop = phase.event - 2 * k
-        return "lift-off" if phase.closed[stop] or before.closed[stop] else "grazing"
+        return "lift-off" if phase.lifts_off() or before.closed[phase.stop] else "grazing"
     first, here, last = (each.status[cluster] for each in (before, phase, behind))
     if here == STICK:
         return "grazing-sliding" if first == last else "crossing-sliding"
@@ -139,13 +139,12 @@ class Successor:
         count = len(self.phases)
         before, phase, behind = (self.phases[(i + step) % count] for step in (-1, 0, 1))
         first = before.ending(phase.event, phase.strike)
-        status = tuple(there if there != here else old for old, here, there in zip(
-            before.status, phase.status, behind.status, strict=True))
-        closed = tuple(there if there != here else old for old, here, there in zip(
-            before.closed, phase.closed, behind.closed, strict=True))
+        status, closed = (
+            tuple(there if there != here else old for old, here, there in zip(*each, strict=True))
+            for each in zip(before.state, phase.state, behind.state, strict=True))
         t, last = self.begin(i), (i - 1) % count
-        state = self.motion.run(t - self.durations[last], np.array([self.durations[last]]),
-                                self.starts[last], before)[0][-1]
+        state = self.motion.reached(t - self.durations[last], self.durations[last],
+                                    self.starts[last], before)
         if first.strike is not None:
             state = self.motion.struck(t, state, first)
         self.phases[last] = first
@@ -154,6 +153,7 @@ class Successor:
 
     def _delete(self, i: int) -> None:
         if i == 0:
+            # The orbit now begins behind what was its second event.
             self.first += self.durations[0]
         for each in (self.phases, self.starts, self.durations):
             del each[i]
@@ -168,11 +168,7 @@ class Successor:
         following = self.phases[behind]
         self.phases[i] = self.phases[i].ending(following.event, following.strike)
         self.durations[i] += self.durations[behind]
-        if behind == 0:
-            # The orbit now begins behind what was its second event.
-            self.first += self.durations[0]
-        for each in (self.phases, self.starts, self.durations):
-            del each[behind]
+        self._delete(behind)
 
     def _without_events(self) -> None:
         """One phase without any event, from a multiple of the period on."""
@@ -180,8 +176,8 @@ class Successor:
         end = T * np.ceil(self.first / T)
         phase = self.phases[0].ending(PERIOD)
         if end > self.first:
-            self.starts[0] = self.motion.run(self.first, np.array([end - self.first]),
-                                             self.starts[0], phase)[0][-1]
+            self.starts[0] = self.motion.reached(self.first, end - self.first, self.starts[0],
+                                                 phase)
         self.phases, self.first = [phase], 0.0
 
     def insert(self, i: int, phase: Phase) -> None:
@@ -193,7 +189,7 @@ class Successor:
     def split(self, i: int, after: float, ending: Phase) -> None:
         """Divide a phase at a time after its begin; the first part gets another end."""
         phase, begin = self.phases[i], self.begin(i)
-        state = self.motion.run(begin, np.array([after]), self.starts[i], phase)[0][-1]
+        state = self.motion.reached(begin, after, self.starts[i], phase)
         if phase.event == PERIOD:
             # The orbit begins behind its only event.
             self.phases, self.starts, self.first = [ending], [state], begin + after
@@ -216,12 +212,6 @@ class Successor:
         problem = replace(self.problem, phases=ordered)
         begin = [self.first] if self.problem.forced else []
         return problem, np.concatenate([*self.starts, self.durations, begin, [self.parameter]])
-
-
-def _with(phase: Phase, cluster: int, status: int, event: int) -> Phase:
-    found = list(phase.status)
-    found[cluster] = status
-    return Phase(tuple(found), phase.closed, event)
 
 
 def beyond(problem: EventOrbit, u: Array, condition: Condition) -> Iterator[Successor]:
@@ -248,9 +238,9 @@ def beyond(problem: EventOrbit, u: Array, condition: Condition) -> Iterator[Succ
     elif condition.what == WITHIN and cluster is not None:
         sense = phase.status[cluster]
         if sense == STICK:
-            begun = _with(phase, cluster, released_sense(event), 2 * cluster)
+            begun = phase.with_status(cluster, released_sense(event), 2 * cluster)
         else:
-            begun = _with(phase, cluster, STICK, 2 * cluster + (0 if sense == 1 else 1))
+            begun = phase.with_status(cluster, STICK, crossing_event(cluster, sense))
         found.split(i, condition.after, phase.ending(event))
         if problem.phases[i].event == PERIOD:
             found.insert(0, begun)
@@ -259,10 +249,10 @@ def beyond(problem: EventOrbit, u: Array, condition: Condition) -> Iterator[Succ
         yield found
     elif condition.what == BEGIN and cluster is not None and not crosses(
             before, phase) and before.cluster() == cluster:
-        found.insert(i, _with(phase, cluster, released_sense(event), 2 * cluster))
+        found.insert(i, phase.with_status(cluster, released_sense(event), 2 * cluster))
         yield found
     elif condition.what == CROSSING and cluster is not None:
-        found.insert(i, _with(phase, cluster, STICK, event))
+        found.insert(i, phase.with_status(cluster, STICK, event))
         yield found
 
 
@@ -280,7 +270,7 @@ def _at_stop(
             yield found
     elif condition.what == WITHIN and not phase.closed[stop]:
         begin, after = found.begin(i), condition.after
-        state = motion.run(begin, np.array([after]), found.starts[i], phase)[0][-1]
+        state = motion.reached(begin, after, found.starts[i], phase)
         for touch in motion.touches(begin + after, state, phase.ending(event)):
             found = Successor(problem, u)
             found.split(i, after, phase.ending(event, touch))
@@ -309,7 +299,7 @@ def _with_flight(
     if status[own] != FIXED and not beside:
         status[own] = OPEN
     flight = Phase(tuple(status), closed, event)
-    state = motion.run(begin, np.array([after]), found.starts[i], phase)[0][-1]
+    state = motion.reached(begin, after, found.starts[i], phase)
     for touch in motion.touches(begin + after, state, flight):
         found = Successor(problem, u)
         flight = replace(flight, strike=touch)
@@ -339,5 +329,5 @@ def _other_impacts(
     # With tangential restitution the stopped contact rebounds, and slips after it on either side.
     rests = stopped and found.motion.problem.tangential[cluster] == 0.0
     if rests and behind.status[cluster] in (STICK, -sense):
-        found.insert((i + 1) % problem.count, _with(behind, cluster, sense, 2 * cluster))
+        found.insert((i + 1) % problem.count, behind.with_status(cluster, sense, 2 * cluster))
     yield found

@@ -1,7 +1,7 @@
 """Branches of set-valued orbits from event to event, through the borders that they meet."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,15 +13,15 @@ from fecontact.bifurcation.continuation.newton import newton, norm
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import special_point
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
+from fecontact.bifurcation.continuation.pseudo_arclength import End
 from fecontact.bifurcation.events.borders import beyond, border_of, nodes_of
 from fecontact.bifurcation.events.conditions import DURATION, STRIKE, Condition
 from fecontact.bifurcation.events.orbit import EventOrbit, anchor
 from fecontact.bifurcation.events.phases import Motion
-from fecontact.bifurcation.events.tracing import Traced, sizes_without_contact, traced
+from fecontact.bifurcation.events.tracing import sizes_without_contact, traced
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
-from fecontact.integrate.nonsmooth.problem import STICK
 from fecontact.integrate.solvers import SetValued
 
 # First steps beyond a border, in those of the branch, and the largest residual there.
@@ -63,43 +63,9 @@ def orbit_from(
     forced = field.forcing_period(values) is not None
     found = traced(motion, begin, start, period, forced)
     problem = EventOrbit(field, values.copy(), free, found.phases, solver, scales,
-                         _margins(motion, found), periods, rtol)
+                         found.margins, periods, rtol)
     return problem, np.concatenate([found.starts.reshape(-1), found.durations,
                                     found.begins[:1] if forced else [], [values[free]]])
-
-
-def _margins(motion: Motion, found: Traced) -> Array:
-    """Scales (2, 2 k + n) of speeds and heights, and of forces, from the samples of an orbit."""
-    k = motion.clusters
-    scales = np.zeros((2, 2 * k + motion.nodes))
-    for phase, begin, start, duration in zip(found.phases, found.begins, found.starts,
-                                             found.durations, strict=True):
-        times = np.linspace(0.0, duration, 33)
-        states = np.vstack([start, motion.run(begin, times[1:], start, phase)[0]])
-        margins = motion.observed(begin + times, states, phase)[0]
-        largest = np.where(np.isfinite(margins), np.abs(margins), 0.0).max(axis=0)
-        for c in range(k):
-            if phase.status[c] == STICK:
-                limit = 0.5 * np.abs(margins[:, 2 * c] + margins[:, 2 * c + 1]).max()
-                scales[1, 2 * c : 2 * c + 2] = np.maximum(scales[1, 2 * c : 2 * c + 2], limit)
-            else:
-                scales[0, 2 * c] = max(scales[0, 2 * c], largest[2 * c])
-                scales[1, 2 * c + 1] = max(scales[1, 2 * c + 1], largest[2 * c + 1])
-        for j in range(2 * k, 2 * k + motion.nodes):
-            row = int(phase.closed[j - 2 * k])
-            scales[row, j] = max(scales[row, j], largest[j])
-    for kinds in scales:
-        kinds[kinds == 0.0] = kinds.max() or 1.0
-    return scales
-
-
-@dataclass(frozen=True, eq=False)
-class Going:
-    """One side of a branch: its points, how it ended, and the error of the last failed step."""
-
-    points: list[BranchPoint]
-    status: BranchStatus
-    message: str = ""
 
 
 def followed(
@@ -116,42 +82,43 @@ def followed(
     FecontactError
         If there is no orbit near the start.
     """
-    ahead = _side(problem, u, options, name, tangent, direction)
+    ahead, end = _side(problem, u, options, name, tangent, direction)
     attributes = labelled(problem, name, attributes)
-    if not both or ahead.status in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
-        return Branch(name, tuple(ahead.points), ahead.status, ahead.message, attributes)
+    if not both or end.status in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
+        return Branch(name, tuple(ahead), end.status, end.message, attributes)
     kept = max(options.points // 2 + 1, 2)
-    left = max(options.points + 1 - min(regular(ahead.points), kept), 2)
-    message = ahead.message
+    left = max(options.points + 1 - min(regular(ahead), kept), 2)
+    message = end.message
     try:
-        back = _side(problem, u, replace(options, points=left), name,
-                     None if tangent is None else -tangent, -direction).points
+        back, _ = _side(problem, u, replace(options, points=left), name,
+                        None if tangent is None else -tangent, -direction)
     except FecontactError as error:
-        back = ahead.points[:1]
+        back = ahead[:1]
         message = " ".join(filter(None, (message, f"Nothing was found to the other side: {error}")))
-    points, whole = shortened(ahead.points, options.points + 1 - regular(back))
+    points, whole = shortened(ahead, options.points + 1 - regular(back))
     turned = [replace(point, tangent=-point.tangent) for point in back[:0:-1]]
-    return Branch(name, (*turned, *points), ahead.status if whole else BranchStatus.POINTS,
+    return Branch(name, (*turned, *points), end.status if whole else BranchStatus.POINTS,
                   message, attributes)
 
 
 def _side(
     problem: EventOrbit, u: Array, options: ContinuationOptions, name: str,
     tangent: Array | None, direction: float,
-) -> Going:
+) -> tuple[list[BranchPoint], End]:
+    """Points of one side of a branch, and how it ended."""
     points: list[BranchPoint] = []
     stops = {options.stop_at} if isinstance(options.stop_at, str) else set(options.stop_at)
     for _ in range(_MOST):
         left = options.points - regular(points)
         if left <= 0:
-            return Going(points, BranchStatus.POINTS)
+            return points, End(BranchStatus.POINTS)
         try:
             piece = continue_branch(problem, u, _of_piece(options, regular(points)), name=name,
                                     tangent=tangent, direction=direction)
         except FecontactError as error:
             if not points:
                 raise
-            return Going(points, BranchStatus.STALLED, str(error))
+            return points, End(BranchStatus.STALLED, str(error))
         if not points and problem.linearise(piece.points[0].u).least.left < -_NOTHING:
             raise AnalysisError("The orbit at the start breaks the conditions of its phases; run "
                                 "the motion longer until it has settled.")
@@ -164,22 +131,22 @@ def _side(
             found = [point for point in found if point.kind is None]
         stored = [_reduced(problem, point) for point in found]
         if not ended:
-            return Going([*points, *stored], piece.status if whole else BranchStatus.POINTS,
-                         piece.message)
+            return [*points, *stored], End(piece.status if whole else BranchStatus.POINTS,
+                                           piece.message)
         condition = nothing_left(problem, last.u)[0]
         kind = border_of(problem, last.u, condition)
         following = None if kind in stops else _following(problem, last, options)
         stored[-1] = _border(problem, last, stored[-1], condition, kind, following is not None)
         points += stored
         if kind in stops:
-            return Going(points, BranchStatus.STOPPED)
+            return points, End(BranchStatus.STOPPED)
         if following is None:
-            return Going(points, BranchStatus.DISCONTINUITY)
+            return points, End(BranchStatus.DISCONTINUITY)
         problem, u, tangent = following
         low, high = options.bounds
         if not low <= u[-1] <= high:
-            return Going(points, BranchStatus.BOUND)
-    return Going(points, BranchStatus.STALLED, f"The orbit meets more than {_MOST} borders.")
+            return points, End(BranchStatus.BOUND)
+    return points, End(BranchStatus.STALLED, f"The orbit meets more than {_MOST} borders.")
 
 
 def _of_piece(options: ContinuationOptions, before: int) -> ContinuationOptions:
@@ -207,8 +174,7 @@ def _border(
     time = float(begins[condition.phase] - begins[0] + condition.after)
     phases = np.array([[*phase.status, *phase.closed, phase.event, phase.order]
                        for phase in problem.phases], dtype=np.int64)
-    strikes = np.array([[0, *([0] * motion.nodes), *([0] * motion.clusters)]
-                        if phase.strike is None else
+    strikes = np.array([[0] * (1 + motion.nodes + motion.clusters) if phase.strike is None else
                         [1, *(int(j in phase.strike.nodes) for j in range(motion.nodes)),
                          *phase.strike.modes] for phase in problem.phases], dtype=np.int64)
     return special_point(stored.u, stored.tangent, stored.values, kind, {
@@ -296,7 +262,7 @@ def _reduced(problem: EventOrbit, point: BranchPoint) -> BranchPoint:
     i, after = anchor(problem, u)
     begin, start, phase = float(problem.begins(u)[i]), problem.starts(u)[i], problem.phases[i]
     states, moved = problem.motion(u).run(begin, np.array([after]), start, phase, True)
-    rates = problem.motion(u).observed(np.array([begin + after]), states, phase)[1][0]
+    rates = problem.motion(u).observed_at(begin + after, states[-1], phase)[1]
     taus = along[K * d : K * d + K]
     if problem.forced:
         begun = float(along[K * d + K] + taus[:i].sum())

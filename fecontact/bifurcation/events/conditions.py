@@ -50,7 +50,7 @@ class Condition(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PhaseSequence:
-    """Phases with their begins (K + 1,), states (K, d) and durations (K,).
+    """Phases with their begins (K,) or more [s], states (K, d) there and durations (K,) [s].
 
     ``margins`` (2, 2 k + n) are those of
     :func:`fecontact.bifurcation.events.phases.scales_of`.
@@ -96,19 +96,15 @@ def of_phase(
         yield from _at_begin(sequence, i)
     if what in (None, STRIKE) and phase.strike is not None:
         begin = float(sequence.begins[i])
-        state = sequence.motion.run(begin, np.array([duration]), sequence.starts[i], phase)[0][-1]
-        for struck, left in sequence.motion.strike_left(begin + duration, state, phase):
+        state = sequence.motion.reached(begin, duration, sequence.starts[i], phase)
+        for struck, left in sequence.motion.impact(begin + duration, state, phase)[1]:
             yield Condition(left, STRIKE, i, struck, duration)
 
 
 def sampled(sequence: PhaseSequence, i: int, after: Array) -> Array:
     """Margins (N, 2 k + n) of a phase at times (N,) after its begin, in their scales."""
     phase, motion, begin = sequence.phases[i], sequence.motion, float(sequence.begins[i])
-    states = np.empty((len(after), len(sequence.starts[i])))
-    moves = after != 0.0
-    states[~moves] = sequence.starts[i]
-    if moves.any():
-        states[moves] = motion.run(begin, after[moves], sequence.starts[i], phase)[0]
+    states = motion.run(begin, after, sequence.starts[i], phase)[0]
     return motion.observed(begin + after, states, phase)[0] / scales_of(phase, sequence.margins)
 
 
@@ -175,13 +171,12 @@ def _at_begin(sequence: PhaseSequence, i: int) -> Iterator[Condition]:
             continue
         yield Condition(float(margins[place]), BEGIN, i, place)
     for cluster in turning:
-        held = Phase((*phase.status[:cluster], STICK, *phase.status[cluster + 1 :]), phase.closed,
-                     PERIOD)
-        start, begin = sequence.starts[i], sequence.begins[i : i + 1]
-        place = crossing_event(cluster, phase)
-        found = sequence.motion.observed(begin, start[None], held)[0][0, place]
-        scale = friction_scale(sequence, i, cluster, held)
-        yield Condition(-float(found) / scale, CROSSING, i, place)
+        held = phase.with_status(cluster, STICK)
+        found = sequence.motion.observed_at(float(sequence.begins[i]), sequence.starts[i], held)[0]
+        place = crossing_event(cluster, phase.status[cluster])
+        # The limit of stick is half the sum of the margins to both sides.
+        limit = float(0.5 * (found[2 * cluster] + found[2 * cluster + 1])) or 1.0
+        yield Condition(-float(found[place]) / limit, CROSSING, i, place)
 
 
 def crosses(before: Phase, phase: Phase) -> bool:
@@ -191,13 +186,6 @@ def crosses(before: Phase, phase: Phase) -> bool:
         (1, -1), (-1, 1))
 
 
-def crossing_event(cluster: int, phase: Phase) -> int:
-    """The margin in stick that is negative where a cluster begins to slip in its sense."""
-    return 2 * cluster + (0 if phase.status[cluster] == 1 else 1)
-
-
-def friction_scale(sequence: PhaseSequence, i: int, cluster: int, held: Phase) -> float:
-    """Limit of stick at the begin of a phase: half the sum of the margins to both sides."""
-    begin, start = sequence.begins[i : i + 1], sequence.starts[i][None]
-    margins = sequence.motion.observed(begin, start, held)[0][0]
-    return float(0.5 * (margins[2 * cluster] + margins[2 * cluster + 1])) or 1.0
+def crossing_event(cluster: int, sense: int) -> int:
+    """The margin in stick that is negative where a cluster begins to slip in a sense."""
+    return 2 * cluster + (0 if sense == 1 else 1)

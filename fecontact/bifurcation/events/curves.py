@@ -19,7 +19,7 @@ from fecontact.bifurcation.events.conditions import (
     PhaseSequence,
     of_phase,
 )
-from fecontact.bifurcation.events.linearisation import EventLinearisation
+from fecontact.bifurcation.events.linearisation import EventLinearisation, bordered_solution
 from fecontact.bifurcation.events.orbit import ADMISSIBLE, EventOrbit
 from fecontact.bifurcation.events.phases import BRIEF, PERIOD, Motion, Phase, Strike
 from fecontact.bifurcation.fields.contact_field import ContactField
@@ -104,9 +104,9 @@ class BorderCurve(Problem):
         sequence = PhaseSequence(motion, orbit.phases, begins, starts, durations, orbit.margins)
         phase, rate = orbit.phases[i], 0.0
         if self.what == RATE:
-            state = motion.run(begin, np.array([tau]), start, phase)[0][-1]
+            state = motion.reached(begin, tau, start, phase)
             slopes = motion.margin_slopes(begin + tau, state, phase, phase.event)
-            rates = motion.observed(np.array([begin + tau]), state[None], phase)[1][0]
+            rates = motion.observed_at(begin + tau, state, phase)[1]
             rate = float(slopes[: len(rates)] @ rates + slopes[len(rates)])
         found = [each.left for each in of_phase(sequence, i, rate, self.what, self.event)
                  if (each.what, each.event) == (self.what, self.event)]
@@ -199,10 +199,7 @@ class BorderLinearisation:
 
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
-        try:
-            return np.asarray(np.linalg.solve(np.vstack([self.matrix, row]), rhs), dtype=float)
-        except np.linalg.LinAlgError:
-            return np.full(len(rhs), np.nan)
+        return bordered_solution(self.matrix, row, rhs)
 
 
 def border_curve(

@@ -19,7 +19,15 @@ from fecontact.core.compiled import helper, kernel, routine
 from fecontact.core.copies import put
 from fecontact.core.records import ANY, Matrix, Size, Vector
 from fecontact.core.types import Array, Integers
-from fecontact.integrate.nonsmooth.dop853 import ERROR_3, ERROR_5, STAGES, A, B, C
+from fecontact.integrate.nonsmooth.dop853 import (
+    ERROR_3,
+    ERROR_5,
+    STAGES,
+    A,
+    B,
+    C,
+    shortened,
+)
 from fecontact.integrate.nonsmooth.equations import (
     derivative,
     held_row,
@@ -36,6 +44,7 @@ from fecontact.integrate.nonsmooth.problem import (
     SLIP,
     STICK,
     WITH_WORK,
+    ContactState,
     Evaluation,
     NonsmoothProblem,
     Progress,
@@ -63,20 +72,11 @@ PART = 3e-4
 _BOTH = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12.0
 _ONE = np.array([-25.0, 48.0, -36.0, 16.0, -3.0]) / 12.0
 _SHORTEST = 1e-13
-# Penetration at first contact [m].
-_FIRST = 1e-100
 
 
 # Number of states, and that of the directions of derivatives: states, time and parameter.
 STATES = Size("states")
 DIRECTIONS = STATES + 2
-
-
-class ContactState(NamedTuple):
-    """Status (k,) of the clusters, and whether stops are closed, (n,)."""
-
-    status: Annotated[Integers, CLUSTERS]
-    closed: Annotated[Integers, NODES]
 
 
 class RatesWorkspace(NamedTuple):
@@ -205,27 +205,26 @@ def _add_differences(t, y, given, workspace):
     p, near, around, out, d = given.problem, workspace.near, workspace.around, workspace.J, len(y)
     contact, work = given.contact, workspace.rates
     out[:] = 0.0
-    _rates(t, y, p, contact, work, near)
-    for i in range(d):
-        step = PART * given.sizes[i]
-        side = _direction(i, step, p, contact.status, work.evaluation)
+    for i in range(d + 1 if given.tick > 0.0 else d):
+        step, side, moment = given.tick, 0, t
+        if i < d:
+            step = PART * given.sizes[i]
+            # The slip velocities at y itself.
+            _rates(t, y, p, contact, work, near)
+            side = _direction(i, step, p, contact.status, work.evaluation)
         for k in range(5):
             weight = _BOTH[k] if side == 0 else _ONE[k] * side
             if weight == 0.0:
                 continue
+            offset = step * (k - 2 if side == 0 else k * side)
             put(y, around)
-            around[i] += step * (k - 2 if side == 0 else k * side)
-            _rates(t, around, p, contact, work, near)
+            if i < d:
+                around[i] += offset
+            else:
+                moment = t + offset
+            _rates(moment, around, p, contact, work, near)
             for j in range(d):
                 out[j, i] += weight * near[j] / step
-        # The slip velocities at y itself, for the next state.
-        _rates(t, y, p, contact, work, near)
-    if given.tick > 0.0:
-        for k in range(5):
-            if _BOTH[k] != 0.0:
-                _rates(t + (k - 2) * given.tick, y, p, contact, work, near)
-                for j in range(d):
-                    out[j, d] += _BOTH[k] * near[j] / given.tick
     _rates(t, y, given.above, contact, work, near)
     for j in range(d):
         out[j, d + 1] += near[j] / (2.0 * given.change)
@@ -294,7 +293,7 @@ def _attempt(step, last, smallest, data):
                 workspace)
     size = _error(h, given.sizes, given.rtol, workspace.stages)
     if not size <= 1.0:
-        shorter = h * (max(0.2, 0.9 * size**-0.125) if math.isfinite(size) else 0.1)
+        shorter = shortened(h, size)
         if shorter < _SHORTEST * (data.output.times[-1] + abs(given.begin)):
             shorter = 0.0
         return FAILED if math.isfinite(size) else NOT_A_NUMBER, shorter
@@ -451,14 +450,6 @@ def decide(
                                             workspace.slopes[0])
     decide_clusters(t, p, progress, workspace, near, w, workspace.slopes[0])
     return 0.0
-
-
-@kernel
-def forces_of_touch(p: NonsmoothProblem, out: Vector) -> None:
-    """Fill out (n,) with the normal forces at first contact of dashpots, at a unit rate."""
-    for j in range(len(out)):
-        out[j] = (normal_force(j, _FIRST, 1.0, p.system)[0]
-                  - normal_force(j, _FIRST, 0.0, p.system)[0])
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Linearised equations of an orbit from event to event: residual, saltation, multipliers."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,14 @@ def _weights(places: Array, at: float) -> tuple[Array, Array]:
     return np.linalg.solve(powers.T, here), np.linalg.solve(powers.T, slope)
 
 
+def bordered_solution(matrix: Array, row: Array, rhs: Array) -> Array:
+    """Solution of ``[[matrix], [row]] x = rhs``; not finite where that is singular."""
+    try:
+        return np.asarray(np.linalg.solve(np.vstack([matrix, row]), rhs), dtype=float)
+    except np.linalg.LinAlgError:
+        return np.full(len(rhs), np.nan)
+
+
 @dataclass(frozen=True, eq=False)
 class End:
     """The end of a phase: the state before and behind the impact, and the event function there.
@@ -48,6 +56,12 @@ class End:
     jumped: Array
     margin: float
     margin_slopes: Array
+
+    @property
+    def rate(self) -> float:
+        """Rate of the event function."""
+        d = len(self.rates)
+        return float(self.margin_slopes[:d] @ self.rates + self.margin_slopes[d])
 
 
 class EventLinearisation:
@@ -81,45 +95,35 @@ class EventLinearisation:
 
         Their equations tell accelerations alone, which would leave place and speed free.
         """
-        stops, phase, t = self.problem.resting, self.problem.phases[-1], float(self.begins[-1])
-        if not stops:
+        if not self.problem.resting:
             return end
-        after, d = end.after, len(end.state)
-        motion = self.motion
-        slopes = motion.slopes_of(
-            lambda t, state, problem: motion.held_at_rest(t, state, phase, stops, problem),
-            t, after)
+        held = partial(self.motion.held_at_rest, phase=self.problem.phases[-1],
+                       stops=self.problem.resting)
+        after, slopes = self.motion.changed(held, float(self.begins[-1]), end.after)
+        d = len(after)
         jumped = slopes[:, :d] @ end.jumped
         jumped[:, d:] += slopes[:, d:]
-        return replace(end, after=motion.held_at_rest(t, after, phase, stops), jumped=jumped)
+        return replace(end, after=after, jumped=jumped)
 
-    def end(
-        self, phase: Phase, begin: float, start: Array, duration: float,
-        motion: Motion | None = None,
-    ) -> End:
+    def end(self, phase: Phase, begin: float, start: Array, duration: float) -> End:
         """The end of a phase, with its derivatives."""
-        motion = self.motion if motion is None else motion
+        motion = self.motion
         states, moved = motion.run(begin, np.array([duration]), start, phase, True)
         state, t = states[-1], float(begin + duration)
-        margins, rates = motion.observed(np.array([t]), states[-1:], phase)
+        margins, rates = motion.observed_at(t, state, phase)
         d = len(state)
         margin, slopes = 0.0, np.zeros(d + 2)
         if phase.event != PERIOD:
-            margin = float(margins[0, phase.event])
+            margin = float(margins[phase.event])
             slopes = motion.margin_slopes(t, state, phase, phase.event)
         after, jumped = state, np.eye(d, d + 2)
         if phase.strike is not None:
-            after = motion.struck(t, state, phase)
-            jumped = motion.slopes_of(
-                lambda t, state, problem: motion.struck(t, state, phase, problem), t, state)
+            after, jumped = motion.changed(partial(motion.struck, phase=phase), t, state)
         elif phase.lifts_off():
             # A flight begins at the stop and without speed, whatever the equations of rest say.
-            stops = (phase.event - 2 * motion.clusters,)
-            after = motion.held_at_rest(t, state, phase, stops)
-            jumped = motion.slopes_of(
-                lambda t, state, problem: motion.held_at_rest(t, state, phase, stops, problem),
-                t, state)
-        return End(state, rates[0], moved, after, jumped, margin, slopes)
+            after, jumped = motion.changed(
+                partial(motion.held_at_rest, phase=phase, stops=(phase.stop,)), t, state)
+        return End(state, rates, moved, after, jumped, margin, slopes)
 
     def _event(self, i: int) -> tuple[float, Array]:
         """Equation of the end of phase i, and its slopes (d + 3,): start, begin, parameter, tau."""
@@ -148,7 +152,7 @@ class EventLinearisation:
         slopes = np.empty(d + 3)
         slopes[: d + 2] = gradient[:d] @ end.moved
         slopes[d : d + 2] += gradient[d:]
-        slopes[-1] = gradient[:d] @ end.rates + gradient[d]
+        slopes[-1] = end.rate
         if order:
             slopes[-1] -= order * end.margin / tau
             slopes /= tau**order
@@ -212,8 +216,8 @@ class EventLinearisation:
         for phase, begin, start, duration in zip(
                 problem.phases, self.begins, problem.starts(self.u), problem.durations(self.u),
                 strict=False):
-            times = np.linspace(0.0, float(duration), _SAMPLES)[1:]
-            found += [start[None], self.motion.run(float(begin), times, start, phase)[0]]
+            times = np.linspace(0.0, float(duration), _SAMPLES)
+            found.append(self.motion.run(float(begin), times, start, phase)[0])
         return np.concatenate(found)
 
     @property
@@ -228,10 +232,7 @@ class EventLinearisation:
 
     def solve(self, row: Array, rhs: Array) -> Array:
         """Solution of [[G_u], [row]] du = rhs; not finite where the matrix is singular."""
-        try:
-            return np.asarray(np.linalg.solve(np.vstack([self.matrix, row]), rhs), dtype=float)
-        except np.linalg.LinAlgError:
-            return np.full(len(rhs), np.nan)
+        return bordered_solution(self.matrix, row, rhs)
 
     @cached_property
     def jumps(self) -> list[Array]:
@@ -250,13 +251,11 @@ class EventLinearisation:
             jump = end.jumped[:, :d].copy()
             if phase.event != PERIOD:
                 following = (i + 1) % K
-                behind = self.motion.observed(
-                    self.begins[i + 1 : i + 2], starts[following][None],
-                    problem.phases[following])[1][0]
-                rate = float(end.margin_slopes[:d] @ end.rates + end.margin_slopes[d])
+                behind = self.motion.observed_at(float(self.begins[i + 1]), starts[following],
+                                                 problem.phases[following])[1]
                 scale = scales_of(phase, problem.margins)[phase.event]
                 slowest = _SLOWEST * scale / problem.scales[-2]
-                rate = np.copysign(max(abs(rate), slowest), rate)
+                rate = np.copysign(max(abs(end.rate), slowest), end.rate)
                 off = behind - jump @ end.rates - end.jumped[:, d]
                 jump += np.outer(off, end.margin_slopes[:d]) / rate
             found.append(jump)
@@ -300,10 +299,8 @@ class EventLinearisation:
         """Margins of the conditions of the phases."""
         problem = self.problem
         sequence = PhaseSequence(self.motion, problem.phases, self.begins, problem.starts(self.u),
-                        problem.durations(self.u), problem.margins)
-        rates = [float(end.margin_slopes[: len(end.rates)] @ end.rates
-                       + end.margin_slopes[len(end.rates)]) for end in self._ends]
-        return list(conditions(sequence, rates))
+                                 problem.durations(self.u), problem.margins)
+        return list(conditions(sequence, [end.rate for end in self._ends]))
 
     @property
     def least(self) -> Condition:

@@ -182,8 +182,7 @@ class EventOrbit(FreeParameters, FloquetTests, Problem):
         begin, start = float(self.begins(u)[i]), self.starts(u)[i]
         if after == 0.0:
             return start
-        return np.asarray(self.motion(u).run(begin, np.array([after]), start,
-                                             self.phases[i])[0][-1])
+        return self.motion(u).reached(begin, after, start, self.phases[i])
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, float]:
         """Test functions of the multipliers, and the smallest margin of the phases' conditions."""

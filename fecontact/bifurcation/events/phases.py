@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.events.flow import (
     PART,
     STATES,
-    ContactState,
     Data,
     FlowWorkspace,
     Given,
@@ -20,7 +19,6 @@ from fecontact.bifurcation.events.flow import (
     Rows,
     StrikeRows,
     flow,
-    forces_of_touch,
     kinetic_coefficients,
     observe,
     set_strike_rows,
@@ -31,16 +29,15 @@ from fecontact.core.records import allocate
 from fecontact.core.types import Array
 from fecontact.integrate.nonsmooth.driver import nonsmooth_problem
 from fecontact.integrate.nonsmooth.problem import (
-    CLUSTERS,
     STICK,
+    ContactState,
     Evaluation,
     NonsmoothProblem,
-    evaluation_for,
+    sizes_of,
 )
 from fecontact.integrate.solvers import SetValued
 from fecontact.integrate.step_loop import FINISHED
-from fecontact.system.nodes import MODES, NODES
-from fecontact.system.powers import POWER_COUNT
+from fecontact.system.node_forces import normal_values
 
 # In place of an event: the end of a period of the forcing.
 PERIOD = -1
@@ -55,6 +52,8 @@ _ROUNDING = 1e-9
 # Durations in periods below which what vanishes at the end of a phase, divided by the power of the
 # duration with which it vanishes at the begin too, is mostly rounding.
 BRIEF = (0.0, 1e-5, 1e-5, 5e-3)
+# Penetration at first contact [m].
+_FIRST = 1e-100
 # Offsets and weights of a difference of fourth order.
 _OFFSETS, _WEIGHTS = np.array([-2.0, -1.0, 1.0, 2.0]), np.array([1.0, -8.0, 8.0, -1.0]) / 12.0
 
@@ -109,6 +108,11 @@ class Phase:
         return stop >= 0 and bool(self.closed[stop])
 
     @property
+    def stop(self) -> int:
+        """The stop at which it ends; below zero for events of clusters."""
+        return self.event - 2 * len(self.status)
+
+    @property
     def state(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """The contact state."""
         return self.status, self.closed
@@ -127,6 +131,11 @@ class Phase:
     def ending(self, event: int, strike: Strike | None = None, order: int = 0) -> "Phase":
         """Phase with this contact state and another end."""
         return replace(self, event=event, strike=strike, order=order)
+
+    def with_status(self, cluster: int, status: int, event: int = PERIOD) -> "Phase":
+        """Phase in which a cluster has another status, with another end."""
+        return replace(self.ending(event), status=(*self.status[:cluster], status,
+                                                   *self.status[cluster + 1 :]))
 
 
 def scales_of(phase: Phase, margins: Array) -> Array:
@@ -169,9 +178,7 @@ class Motion:
         self.problem, self.rubbing = self._problem(values)
         self.clusters, self.nodes = len(self.problem.rows), len(self.problem.cluster)
         self.modes = self.problem.rows.shape[1]
-        size = 2 * self.modes + POWER_COUNT + self.nodes
-        self._workspace = RatesWorkspace(evaluation_for(self.problem), np.zeros(size),
-                                         np.zeros(size))
+        self._workspace = allocate(RatesWorkspace, sizes_of(self.problem))
 
     @property
     def evaluation(self) -> Evaluation:
@@ -188,11 +195,14 @@ class Motion:
     @cached_property
     def _unwatched(self) -> NDArray[np.bool_]:
         """Nodes (n,) whose opening is no event of their own: their forces begin from zero."""
-        found = np.zeros(self.nodes)
-        if self.problem.rigid == 0:
-            forces_of_touch(self.problem, found)
-            return found == 0.0
-        return found > 0.0
+        s, n = self.problem.system, self.nodes
+        if self.problem.rigid:
+            return np.zeros(n, dtype=bool)
+        still, fast, slope = np.empty((3, n))
+        for rate, force in ((0.0, still), (1.0, fast)):
+            normal_values(s.normal, np.full(n, _FIRST), np.full(n, rate), s.normal_parameters,
+                          force, slope)
+        return np.asarray(still == fast)
 
     def _problem(self, values: Array) -> tuple[NonsmoothProblem, NDArray[np.bool_]]:
         solver = self.solver
@@ -227,6 +237,8 @@ class Motion:
     ) -> tuple[Array, Array]:
         """States (N, d) at times (N,) after a begin, and the slopes (d, d + 2) of the last.
 
+        The first time may be zero.
+
         Raises
         ------
         AnalysisError
@@ -246,6 +258,10 @@ class Motion:
             raise AnalysisError("The motion between two events could not be followed.")
         return states, slopes
 
+    def reached(self, begin: float, after: float, start: Array, phase: Phase) -> Array:
+        """State (d,) so long after a begin."""
+        return self.run(begin, np.array([after]), start, phase)[0][-1]
+
     def observed(
         self, times: Array, states: Array, phase: Phase, problem: NonsmoothProblem | None = None
     ) -> tuple[Array, Array]:
@@ -260,36 +276,55 @@ class Motion:
         margins[:, 2 * self.clusters :][:, self._unwatched] = np.inf
         return margins, rates
 
+    def observed_at(
+        self, t: float, state: Array, phase: Phase, problem: NonsmoothProblem | None = None
+    ) -> tuple[Array, Array]:
+        """Margins (2 k + n,) and rates (d,) at one state."""
+        margins, rates = self.observed(np.array([t]), state[None], phase, problem)
+        return margins[0], rates[0]
+
     def margin_slopes(self, t: float, state: Array, phase: Phase, event: int) -> Array:
         """Slopes (d + 2,) of a margin by the states, time and parameter."""
-        d = len(state)
-        times, states = self._around(t, state)
-        found = self.observed(times, states, phase)[0][:, event].reshape(-1, 4)
-        steps = np.append(PART * self.sizes, self.tick)[: len(found)]
-        slopes = np.zeros(d + 2)
-        slopes[: len(found)] = found @ _WEIGHTS / steps
-        above, below, change = self._perturbed
-        ends = [self.observed(np.array([t]), state[None], phase, problem)[0][0, event]
-                for problem in (above, below)]
-        slopes[-1] = (ends[0] - ends[1]) / (2.0 * change)
-        return slopes
+        return self._slopes(lambda times, states, problem: self.observed(
+            times, states, phase, problem)[0][:, [event]], t, state)[0]
 
-    def _around(self, t: float, state: Array) -> tuple[Array, Array]:
-        """Times and states for differences: four for each state, and four in time."""
+    def changed(
+        self, change: Callable[..., Array], t: float, state: Array
+    ) -> tuple[Array, Array]:
+        """The state after ``change(t, state, problem=...)``, and its slopes (d, d + 2).
+
+        Slopes are by the state before, time and parameter.
+        """
+        def each(times: Array, states: Array, problem: NonsmoothProblem) -> Array:
+            return np.array([change(time, state, problem=problem)
+                             for time, state in zip(times, states, strict=True)])
+
+        return change(t, state), self._slopes(each, t, state)
+
+    def _slopes(
+        self, values: Callable[[Array, Array, NonsmoothProblem], Array], t: float, state: Array
+    ) -> Array:
+        """Slopes (k, d + 2) of values (N, k) at times and states by the state, time, parameter."""
         d = len(state)
-        count = 4 * (d + (self.tick > 0.0))
-        times, states = np.full(count, t), np.tile(state, (count, 1))
+        steps = np.append(PART * self.sizes, self.tick)[: d + (self.tick > 0.0)]
+        times, states = np.full(4 * len(steps), t), np.tile(state, (4 * len(steps), 1))
         for i in range(d):
-            states[4 * i : 4 * i + 4, i] += PART * self.sizes[i] * _OFFSETS
-        times[4 * d :] += self.tick * _OFFSETS[: count - 4 * d]
-        return times, states
+            states[4 * i : 4 * i + 4, i] += steps[i] * _OFFSETS
+        times[4 * d :] += self.tick * _OFFSETS[: len(times) - 4 * d]
+        found = values(times, states, self.problem).reshape(len(steps), 4, -1)
+        above, below, change = self._perturbed
+        slopes = np.zeros((found.shape[2], d + 2))
+        slopes[:, : len(steps)] = (np.einsum("ikj,k->ij", found, _WEIGHTS) / steps[:, None]).T
+        larger, smaller = (values(np.array([t]), state[None], problem)[0]
+                           for problem in (above, below))
+        slopes[:, -1] = (larger - smaller) / (2.0 * change)
+        return slopes
 
     def struck(
         self, t: float, state: Array, phase: Phase, problem: NonsmoothProblem | None = None
     ) -> Array:
         """The state after the impact at the end of a phase."""
-        assert phase.strike is not None
-        return self._impact(t, state, phase, phase.strike, problem)[0]
+        return self.impact(t, state, phase, problem)[0]
 
     def held_at_rest(
         self, t: float, state: Array, phase: Phase, stops: tuple[int, ...],
@@ -299,56 +334,36 @@ class Motion:
         m = self.modes
         found = self._strike_rows(t, state, phase, problem)
         closed = tuple(0 if j in stops else each for j, each in enumerate(phase.closed))
-        heights = self.observed(np.array([t]), state[None], replace(phase, closed=closed),
-                                problem)[0][0, 2 * self.clusters :]
+        heights = self.observed_at(t, state, replace(phase, closed=closed),
+                                   problem)[0][2 * self.clusters :]
         rows, each = found.held[list(stops)], list(stops)
         after = state.copy()
         after[:m] -= rows.T @ np.linalg.solve(rows @ rows.T, heights[each])
         after[m:] += rows.T @ np.linalg.solve(rows @ rows.T, found.speeds[each])
         return after
 
-    def slopes_of(
-        self, change: Callable[[float, Array, NonsmoothProblem], Array], t: float, state: Array
-    ) -> Array:
-        """Slopes (d, d + 2) of a changed state by the state, time and parameter."""
-        d = len(state)
-        times, states = self._around(t, state)
-        found = np.array([change(time, each, self.problem)
-                          for time, each in zip(times, states, strict=True)]).reshape(-1, 4, d)
-        steps = np.append(PART * self.sizes, self.tick)[: len(found)]
-        slopes = np.zeros((d, d + 2))
-        slopes[:, : len(found)] = (np.einsum("ikj,k->ij", found, _WEIGHTS) / steps[:, None]).T
-        above, below, width = self._perturbed
-        slopes[:, -1] = (change(t, state, above) - change(t, state, below)) / (2.0 * width)
-        return slopes
-
     def _strike_rows(
         self, t: float, state: Array, phase: Phase, problem: NonsmoothProblem | None
     ) -> StrikeRows:
         """Constraints at an impact at the end of a phase."""
-        found = allocate(StrikeRows, {NODES: self.nodes, CLUSTERS: self.clusters,
-                                      MODES: self.modes})
+        found = allocate(StrikeRows, sizes_of(self.problem))
         set_strike_rows(self.problem if problem is None else problem, phase.contact,
                         self._workspace, t, np.ascontiguousarray(state), found)
         return found
 
-    def strike_left(self, t: float, state: Array, phase: Phase) -> list[tuple[int, float]]:
-        """Places of events and relative margins of the impact at the end of a phase."""
-        assert phase.strike is not None
-        return self._impact(t, state, phase, phase.strike)[1]
-
-    def _impact(
-        self, t: float, state: Array, phase: Phase, strike: Strike,
-        problem: NonsmoothProblem | None = None,
+    def impact(
+        self, t: float, state: Array, phase: Phase, problem: NonsmoothProblem | None = None
     ) -> tuple[Array, list[tuple[int, float]]]:
-        """The state after an impact of a given kind, and the margins of its conditions.
+        """The state after the impact at the end of a phase, and the margins of its conditions.
 
-        Margins are relative to the largest impulse or speed. For a cluster whose slip the impact
-        stops they are the distances of its impulse from both edges of the cone, for others the slip
-        velocity in their sense, for stops the impulse that presses or the speed that parts them.
+        Margins are pairs of an event and a number relative to the largest impulse or speed. For a
+        cluster whose slip the impact stops these are the distances of its impulse from both edges
+        of the cone, for others the slip velocity in their sense, for stops the impulse that presses
+        or the speed that parts them.
         """
         k, n, m = self.clusters, self.nodes, self.modes
-        chosen = self.problem if problem is None else problem
+        chosen, strike = self.problem if problem is None else problem, phase.strike
+        assert strike is not None
         held, pushing, speeds, coefficients = self._strike_rows(t, state, phase, chosen)
         for j in strike.nodes:
             sense = strike.modes[chosen.cluster[j]]
@@ -376,7 +391,7 @@ class Motion:
         sizes = np.linalg.norm(held, axis=1), np.linalg.norm(pushing, axis=1)
         near = np.abs(held @ pushing.T) > _ROUNDING * np.outer(*sizes)
         np.fill_diagonal(near, False)
-        struck = phase.event - 2 * k
+        struck = phase.stop
         idle = np.array([j != struck and not near[j, active].any() for j in range(n)])
         # Impulses of a touch are rounding.
         touched = abs(speeds[struck]) <= _ROUNDING * fastest
@@ -400,20 +415,18 @@ class Motion:
 
         Its contact slips; which closed stops beside it take part, its speed tells alone.
         """
-        node = phase.event - 2 * self.clusters
-        own = int(self.problem.cluster[node])
-        for nodes, modes in self._strikes(node, phase):
-            if modes[own] == STICK:
+        own = int(self.problem.cluster[phase.stop])
+        for strike in self._strikes(phase):
+            if strike.modes[own] == STICK:
                 continue
-            strike = Strike(nodes, modes)
-            if all(part > 0.0 for event, part in self._impact(t, state, phase, strike)[1]
-                   if event < 2 * self.clusters and modes[event // 2] != STICK):
+            left = self.impact(t, state, replace(phase, strike=strike))[1]
+            if all(part > 0.0 for event, part in left
+                   if event < 2 * self.clusters and strike.modes[event // 2] != STICK):
                 yield strike
 
-    def _strikes(
-        self, node: int, phase: Phase
-    ) -> Iterator[tuple[tuple[int, ...], tuple[int, ...]]]:
-        """Nodes that an impact may press, and modes of the clusters: STICK, +1, -1 or none, 0."""
+    def _strikes(self, phase: Phase) -> Iterator[Strike]:
+        """Impacts that the stop at the end of a phase may have."""
+        node = phase.stop
         others = [j for j in range(self.nodes) if phase.closed[j] and j != node]
         for count in range(len(others), -1, -1):
             for beside in combinations(others, count):
@@ -424,7 +437,7 @@ class Motion:
                     given = [0] * self.clusters
                     for c, mode in zip(rubbed, modes, strict=True):
                         given[c] = mode
-                    yield nodes, tuple(given)
+                    yield Strike(nodes, tuple(given))
 
     def strike_at(
         self, t: float, state: Array, phase: Phase, wanted: Array
@@ -436,11 +449,9 @@ class Motion:
         AnalysisError
             If there is none.
         """
-        node = phase.event - 2 * self.clusters
         size = np.abs(np.concatenate([state, wanted])[self.modes :]).max()
-        for nodes, modes in self._strikes(node, phase):
-            strike = Strike(nodes, modes)
-            after, left = self._impact(t, state, phase, strike)
+        for strike in self._strikes(phase):
+            after, left = self.impact(t, state, replace(phase, strike=strike))
             fits = all(part >= -_ROUNDING for _, part in left)
             if fits and np.abs(after[self.modes :] - wanted).max() <= 1e-6 * size:
                 return strike

@@ -1,20 +1,21 @@
 """The phases of a periodic motion, from a state on it."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from fecontact.bifurcation.events.conditions import PhaseSequence
 from fecontact.bifurcation.events.flow import decide
 from fecontact.bifurcation.events.phases import PERIOD, Motion, Phase
 from fecontact.core.errors import AnalysisError
+from fecontact.core.records import allocate
 from fecontact.core.types import Array
-from fecontact.integrate.nonsmooth.event_search import Workspace, workspace_for
+from fecontact.integrate.nonsmooth.event_search import Workspace
 from fecontact.integrate.nonsmooth.problem import (
     OPEN,
     SLIP_SIZE,
     STICK,
     Progress,
     progress_for,
+    sizes_of,
 )
 from fecontact.integrate.nonsmooth.rigid_stops import NO_ACCELERATION, NO_IMPULSES
 
@@ -29,17 +30,9 @@ _NEAR = 1e-9
 _AT_REST = 1e-11
 
 
-@dataclass(frozen=True, eq=False)
-class Traced:
-    """Phases of a period: begins (K,) [s], states (K, d) there, durations (K,) [s]."""
-
-    phases: tuple[Phase, ...]
-    begins: Array
-    starts: Array
-    durations: Array
-
-
-def traced(motion: Motion, begin: float, start: Array, period: float, forced: bool) -> Traced:
+def traced(
+    motion: Motion, begin: float, start: Array, period: float, forced: bool
+) -> PhaseSequence:
     """Phases of the motion from a state, over one period.
 
     They begin behind the first event, or at a multiple of the period where there is none.
@@ -55,10 +48,9 @@ def traced(motion: Motion, begin: float, start: Array, period: float, forced: bo
         if not forced:
             raise AnalysisError("The motion has no events.")
         end = period * np.ceil(begin / period)
-        moved = motion.run(begin, np.array([end - begin]), start, phases[0])[0][-1] if (
-            end > begin) else start
-        return Traced((phases[0].ending(PERIOD),), np.zeros(1), moved[None],
-                      np.array([period]))
+        moved = motion.reached(begin, end - begin, start, phases[0]) if end > begin else start
+        return _measured(motion, (phases[0].ending(PERIOD),), np.zeros(1), moved[None],
+                         np.array([period]))
     if np.diff(begins[1:]).min(initial=period) < _SHORTEST * period:
         raise AnalysisError(_CLOSELY)
     # The phase after the last event leads to the first event again, a period later.
@@ -73,7 +65,33 @@ def traced(motion: Motion, begin: float, start: Array, period: float, forced: bo
         raise AnalysisError(_CLOSELY)
     ordered = tuple(phase.ending(phase.event, phase.strike, order_of(motion, before, phase))
                     for before, phase in zip([found[-1], *found[:-1]], found, strict=True))
-    return Traced(ordered, begins[1:], states[1:], durations)
+    return _measured(motion, ordered, begins[1:], states[1:], durations)
+
+
+def _measured(
+    motion: Motion, phases: tuple[Phase, ...], begins: Array, starts: Array, durations: Array
+) -> PhaseSequence:
+    """Phases with scales (2, 2 k + n) of speeds and heights, and of forces, from samples."""
+    k = motion.clusters
+    scales = np.zeros((2, 2 * k + motion.nodes))
+    for phase, begin, start, duration in zip(phases, begins, starts, durations, strict=True):
+        times = np.linspace(0.0, duration, 33)
+        states = motion.run(begin, times, start, phase)[0]
+        margins = motion.observed(begin + times, states, phase)[0]
+        largest = np.where(np.isfinite(margins), np.abs(margins), 0.0).max(axis=0)
+        for c in range(k):
+            if phase.status[c] == STICK:
+                limit = 0.5 * np.abs(margins[:, 2 * c] + margins[:, 2 * c + 1]).max()
+                scales[1, 2 * c : 2 * c + 2] = np.maximum(scales[1, 2 * c : 2 * c + 2], limit)
+            else:
+                scales[0, 2 * c] = max(scales[0, 2 * c], largest[2 * c])
+                scales[1, 2 * c + 1] = max(scales[1, 2 * c + 1], largest[2 * c + 1])
+        for j in range(2 * k, 2 * k + motion.nodes):
+            row = int(phase.closed[j - 2 * k])
+            scales[row, j] = max(scales[row, j], largest[j])
+    for kinds in scales:
+        kinds[kinds == 0.0] = kinds.max() or 1.0
+    return PhaseSequence(motion, phases, begins, starts, durations, scales)
 
 
 def sizes_without_contact(motion: Motion, begin: float, start: Array, period: float) -> Array:
@@ -95,8 +113,8 @@ def order_of(motion: Motion, before: Phase, phase: Phase) -> int:
     if phase.event == PERIOD or phase.cluster() != cluster:
         return 0
     if cluster is None:
-        stop = _stop(motion, phase)
-        if phase.event != before.event or phase.closed[stop]:
+        stop = phase.stop
+        if phase.event != before.event or phase.lifts_off():
             return 0
         # Behind an impact without rebound the speed vanishes too, and where the force of a stop
         # has vanished the acceleration.
@@ -118,16 +136,12 @@ def jumps(motion: Motion, cluster: int) -> bool:
     return bool((given > own * (1.0 + 1e-9)).any())
 
 
-def _stop(motion: Motion, phase: Phase) -> int:
-    return phase.event - 2 * motion.clusters
-
-
 def _followed(
     motion: Motion, begin: float, start: Array, period: float
 ) -> tuple[list[Phase], Array, Array]:
     """Phases from a state on, the last of which is cut, with begins and states there."""
     progress = progress_for(motion.problem, motion.rubbing, start, begin, 0.0)
-    workspace = workspace_for(motion.problem)
+    workspace = allocate(Workspace, sizes_of(motion.problem))
     phases: list[Phase] = []
     begins, states, t = [begin], [start], begin
     _first_state(motion, progress, workspace, t)
@@ -135,10 +149,9 @@ def _followed(
         progress.closed[:] = 1
     while True:
         phase = Phase(tuple(progress.status.tolist()), tuple(progress.closed.tolist()), PERIOD)
-        _require_known(motion, phase)
-        state = states[-1]
-        left = begin + period - t
-        found = _first_event(motion, phase, t, state, left, period)
+        if motion.problem.rigid == 0 and OPEN in phase.status:
+            raise AnalysisError("A compliant contact opens.")
+        found = _first_event(motion, phase, t, states[-1], begin + period - t, period)
         if found is None:
             return [*phases, phase], np.array(begins), np.array(states)
         after, event, end = found
@@ -147,7 +160,7 @@ def _followed(
         ending = phase.ending(event)
         t += after
         moved = _decided(motion, progress, workspace, t, end, ending)
-        if event >= 2 * motion.clusters and not phase.closed[event - 2 * motion.clusters]:
+        if ending.stop >= 0 and not ending.lifts_off():
             struck = motion.strike_at(t, end, ending, moved[motion.modes :])
             ending = phase.ending(event, struck)
             moved = motion.struck(t, end, ending)
@@ -158,18 +171,11 @@ def _followed(
         states.append(moved)
 
 
-def _require_known(motion: Motion, phase: Phase) -> None:
-    if motion.problem.rigid == 0 and OPEN in phase.status:
-        raise AnalysisError("A compliant contact opens.")
-
-
 def _first_state(motion: Motion, progress: Progress, workspace: Workspace, t: float) -> None:
     """Decide which clusters stick and which stops are closed at the start."""
     phase = Phase(tuple(progress.status.tolist()), tuple(progress.closed.tolist()), PERIOD)
     d = 2 * motion.modes
-    heights = motion.observed(np.array([t]), progress.state[None, :d], phase)[0][0]
-    for flags in (workspace.released, workspace.arrived, workspace.touched, workspace.parting):
-        flags[:] = False
+    heights = motion.observed_at(t, progress.state[:d], phase)[0]
     if motion.problem.rigid:
         scale = float(motion.sizes[: motion.modes].max())
         workspace.touched[:] = heights[2 * motion.clusters :] <= _AT_REST * scale
@@ -202,8 +208,8 @@ def _decided(
         else:
             workspace.arrived[c] = True
     else:
-        flags = workspace.parting if phase.closed[event - 2 * k] else workspace.touched
-        flags[event - 2 * k] = True
+        flags = workspace.parting if phase.lifts_off() else workspace.touched
+        flags[phase.stop] = True
     _require_decided(motion, progress, workspace, t)
     return progress.state[:d].copy()
 
@@ -224,7 +230,7 @@ def _first_event(
     times = np.linspace(0.0, left, max(8, int(np.ceil(_SAMPLES * left / period))) + 1)
     # The event function that began a phase, such as the height after an impact, is zero at first.
     fine = np.concatenate([times[:1], times[1] * np.array([1e-3, 1e-2, 1e-1]), times[1:]])
-    states = np.vstack([state, motion.run(t, fine[1:], state, phase)[0]])
+    states = motion.run(t, fine, state, phase)[0]
     margins = motion.observed(t + fine, states, phase)[0]
     first: tuple[float, int] | None = None
     for event in range(margins.shape[1]):
@@ -238,9 +244,8 @@ def _first_event(
         place = int(passed[0])
 
         def left_of(after: float, event: int = event, place: int = place) -> float:
-            ahead = after - fine[place]
-            reached = motion.run(t + fine[place], np.array([ahead]), states[place], phase)[0]
-            return float(motion.observed(np.array([t + after]), reached, phase)[0][0, event])
+            reached = motion.reached(t + fine[place], after - fine[place], states[place], phase)
+            return float(motion.observed_at(t + after, reached, phase)[0][event])
 
         at = float(brentq(left_of, fine[place], fine[place + 1], xtol=1e-15 * period, rtol=1e-14))
         if first is None or at < first[0]:
@@ -248,5 +253,5 @@ def _first_event(
     if first is None:
         return None
     at, event = first
-    return at, event, motion.run(t, np.array([at]), state, phase)[0][-1]
+    return at, event, motion.reached(t, at, state, phase)
 

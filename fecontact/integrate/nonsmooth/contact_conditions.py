@@ -119,7 +119,7 @@ def _follow(c, case):
 
 
 @helper
-def _limit(k, coefficient, c, x):
+def friction_limit(k, coefficient, c, x):
     """Sum of mu L over the nodes of cluster k."""
     total = 0.0
     for j in range(len(c.cluster)):
@@ -147,7 +147,7 @@ def _solve_case(c, case):
             unknown[count] = n + d
             count += 1
         elif case.mode[d] != OPEN:
-            x[n + d] = case.mode[d] * _limit(d, c.slipping, c, x)
+            x[n + d] = case.mode[d] * friction_limit(d, c.slipping, c, x)
     _follow(c, case)
     system, right, pivots = np.empty((count, count)), np.empty(count), np.empty(count, np.int64)
     for a in range(count):
@@ -166,7 +166,7 @@ def _solve_case(c, case):
         x[unknown[a]] = right[a]
     for d in range(k):
         if case.mode[d] != STICK and case.mode[d] != OPEN:
-            x[n + d] = case.mode[d] * _limit(d, c.slipping, c, x)
+            x[n + d] = case.mode[d] * friction_limit(d, c.slipping, c, x)
 
 
 @routine
@@ -190,7 +190,7 @@ def _holds(c, sticking, case):
     for d in range(len(c.mode)):
         if c.mode[d] == STICK:
             if case.mode[d] == STICK:
-                limit = _limit(d, sticking, c, x)
+                limit = friction_limit(d, sticking, c, x)
                 holds = holds and abs(x[n + d]) <= limit + slack and abs(y[n + d]) <= rest
             elif case.mode[d] != OPEN:
                 holds = holds and case.mode[d] * y[n + d] <= rest
@@ -215,13 +215,13 @@ def _sweep(c, case):
             if r < n:
                 impulse = max(c.least[r], x[r] - y[r] / c.matrix[r, r])
             elif c.mode[r - n] == STICK:
-                limit = _limit(r - n, c.sticking, c, x)
+                limit = friction_limit(r - n, c.sticking, c, x)
                 impulse = x[r] - y[r] / c.matrix[r, r]
                 if abs(impulse) > limit:
-                    limit = _limit(r - n, c.slipping, c, x)
+                    limit = friction_limit(r - n, c.slipping, c, x)
                     impulse = limit if impulse > 0.0 else -limit
             else:
-                impulse = c.mode[r - n] * _limit(r - n, c.slipping, c, x)
+                impulse = c.mode[r - n] * friction_limit(r - n, c.slipping, c, x)
             change = impulse - x[r]
             x[r] = impulse
             for q in range(n + k):
@@ -234,10 +234,10 @@ def _sweep(c, case):
     for d in range(k):
         case.mode[d] = c.mode[d]
         if c.mode[d] == STICK:
-            limit = _limit(d, c.sticking, c, x)
+            limit = friction_limit(d, c.sticking, c, x)
             if limit == 0.0:
                 case.mode[d] = OPEN
-            elif abs(x[n + d]) >= min(limit, _limit(d, c.slipping, c, x)) * (1.0 - 1e-12):
+            elif abs(x[n + d]) >= min(limit, friction_limit(d, c.slipping, c, x)) * (1.0 - 1e-12):
                 case.mode[d] = 1 if x[n + d] > 0.0 else -1
             # A cluster without slip at less than the limit sticks.
             if limit > 0.0 and abs(x[n + d]) < limit * (1.0 - 1e-12) and y[n + d] == 0.0:

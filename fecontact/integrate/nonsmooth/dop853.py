@@ -12,7 +12,7 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from fecontact.core.compiled import helper, routine
-from fecontact.integrate.nonsmooth.steps.rates import set_powers, set_rates
+from fecontact.integrate.nonsmooth.equations import set_powers, set_rates
 
 A, B, C = (np.ascontiguousarray(table) for table in (DOP853.A, DOP853.B, DOP853.C))
 ERROR_5, ERROR_3 = np.ascontiguousarray(DOP853.E5), np.ascontiguousarray(DOP853.E3)
@@ -46,14 +46,13 @@ def take(step, p, progress, w, workspace):
                           + a[7] * slopes[7, i] + a[8] * slopes[8, i] + a[9] * slopes[9, i]
                           + a[10] * slopes[10, i])
             new[i] = Y[i] + h * total
-        set_rates(min(step.t + C[stage] * h, step.latest), new, p, progress, w, workspace,
-                  slopes[stage])
+        set_rates(min(step.t + C[stage] * h, step.latest), new, p, progress, w, slopes[stage])
         if B[stage] != 0.0:
-            set_powers(new, p, progress, w, workspace, slopes[stage, 2 * m :])
+            set_powers(new, p, progress, w, slopes[stage, 2 * m :])
     for i in range(len(Y)):
         new[i] = Y[i] + h * _combined(B, slopes, i)
-    set_rates(min(step.t + h, step.latest), new, p, progress, w, workspace, slopes[STAGES])
-    set_powers(new, p, progress, w, workspace, slopes[STAGES, 2 * m :])
+    set_rates(min(step.t + h, step.latest), new, p, progress, w, slopes[STAGES])
+    set_powers(new, p, progress, w, slopes[STAGES, 2 * m :])
 
 
 @helper
@@ -82,6 +81,14 @@ def error(h, Y, limits, workspace):
     return h * fifth / math.hypot(1.0, 0.1 * third / fifth)
 
 
+@helper
+def shortened(length, size_of_error):
+    """Length of the next attempt at a step with too large an error."""
+    if math.isfinite(size_of_error):
+        return length * max(0.2, 0.9 * size_of_error**-0.125)
+    return length * 0.1
+
+
 @routine
 def prepare_dense(step, p, progress, w, workspace):
     """Fill ``workspace.parts`` (PARTS, size) for `interpolate`; needs three more slopes."""
@@ -94,8 +101,8 @@ def prepare_dense(step, p, progress, w, workspace):
             state[i] = Y[i] + h * (
                 _combined(row, slopes, i) + row[12] * slopes[12, i] + row[13] * slopes[13, i]
                 + row[14] * slopes[14, i])
-        set_rates(t + C_DENSE[extra] * h, state, p, progress, w, workspace, slopes[stage])
-        set_powers(state, p, progress, w, workspace, slopes[stage, 2 * m :])
+        set_rates(t + C_DENSE[extra] * h, state, p, progress, w, slopes[stage])
+        set_powers(state, p, progress, w, slopes[stage, 2 * m :])
     for i in range(len(Y)):
         change = new[i] - Y[i]
         parts[0, i] = change

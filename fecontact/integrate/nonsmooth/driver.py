@@ -1,7 +1,7 @@
 """Runs with set-valued friction and rigid stops: the limit of infinite smoothing slope."""
 
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from typing import Any, cast
@@ -14,16 +14,14 @@ from fecontact.core.records import allocate
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.coefficients import Coefficient, node_values
 from fecontact.integrate.event_arrays import watch_for
-from fecontact.integrate.events import AnyEvent
 from fecontact.integrate.kept_rows import workspace_for_rows
 from fecontact.integrate.kept_steps import KeptSteps
 from fecontact.integrate.nonsmooth import problem as kinds
 from fecontact.integrate.nonsmooth.equations import compiled_derivative
 from fecontact.integrate.nonsmooth.event_log import note_events
 from fecontact.integrate.nonsmooth.rigid_stops import compiled_change
-from fecontact.integrate.nonsmooth.steps.limits import floor_of, longest_between_events, stops_of
 from fecontact.integrate.rodas5p.event_kernels import Watch
-from fecontact.integrate.run_limits import longest_step
+from fecontact.integrate.run_limits import largest_motions, longest_step
 from fecontact.integrate.step_loop import REJECTIONS, STEPS
 from fecontact.integrate.step_runs import StepRun, complete, until_end
 from fecontact.integrate.task import SetValuedOptions, Task
@@ -32,10 +30,17 @@ from fecontact.laws.base import FrictionLaw
 from fecontact.laws.friction.stribeck import Frictionless
 from fecontact.laws.friction_curve import CREEP, STEEP
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.loads import work_of_loads
 from fecontact.system.powers import POWER_COUNT
 
 # Largest number of independent slip velocities that run from event to event unless asked to.
 _FEW = 8
+# Longest step in periods of the excitation, where it is the only thing given in time.
+_PERIOD_PART = 0.125
+# Change of a signal within rounding of a time, in parts of its largest value, that is a jump.
+_JUMP = 1e-9
+# Errors of velocities count relative to this part of what drive and loads bring about.
+_DRIVEN = 1e-3
 
 
 def integrate_set_valued(task: Task, options: SetValuedOptions) -> Solution:
@@ -109,48 +114,39 @@ def start(task: Task, options: SetValuedOptions) -> Run:
                                          tangential=options.tangential_restitution)
     problem = problem._replace(poisson=int(options.impact_law == "poisson"))
     method = _chosen(problem, options.method)
-    solid = system.basis.dimension == 3
     progress = kinds.progress_for(problem, rubbing, state, float(times[0]), 0.01 * longest)
     limits = kinds.Limits(
-        stops_of(system, float(times[0]), float(times[-1])),
-        floor_of(system, state, times, longest), task.rtol, longest)
+        _stops_of(system, float(times[0]), float(times[-1])),
+        _floor_of(system, state, times, longest), task.rtol, longest)
     if longest == default and method == "event-driven" and restitution is None:
         most = np.inf if task.max_step is None else float(task.max_step)
-        limits = limits._replace(longest=min(longest_between_events(system, times), most))
-    sizes = len(progress.state), len(progress.carried), system.basis.contact_nodes
-    workspace = workspace_for_rows(task.keep_steps, sum(sizes))
-    output, kept = (kinds.Output(rows, *(np.empty((len(rows), size)) for size in sizes))
+        limits = limits._replace(longest=min(_longest_between_events(system, times), most))
+    columns = len(progress.state), len(progress.carried), system.basis.contact_nodes
+    workspace = workspace_for_rows(task.keep_steps, sum(columns))
+    output, kept = (kinds.Output(rows, *(np.empty((len(rows), size)) for size in columns))
                     for rows in (times, np.zeros(workspace)))
-    evaluation = kinds.evaluation_for(problem)
-    loop: Callable[..., int]
+    sizes = kinds.sizes_of(problem)
+    data = problem, limits, progress, output, kept
     watch = watch_for(system, events, False)
     watch = watch._replace(note=note_events.address if events else 0)
-    data = problem, limits, progress, output, kept
-    if solid and restitution is not None:
-        from fecontact.integrate.nonsmooth import impact_steps
-        from fecontact.integrate.nonsmooth.space_impulses import ImpactWorkspace
-        _require_no_events(events)
-        loop = partial(impact_steps.run_impact_steps,
-                       impact_steps.Data(*data, allocate(ImpactWorkspace, kinds.sizes_of(problem))))
-    elif method == "event-driven":
-        from fecontact.integrate.nonsmooth.event_driven import Data, run_for
-        from fecontact.integrate.nonsmooth.event_search import workspace_for
-        loop = partial(run_for(problem), Data(*data, evaluation, workspace_for(problem), watch))
-    else:
-        from fecontact.integrate.nonsmooth import time_stepping
-        from fecontact.integrate.nonsmooth.stepping_workspace import (
-            workspace_for as stepping_workspace,
-        )
-        _require_no_events(events)
-        loop = partial(time_stepping.run_steps, time_stepping.Data(
-            *data, evaluation, stepping_workspace(problem)))
-    return Run(loop, progress, output, kept, watch, method)
-
-
-def _require_no_events(events: Sequence[AnyEvent]) -> None:
-    if events:
+    loop: Callable[..., int]
+    if method == "event-driven":
+        from fecontact.integrate.nonsmooth.event_driven import run_for
+        from fecontact.integrate.nonsmooth.event_search import Data, Workspace
+        loop = partial(run_for(problem), Data(*data, allocate(kinds.Evaluation, sizes),
+                                              allocate(Workspace, sizes), watch))
+    elif events:
         raise InputError("TimeStepping(), which this system needs, locates no events; leave them "
                          "out, or take fewer contact nodes.")
+    elif restitution is not None:
+        from fecontact.integrate.nonsmooth import impact_steps
+        loop = partial(impact_steps.run_impact_steps, impact_steps.Data(
+            *data, allocate(impact_steps.ImpactWorkspace, sizes)))
+    else:
+        from fecontact.integrate.nonsmooth import time_stepping
+        loop = partial(time_stepping.run_steps, time_stepping.Data(
+            *data, allocate(kinds.Evaluation, sizes), allocate(time_stepping.Workspace, sizes)))
+    return Run(loop, progress, output, kept, watch, method)
 
 
 def nonsmooth_problem(
@@ -312,3 +308,50 @@ def _chosen(problem: kinds.NonsmoothProblem, method: str) -> str:
         raise InputError(f"EventDriven() needs independent slip velocities, but the {len(moving)} "
                          f"different ones depend on fewer modes; take SetValued().")
     return method
+
+
+def _stops_of(system: ContactSystem, start: float, end: float) -> Array:
+    """Breaks (k,) up to the end; where signals jump right after one, the next number instead."""
+    found = np.array(system.breakpoints(float(np.nextafter(start, -np.inf)),
+                                        float(np.nextafter(end, np.inf))), dtype=float)
+    near = np.stack([np.nextafter(found, -np.inf), found, np.nextafter(found, np.inf)])
+    jumps = np.zeros((2, len(found)), dtype=bool)
+    for signal in (*system.drive.motions, *system.load.signals.values()) if len(found) else ():
+        value, rate = signal.history(near.ravel()).T.reshape(2, 3, -1)
+        steepest = np.abs(rate).max(axis=0) * np.diff(near, axis=0).max(axis=0)
+        jumps |= np.abs(np.diff(value, axis=0)) > 2.0 * steepest + _JUMP * signal.largest
+    stops = np.union1d(found[jumps[0] | ~jumps[1]], near[2, jumps[1]])
+    return stops[(stops > start) & (stops <= end)]
+
+
+def _longest_between_events(system: ContactSystem, times: Array) -> float:
+    """Longest step [s] of an event-driven run with compliant contact."""
+    if not system.prescribed_motion.constant or system.ground.wavy:
+        return longest_step(system, times)
+    start, end = float(times[0]), float(times[-1])
+    return min((end - start) / 50.0, _PERIOD_PART * system.shortest_period(start, end))
+
+
+def _floor_of(system: ContactSystem, state: Array, times: Array, longest: float) -> Array:
+    """Values (2 m + p + n,) below which the error is not measured relative to the state."""
+    m, n = system.basis.modes, system.basis.contact_nodes
+    arrays, drive = system.arrays, system.drive
+    largest = largest_motions(system)
+    depth = system.penetration_scale
+    fastest = system.prescribed_motion.largest_speed(float(times[0]), float(times[-1]))
+    speed = max(0.01 * fastest, depth / longest)
+    # Velocities that drive and loads bring about in each mode, within a step where it is slow.
+    springs = arrays.drive_stiffness[:, None] * arrays.drive_shapes
+    applied_forces = [(springs, [motion.largest for motion in drive.motions[: len(springs)]]),
+              (arrays.load_shapes, [signal.largest for signal in system.load.signals.values()])]
+    applied = sum(np.array(sizes) @ np.abs(shapes) for shapes, sizes in applied_forces)
+    slowest = np.maximum(np.diag(arrays.stiffness), 1.0 / longest**2)
+    driven = applied / np.sqrt(slowest)
+    energy = (0.5 * state[m : 2 * m] @ state[m : 2 * m]
+              + 0.5 * abs(state[:m] @ system.arrays.stiffness @ state[:m])
+              + work_of_loads(system.basis, system.load, depth)
+              + sum(0.5 * c * motion.largest**2 for c, motion in zip(
+                  drive.stiffness, drive.motions, strict=True))
+              + 0.5 * driven @ driven)
+    return np.concatenate([depth / largest, np.maximum(speed / largest, _DRIVEN * driven),
+                           np.full(POWER_COUNT + n, energy or 0.5 * speed**2)])

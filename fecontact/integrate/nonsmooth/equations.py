@@ -10,12 +10,17 @@ Sticking clusters have ``a_c = 0``, which gives their ``R_c``; each node takes a
 proportion to its limit. Closed rigid stops add u'' = 0 for their normal forces, and friction that
 slips is proportional to these. The state of these kernels is Y = [q, q', work, friction work per
 node].
+
+A stage of a step needs no more than rates; powers are evaluated where they enter the end of a step
+or its interpolation, and limits of stick where forces are compared with them.
 """
 
+import math
 from collections.abc import Callable
 
 from fecontact.core.addresses import function_at
-from fecontact.core.compiled import compile_law, helper
+from fecontact.core.compiled import compile_law, helper, routine
+from fecontact.core.copies import put
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.core.records import IntegerVector, Vector
 from fecontact.integrate.nonsmooth.problem import (
@@ -24,6 +29,7 @@ from fecontact.integrate.nonsmooth.problem import (
     FORCE,
     GRIP,
     LIMIT,
+    MOTION,
     PENETRATION,
     PRESSING,
     RATE,
@@ -31,23 +37,41 @@ from fecontact.integrate.nonsmooth.problem import (
     SLIP_OF,
     SLOPE,
     SLOPE_OF,
+    SPEED,
     STICK,
+    TRAVEL,
+    WHEN,
+    ContactState,
     Evaluation,
     NonsmoothProblem,
 )
 from fecontact.laws.friction_curve import CREEP
 from fecontact.laws.signatures import signal_at
-from fecontact.system.kernels import body_acceleration, prescribed_at
+from fecontact.system.kernels import (
+    add_drive_force,
+    add_loads,
+    body_acceleration,
+    set_constant_load,
+)
 from fecontact.system.node_forces import normal_force, plane_friction, pressing_force
-from fecontact.system.nodes import ground_speed, node_contact, node_motion
+from fecontact.system.nodes import (
+    GroundMotion,
+    ground_motion,
+    ground_speed,
+    node_contact,
+    node_motion,
+)
 from fecontact.system.powers import (
     BELT_FRICTION,
     BELT_NORMAL,
     CONTACT_DAMPING,
+    DASHPOTS,
+    DRIVE,
     FRICTION,
+    LOAD,
     POWER_COUNT,
     belt_normal_power,
-    body_powers,
+    matrix_powers,
 )
 
 # Y' is evaluated in many places; behind an address its code is not copied into each of them.
@@ -64,14 +88,6 @@ def derivative(t, Y, p, status, closed, w, out):
 
 
 @helper
-def solve_small(w, size):
-    """Replace the first entries of w.right by the solution, with the first rows of w.matrix."""
-    matrix = w.matrix[:size, :size]
-    factorise(matrix, size, w.pivots)
-    solve(matrix, w.pivots[:size], w.right[:size])
-
-
-@helper
 def speed_rate(t, p):
     """Acceleration of the ground, from its speed."""
     s, d = p.system, p.tick
@@ -85,20 +101,43 @@ def speed_rate(t, p):
 
 
 @helper
-def free_acceleration(t, Y, s, out):
-    """Fill out (m,) with q'' without contact; returns the motion of the ground."""
-    moved = prescribed_at(t, s, out)
-    body_acceleration(out, Y, s, out)
-    return moved
+def set_implicit_matrix(damped, stiff, s, out):
+    """Fill out (m, m) with 1 + C ``damped`` + K ``stiff``, the matrix of an implicit step."""
+    for i in range(len(out)):
+        for k in range(len(out)):
+            out[i, k] = damped * s.damping[i, k] + stiff * s.stiffness[i, k]
+        out[i, i] += 1.0
 
 
 @helper
-def contact_powers(moved, s, nodes, friction, elastic, out):
-    """Add the powers at the nodes to out (p,) and put those of friction behind them (n,).
+def set_prescribed(t, s, w):
+    """Fill ``w.given``, ``w.loads`` and ``w.applied_forces`` unless they are those of this time."""
+    given = w.given
+    if given[WHEN] == t:
+        return
+    moved = ground_motion(t, s)
+    given[WHEN], given[TRAVEL], given[SPEED] = t, moved.travel, moved.speed
+    set_constant_load(s, w.loads)
+    add_loads(t, s, w.loads)
+    put(w.loads, w.applied_forces)
+    for axis in range(len(s.drive)):
+        stiffness, damping = s.drive_stiffness[axis], s.drive_damping[axis]
+        if stiffness != 0.0 or damping != 0.0:
+            value, rate = signal_at(s.drive[axis])(t, s.drive_parameters[axis])
+            given[MOTION + 2 * axis], given[MOTION + 2 * axis + 1] = value, rate
+            add_drive_force(stiffness * value + damping * rate, axis, s, w.applied_forces)
 
-    ``elastic`` says whether the normal forces come from the normal laws.
-    """
-    n = len(nodes)
+
+@helper
+def _moved(given):
+    """Motion of the ground in ``given``."""
+    return GroundMotion(given[TRAVEL], given[SPEED], 0.0, 0.0)
+
+
+@helper
+def contact_powers(moved, p, nodes, friction, out):
+    """Add the powers at the nodes to out (p,) and put those of friction behind them (n,)."""
+    s, n = p.system, len(nodes)
     for j in range(n):
         force, rubbed = nodes[j, FORCE], 0.0
         for k in range(s.rows.shape[1] - 1):
@@ -107,7 +146,7 @@ def contact_powers(moved, s, nodes, friction, elastic, out):
             out[BELT_NORMAL] += belt_normal_power(force, slope, slip, speed, s)
             out[BELT_FRICTION] -= R * speed
             rubbed += R * slip
-        if elastic and nodes[j, RATE] != 0.0:
+        if p.rigid == 0 and nodes[j, RATE] != 0.0:
             # Damping may bring the force to zero while the spring is still compressed.
             stored = normal_force(j, nodes[j, PENETRATION], 0.0, s)[0]
             out[CONTACT_DAMPING] += (force - stored) * nodes[j, RATE]
@@ -239,64 +278,49 @@ def pushing_row(a, i, p, w):
 
 
 @helper
-def hold_contacts(t, p, status, closed, w, acceleration):
-    """Forces of closed rigid stops and of the clusters that stick on them.
+def coupling(a, b, p, w):
+    """Change of what one constraint holds by a unit force of another; see :func:`held_row`."""
+    total = 0.0
+    for i in range(p.rows.shape[1]):
+        total += held_row(a, i, p, w) * pushing_row(b, i, p, w)
+    return total
 
-    From u'' = 0 and a = 0, put into w and ``acceleration``; friction of stops that slip is
-    proportional to their normal forces.
+
+@helper
+def residual(a, ground, acceleration, p, w):
+    """What u'' of node a, or -a of a cluster, is at an acceleration, if the ground has another."""
+    n = len(p.cluster)
+    total = (w.nodes[a, CURVED] - w.nodes[a, SLOPE] * ground if a < n
+             else p.sliding[a - n] * ground)
+    for i in range(p.rows.shape[1]):
+        total -= held_row(a, i, p, w) * acceleration[i]
+    return total
+
+
+@helper
+def hold(count, p, w, out):
+    """Change out (m,) by contact forces so that the residuals ``w.right`` of constraints vanish.
+
+    The constraints are the first of ``w.indices``, clusters behind the nodes. Their forces take
+    the place of the residuals.
     """
-    s = p.system
-    n, _, m = s.rows.shape
-    count = 0
-    for j in range(n):
-        c = p.cluster[j]
-        slip = w.nodes[j, SLIP]
-        w.slip[c] = slip
-        if closed[j]:
-            w.indices[count] = j
-            count += 1
-            direction = sense(status[c], slip)
-            if direction != 0:
-                w.friction[j] = slipping_force(j, slip, float(direction), w.nodes[j, GRIP], s)
-    if count == 0:
-        return
-    for c in range(len(p.rows)):
-        if status[c] == STICK:
-            w.indices[count] = n + c
-            count += 1
-    ground = speed_rate(t, p)
+    matrix = w.matrix[:count, :count]
     for a in range(count):
-        j = w.indices[a]
-        w.right[a] = (w.nodes[j, CURVED] - w.nodes[j, SLOPE] * ground if j < n
-                      else p.sliding[j - n] * ground)
-        for i in range(m):
-            w.right[a] -= held_row(j, i, p, w) * acceleration[i]
         for b in range(count):
-            total = 0.0
-            for i in range(m):
-                total += held_row(j, i, p, w) * pushing_row(w.indices[b], i, p, w)
-            w.matrix[a, b] = total
-    solve_small(w, count)
+            matrix[a, b] = coupling(w.indices[a], w.indices[b], p, w)
+    factorise(matrix, count, w.pivots)
+    solve(matrix, w.pivots[:count], w.right[:count])
     for a in range(count):
-        for i in range(m):
-            acceleration[i] += pushing_row(w.indices[a], i, p, w) * w.right[a]
-        if w.indices[a] < n:
-            w.nodes[w.indices[a], FORCE] = w.right[a]
-        else:
-            w.total[w.indices[a] - n] = w.right[a]
-    for j in range(n):
-        c, force = p.cluster[j], w.nodes[j, FORCE]
-        w.nodes[j, PRESSING] = force * w.nodes[j, GRIP]
-        w.pressing[c] += w.nodes[j, PRESSING]
-        w.friction[j] *= force
-        if status[c] != STICK:
-            w.total[c] += w.friction[j]
+        for i in range(p.rows.shape[1]):
+            out[i] += pushing_row(w.indices[a], i, p, w) * w.right[a]
 
 
 @helper
 def share_friction(p, status, w):
     """Put the parts of the nodes in the friction of sticking clusters into ``w.friction``."""
     alone = len(p.rows) == len(p.cluster)
+    if not alone:
+        set_limits(p, w)
     for j in range(len(p.cluster)):
         c = p.cluster[j]
         if status[c] == STICK:
@@ -307,90 +331,140 @@ def share_friction(p, status, w):
 
 
 @helper
-def hold_clusters(t, p, status, w, acceleration):
-    """Friction forces of sticking clusters, from a = 0, put into w.total and ``acceleration``."""
-    clusters, m = p.rows.shape
-    count = 0
-    for c in range(clusters):
-        if status[c] == STICK:
-            w.indices[count] = c
+def _add_contact_forces(t, Y, p, status, closed, w, acceleration):
+    """Put the contact forces at Y into w and into ``acceleration``, which is that without them.
+
+    Closed rigid stops have u'' = 0, and clusters that stick on them a = 0; friction of stops that
+    slip is proportional to their normal forces. Limits of stick are left out.
+    """
+    s = p.system
+    n, _, m = s.rows.shape
+    observe_forces(_moved(w.given), Y, p, w.nodes)
+    w.total[:] = 0.0
+    w.pressing[:] = 0.0
+    w.friction[:] = 0.0
+    count, rigid = 0, p.rigid != 0
+    for j in range(n):
+        c, slip = p.cluster[j], w.nodes[j, SLIP]
+        w.slip[c] = slip
+        direction = sense(status[c], slip)
+        if rigid:
+            if closed[j]:
+                w.indices[count] = j
+                count += 1
+                if direction != 0:
+                    w.friction[j] = slipping_force(j, slip, float(direction), w.nodes[j, GRIP], s)
+            continue
+        force, pressing, friction = w.nodes[j, FORCE], w.nodes[j, PRESSING], 0.0
+        if pressing > 0.0 and direction != 0:
+            friction = slipping_force(j, slip, float(direction), pressing, s)
+            w.friction[j] = friction
+            w.total[c] += friction
+        w.pressing[c] += pressing
+        for i in range(m):
+            acceleration[i] += lifting_row(j, i, w, s) * force - s.rows[j, 0, i] * friction
+    for c in range(len(p.rows)):
+        if status[c] == STICK and (count > 0 or not rigid):
+            w.indices[count] = n + c
             count += 1
     if count == 0:
         return
     ground = speed_rate(t, p)
-    if count == 1:
-        c = w.indices[0]
-        right, total = -p.sliding[c] * ground, 0.0
+    if count == 1 and not rigid:
+        # The most frequent case needs no system of equations.
+        c, inertia = w.indices[0] - n, 0.0
+        force = -p.sliding[c] * ground
         for i in range(m):
-            right += p.rows[c, i] * acceleration[i]
-            total += p.rows[c, i] * p.rows[c, i]
-        force = right / total
-        w.total[c] = force
+            force += p.rows[c, i] * acceleration[i]
+            inertia += p.rows[c, i] * p.rows[c, i]
+        w.total[c] = force / inertia
         for i in range(m):
-            acceleration[i] -= p.rows[c, i] * force
+            acceleration[i] -= p.rows[c, i] * w.total[c]
         return
     for a in range(count):
-        c = w.indices[a]
-        w.right[a] = -p.sliding[c] * ground
-        for i in range(m):
-            w.right[a] += p.rows[c, i] * acceleration[i]
-        for b in range(count):
-            total = 0.0
-            for i in range(m):
-                total += p.rows[c, i] * p.rows[w.indices[b], i]
-            w.matrix[a, b] = total
-    solve_small(w, count)
+        w.right[a] = residual(w.indices[a], ground, acceleration, p, w)
+    hold(count, p, w, acceleration)
     for a in range(count):
-        c = w.indices[a]
-        w.total[c] = w.right[a]
-        for i in range(m):
-            acceleration[i] -= p.rows[c, i] * w.right[a]
+        if w.indices[a] < n:
+            w.nodes[w.indices[a], FORCE] = w.right[a]
+        else:
+            w.total[w.indices[a] - n] = w.right[a]
+    for j in range(n if rigid else 0):
+        c, force = p.cluster[j], w.nodes[j, FORCE]
+        w.nodes[j, PRESSING] = force * w.nodes[j, GRIP]
+        w.pressing[c] += w.nodes[j, PRESSING]
+        w.friction[j] *= force
+        if status[c] != STICK:
+            w.total[c] += w.friction[j]
+
+
+@routine
+def set_rates(t, Y, p, contact, w, out):
+    """Fill out (2 m,) with q' and q'' at Y, and w with what acts, except for limits of stick.
+
+    ``contact`` is a record with ``status`` and ``closed``, such as the progress of a run.
+    """
+    s = p.system
+    m = s.rows.shape[2]
+    set_prescribed(t, s, w)
+    acceleration = out[m : 2 * m]
+    for i in range(m):
+        out[i] = Y[m + i]
+    body_acceleration(w.applied_forces, Y, s, acceleration)
+    _add_contact_forces(t, Y, p, contact.status, contact.closed, w, acceleration)
 
 
 @helper
-def add_contact_forces(t, Y, moved, p, status, closed, w, acceleration):
-    """Put the contact forces at Y into w and into ``acceleration``, which is that without them.
-
-    Limits of stick are left out.
-    """
-    s = p.system
-    n, _, m = s.rows.shape
-    observe_forces(moved, Y, p, w.nodes)
-    w.total[:] = 0.0
-    w.pressing[:] = 0.0
-    w.friction[:] = 0.0
-    if p.rigid != 0:
-        hold_contacts(t, p, status, closed, w, acceleration)
-        return
-    for j in range(n):
-        c = p.cluster[j]
-        slip, pressing = w.nodes[j, SLIP], w.nodes[j, PRESSING]
-        w.slip[c] = slip
-        w.pressing[c] += pressing
-        direction = sense(status[c], slip)
-        if pressing > 0.0 and direction != 0:
-            w.friction[j] = slipping_force(j, slip, float(direction), pressing, s)
-            w.total[c] += w.friction[j]
-        force = w.nodes[j, FORCE]
+def set_slips(t, Y, p, w):
+    """Put the slip velocities of the clusters at Y into ``w.slip``."""
+    clusters, m = p.rows.shape
+    speed = ground_motion(t, p.system).speed
+    for c in range(clusters):
+        w.slip[c] = -p.sliding[c] * speed
         for i in range(m):
-            acceleration[i] += (lifting_row(j, i, w, s) * force
-                                - s.rows[j, 0, i] * w.friction[j])
-    hold_clusters(t, p, status, w, acceleration)
+            w.slip[c] += p.rows[c, i] * Y[m + i]
+
+
+@helper
+def _add_drive_powers(given, Y, s, out):
+    """Add the powers of the drive to out."""
+    m = s.rows.shape[2]
+    for axis in range(len(s.drive)):
+        stiffness, damping = s.drive_stiffness[axis], s.drive_damping[axis]
+        if stiffness == 0.0 and damping == 0.0:
+            continue
+        value, rate = given[MOTION + 2 * axis], given[MOTION + 2 * axis + 1]
+        place, speed = 0.0, 0.0
+        for i in range(m):
+            place += s.drive_shapes[axis, i] * Y[i]
+            speed += s.drive_shapes[axis, i] * Y[m + i]
+        out[DRIVE] += (stiffness * (value - place) + damping * (rate - speed)) * rate
+        out[DASHPOTS] += damping * rate * (rate - 2.0 * speed)
+
+
+@routine
+def set_powers(Y, p, contact, w, out):
+    """Fill out (p + n,) with the powers at Y, where :func:`set_rates` has been last."""
+    s = p.system
+    m = s.rows.shape[2]
+    share_friction(p, contact.status, w)
+    for k in range(POWER_COUNT):
+        out[k] = 0.0
+    _add_drive_powers(w.given, Y, s, out)
+    for i in range(m):
+        out[LOAD] += w.loads[i] * Y[m + i]
+    matrix_powers((0, m, 0, m), Y, s, out)
+    contact_powers(_moved(w.given), p, w.nodes, w.friction, out)
 
 
 def _derivative(t, Y, p, status, closed, w, out):
     """Fill out with Y' for given status of the clusters and stops, and w with what acts."""
-    s = p.system
-    m = s.rows.shape[2]
-    for i in range(m):
-        out[i] = Y[m + i]
-    acceleration = out[m : 2 * m]
-    moved = free_acceleration(t, Y, s, acceleration)
-    add_contact_forces(t, Y, moved, p, status, closed, w, acceleration)
+    # Another problem may have been the last.
+    w.given[WHEN] = math.nan
+    contact = ContactState(status, closed)
+    set_rates(t, Y, p, contact, w, out)
+    set_powers(Y, p, contact, w, out[2 * p.rows.shape[1] :])
     set_limits(p, w)
-    share_friction(p, status, w)
-    body_powers(t, Y, s, out[2 * m :])
-    contact_powers(moved, s, w.nodes, w.friction, p.rigid == 0, out[2 * m :])
 
 
 compiled_derivative = compile_law(DERIVATIVE, "derivative(t, Y, p, status, closed, w, out)",

@@ -7,17 +7,31 @@ step's interpolation to the last digits, and repeated with the shorter length.
 
 import math
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
 from fecontact.core.copies import put
-from fecontact.integrate.nonsmooth.dop853 import STAGES, error, interpolate, prepare_dense, take
-from fecontact.integrate.nonsmooth.equations import derivative, place_size
-from fecontact.integrate.nonsmooth.event_log import BEGIN, CHANGED, WITHIN, full, note_at
+from fecontact.integrate.nonsmooth.dop853 import (
+    STAGES,
+    error,
+    interpolate,
+    prepare_dense,
+    shortened,
+    take,
+)
+from fecontact.integrate.nonsmooth.equations import (
+    derivative,
+    place_size,
+    set_rates,
+    set_slips,
+    share_friction,
+)
+from fecontact.integrate.nonsmooth.event_log import BEGIN, CHANGED, WITHIN, note_at
 from fecontact.integrate.nonsmooth.event_search import (
     ROUNDING,
+    Data,
     Workspace,
     first_changes,
     least_depth,
@@ -59,11 +73,10 @@ from fecontact.integrate.nonsmooth.rigid_stops import (
     change_contacts_at,
     settle,
 )
-from fecontact.integrate.nonsmooth.steps.flights import YOUNG, advance
-from fecontact.integrate.nonsmooth.steps.rates import set_rates, set_slips, share
+from fecontact.integrate.nonsmooth.steps.flights import advance
 from fecontact.integrate.nonsmooth.steps.releases import holding, set_left
 from fecontact.integrate.nonsmooth.transitions import decide_clusters, hold_velocity
-from fecontact.integrate.rodas5p.event_kernels import Watch
+from fecontact.integrate.rodas5p.event_kernels import full
 from fecontact.integrate.small_systems import FEW, Sized
 from fecontact.integrate.step_loop import (
     BEYOND,
@@ -92,19 +105,6 @@ _SLOW = 1e-9
 # Repeated steps in a row, without any time between them, in which what lets go may still hold;
 # after these rounding alone holds it.
 _MOST_HELD = 3
-
-
-class Data(NamedTuple):
-    """A run from event to event; what is watched for is noted in ``watch``."""
-
-    problem: NonsmoothProblem
-    limits: Limits
-    progress: Progress
-    output: Output
-    kept: Output
-    evaluation: Evaluation
-    workspace: Workspace
-    watch: Watch
 
 
 @helper
@@ -180,8 +180,8 @@ def _fill(row, output, step, data):
     p, progress, w, workspace = data.problem, data.progress, data.evaluation, data.workspace
     time, state = output.times[row], output.states[row]
     interpolate((time - step.t) / step.h, progress.state, workspace.parts, state)
-    set_rates(time, state, p, progress, w, workspace, workspace.rate)
-    share(p, progress.status, w)
+    set_rates(time, state, p, progress, w, workspace.rate)
+    share_friction(p, progress.status, w)
     for j in range(len(w.friction)):
         output.friction[row, j], output.normal[row, j] = w.friction[j], w.nodes[j, FORCE]
 
@@ -193,17 +193,9 @@ def _sizes(progress, w):
     quick, fast, deep = largest[SLIP_SIZE], largest[RATE_SIZE], largest[DEPTH_SIZE]
     for c in range(len(w.slip)):
         quick = max(quick, abs(w.slip[c]))
-    for j in range(len(w.nodes)):
+    for j in range(len(w.friction)):
         fast, deep = max(fast, abs(w.nodes[j, RATE])), max(deep, abs(w.nodes[j, PENETRATION]))
     return quick, fast, deep
-
-
-@helper
-def _shortened(length, size_of_error):
-    """Length of the next attempt at a step with too large an error."""
-    if math.isfinite(size_of_error):
-        return length * max(0.2, 0.9 * size_of_error**-0.125)
-    return length * 0.1
 
 
 @helper
@@ -254,7 +246,7 @@ def _accept(step, p, progress, output, w, workspace):
     for c in range(len(status)):
         workspace.fresh[c] = False
     for j in range(len(closed)):
-        workspace.fresh[len(status) + j] = workspace.flights[j, YOUNG] != 0.0
+        workspace.fresh[len(status) + j] = workspace.flights.young[j]
     any_held = False
     for c in range(len(p.rows)):
         workspace.held[c] = status[c] == STICK
@@ -342,8 +334,7 @@ def _begin(t, data):
     if outcome == RUNNING:
         derivative(t, progress.state, p, progress.status, progress.closed, w, workspace.slopes[0])
         if watch.note != 0:
-            note_at(watch.note)(next_target(t, 0.0, CUT, 0.0, data), 0.0, BEGIN, p, progress, w,
-                                workspace, watch)
+            note_at(watch.note)(next_target(t, 0.0, CUT, 0.0, data), 0.0, BEGIN, data)
             derivative(t, progress.state, p, progress.status, progress.closed, w,
                        workspace.slopes[0])
     _show(t, progress, data.output, w)
@@ -383,14 +374,14 @@ def _attempt(step, last, smallest, data):
         return TAKEN, length
     holds = holding(progress)
     if holds and counts[KNOWN] == 0:
-        set_rates(step.t, progress.state, p, progress, w, workspace, workspace.rate)
+        set_rates(step.t, progress.state, p, progress, w, workspace.rate)
         set_left(p, progress, w, workspace.ends[0])
         counts[KNOWN] = 1
     take(step, p, progress, w, workspace)
     size_of_error = error(length, progress.state, limits, workspace)
     if not size_of_error <= 1.0:
         numbers[REPEATED] = 1.0
-        h = _shortened(length, size_of_error)
+        h = shortened(length, size_of_error)
         if math.isfinite(size_of_error):
             return FAILED, h
         workspace.slopes[1:, :] = 0.0
@@ -420,15 +411,14 @@ def _find_end(step, data):
     watch = data.watch
     if watch.note == 0 or not step.h > 0.0:
         return BEYOND
-    return note_at(watch.note)(step, 1.0, WITHIN, data.problem, data.progress, data.evaluation,
-                               data.workspace, watch)
+    return note_at(watch.note)(step, 1.0, WITHIN, data)
 
 
 @routine
 def _close(step, writes, data):
     """Take young flights to the end of a step."""
     if data.problem.rigid != 0 and step.h > 0.0:
-        advance(1.0, step, data.problem, data.progress, data.workspace)
+        advance(1.0, step, data.problem, data.progress, data.evaluation, data.workspace)
 
 
 @routine
@@ -487,8 +477,7 @@ def _change(step, h, data):
     # Wherever the motion goes on from, an output at this moment shows what comes after.
     _show(t, progress, data.output, w)
     if watch.note != 0 and note_at(watch.note)(
-            next_target(t, 0.0, CUT, 0.0, data), 0.0, CHANGED, p, progress, w, workspace,
-            watch) <= 1.0:
+            next_target(t, 0.0, CUT, 0.0, data), 0.0, CHANGED, data) <= 1.0:
         return STOPPED, h
     return pace(step, progress, times), h
 

@@ -9,22 +9,14 @@ whose changes of sign are found however close.
 # Compiled functions: their types are those of their signatures for numba.
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law, helper, routine
 from fecontact.integrate.bernstein import from_nested, sign_changes
 from fecontact.integrate.nonsmooth.dop853 import PARTS, interpolate
 from fecontact.integrate.nonsmooth.equations import derivative
-from fecontact.integrate.nonsmooth.event_search import Workspace
-from fecontact.integrate.nonsmooth.problem import (
-    FORCE,
-    STICK,
-    Evaluation,
-    NonsmoothProblem,
-    Progress,
-    Step,
-)
+from fecontact.integrate.nonsmooth.event_search import Data
+from fecontact.integrate.nonsmooth.problem import FORCE, STICK, Step
 from fecontact.integrate.rodas5p.event_kernels import (
     FIRST_OWN,
     FOUND,
@@ -34,7 +26,6 @@ from fecontact.integrate.rodas5p.event_kernels import (
     SLIPPING,
     STICKING,
     TOUCH_DOWN,
-    Watch,
     event_at,
     first_stop,
     note,
@@ -44,36 +35,19 @@ from fecontact.integrate.step_polynomials import MOST
 
 # Kinds of notes: the state at the start, a step or a part of it, a change of contact.
 BEGIN, WITHIN, CHANGED = range(3)
-NOTE = Callable[[Step, float, int, NonsmoothProblem, Progress, Evaluation, Workspace, Watch], float]
+NOTE = Callable[[Step, float, int, Data], float]
 note_at = function_at(NOTE)
 
 _LOOKS, _HALVINGS = 16, 44
 
 
-class View(NamedTuple):
-    """A step that is examined: what a run knows of it, and the events that are watched."""
-
-    step: Step
-    problem: NonsmoothProblem
-    progress: Progress
-    evaluation: Evaluation
-    workspace: Workspace
-    watch: Watch
-
-
 @helper
-def full(watch):
-    """Whether the events of one more step may find no place."""
-    most = (_LOOKS + 2) * (3 * len(watch.zones) + len(watch.own))
-    return watch.counts[FOUND] + most > len(watch.found)
-
-
-@helper
-def _zone(j, p, progress, w):
-    """State of a node as w sees it."""
+def _zone(j, data):
+    """State of a node at its last evaluation."""
+    p, progress = data.problem, data.progress
     status = progress.status[p.cluster[j]]
     # At the very moment of a touch the force may be zero or not; the status of the cluster tells.
-    pressed = status != OPEN and w.nodes[j, FORCE] != 0.0
+    pressed = status != OPEN and data.evaluation.nodes[j, FORCE] != 0.0
     if p.rigid != 0:
         pressed = progress.closed[j] != 0
     if not pressed:
@@ -88,20 +62,20 @@ def _counts(rising, k, watch):
 
 
 @routine
-def _look(part, view):
-    """Put the state within a step into its workspace, and what acts there; the time."""
-    step, progress, workspace = view.step, view.progress, view.workspace
+def _look(part, step, data):
+    """Put the state within a step into the workspace, and what acts there; the time."""
+    progress, workspace = data.progress, data.workspace
     t = min(step.t + part * step.h, step.latest)
     interpolate(part, progress.state, workspace.parts, workspace.state)
-    derivative(t, workspace.state, view.problem, progress.status, progress.closed, view.evaluation,
+    derivative(t, workspace.state, data.problem, progress.status, progress.closed, data.evaluation,
                workspace.rate)
     return t
 
 
 @routine
-def _note_linear(k, upto, view):
+def _note_linear(k, upto, step, data):
     """Note the passages of a linear function of the state."""
-    watch, progress, workspace = view.watch, view.progress, view.workspace
+    watch, progress, workspace = data.watch, data.progress, data.workspace
     row, c, b = watch.own_parameters[k], workspace.nested, workspace.bound
     size = watch.states.shape[1]
     c[:] = 0.0
@@ -116,14 +90,14 @@ def _note_linear(k, upto, view):
     for i in range(sign_changes(b, workspace.halves, workspace.along, places)):
         sign = -sign
         if places[i] <= upto and _counts(sign > 0.0, k, watch):
-            t = _look(places[i], view)
+            t = _look(places[i], step, data)
             note(watch, t, FIRST_OWN + k, -1, workspace.state)
 
 
 @routine
-def _note_own(k, left, right, new, view):
+def _note_own(k, left, right, new, step, data):
     """Note the change of sign of a user's function between two looks."""
-    watch, workspace = view.watch, view.workspace
+    watch, workspace = data.watch, data.workspace
     g, row, size = event_at(watch.own[k]), watch.own_parameters[k], watch.states.shape[1]
     old = watch.own_values[k]
     rising = old < 0.0 <= new
@@ -132,67 +106,65 @@ def _note_own(k, left, right, new, view):
     low, high = left, right
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        t = _look(middle, view)
+        t = _look(middle, step, data)
         value = g(t, workspace.state[:size], row)
         if (value >= 0.0) if rising else (value <= 0.0):
             high = middle
         else:
             low = middle
-    t = _look(high, view)
+    t = _look(high, step, data)
     note(watch, t, FIRST_OWN + k, -1, workspace.state)
 
 
 @routine
-def _note_touch(j, left, right, view):
+def _note_touch(j, left, right, step, data):
     """Note that the normal law of a node begins or ends between two looks."""
-    p, progress, w, watch = view.problem, view.progress, view.evaluation, view.watch
-    low, high, old = left, right, watch.zones[j]
+    low, high, old = left, right, data.watch.zones[j]
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        _look(middle, view)
-        if _zone(j, p, progress, w) == old:
+        _look(middle, step, data)
+        if _zone(j, data) == old:
             low = middle
         else:
             high = middle
-    t = _look(high, view)
-    note_zone(j, _zone(j, p, progress, w), t, view.workspace.state, watch)
+    t = _look(high, step, data)
+    note_zone(j, _zone(j, data), t, data.workspace.state, data.watch)
 
 
 @routine
-def _note_step(upto, view):
+def _note_step(upto, step, data):
     """Note the events of a step up to a part of it."""
-    p, progress, w, watch = view.problem, view.progress, view.evaluation, view.watch
-    size, state = watch.states.shape[1], view.workspace.state
-    nodes = watch.counts[NODES] != 0 and p.rigid == 0
+    watch = data.watch
+    size, state = watch.states.shape[1], data.workspace.state
+    nodes = watch.counts[NODES] != 0 and data.problem.rigid == 0
     looks = nodes
     for k in range(len(watch.own)):
         if watch.linear[k]:
-            _note_linear(k, upto, view)
+            _note_linear(k, upto, step, data)
         else:
             looks = True
     for look in range(_LOOKS if looks else 1):
         left, right = (upto * look / _LOOKS, upto * (look + 1) / _LOOKS) if looks else (0.0, upto)
-        t = _look(right, view)
+        t = _look(right, step, data)
         for j in range(len(watch.zones)):
-            if nodes and _zone(j, p, progress, w) != watch.zones[j]:
-                _note_touch(j, left, right, view)
-                _look(right, view)
+            if nodes and _zone(j, data) != watch.zones[j]:
+                _note_touch(j, left, right, step, data)
+                _look(right, step, data)
         for k in range(len(watch.own)):
             new = event_at(watch.own[k])(t, state[:size], watch.own_parameters[k])
             if not watch.linear[k]:
-                _note_own(k, left, right, new, view)
-                _look(right, view)
+                _note_own(k, left, right, new, step, data)
+                _look(right, step, data)
             watch.own_values[k] = new
 
 
 @routine
-def _note_change(begin, view):
+def _note_change(begin, t, data):
     """Note what has changed at the begin of a step; at that of a run, what is struck."""
-    t, p, progress, w = view.step.t, view.problem, view.progress, view.evaluation
-    watch, workspace = view.watch, view.workspace
-    Y, size = progress.state, watch.states.shape[1]
+    watch, workspace = data.watch, data.workspace
+    Y, size = data.progress.state, watch.states.shape[1]
     for j in range(len(watch.zones)):
-        zone = _zone(j, p, progress, w)
+        zone = _zone(j, data)
         if begin:
             # A stop that is struck at the start was open before.
             watch.zones[j] = OPEN if workspace.touched[j] else zone
@@ -211,21 +183,19 @@ def _note_change(begin, view):
         watch.own_values[k] = new
 
 
-def _note_events(step, upto, what, p, progress, w, workspace, watch):
+def _note_events(step, upto, what, data):
     """Note events; the part of the step after which the run ends, or inf.
 
     Events after the first at which the run ends are dropped.
     """
-    begun = watch.counts[FOUND]
-    view = View(step, p, progress, w, workspace, watch)
+    begun = data.watch.counts[FOUND]
     if what == WITHIN:
-        _note_step(upto, view)
+        _note_step(upto, step, data)
     else:
-        _note_change(what == BEGIN, view)
-    stop = first_stop(begun, watch)
+        _note_change(what == BEGIN, step.t, data)
+    stop = first_stop(begun, data.watch)
     return max((stop - step.t) / step.h, 0.0) if what == WITHIN else max(stop - step.t, 0.0)
 
 
 # By its address, so that it is not compiled into the loop over the steps.
-note_events = compile_law(
-    NOTE, "note_events(step, upto, what, p, progress, w, workspace, watch)", _note_events)
+note_events = compile_law(NOTE, "note_events(step, upto, what, data)", _note_events)

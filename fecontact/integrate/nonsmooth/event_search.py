@@ -15,7 +15,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.records import Flags, allocate
+from fecontact.core.records import Flags
 from fecontact.core.types import Array
 from fecontact.integrate.bernstein import (
     DEPTH,
@@ -35,20 +35,18 @@ from fecontact.integrate.nonsmooth.problem import (
     OPEN,
     STICK,
     WITH_WORK,
+    Evaluation,
+    Limits,
     NonsmoothProblem,
-    sizes_of,
+    Output,
+    Progress,
 )
-from fecontact.integrate.nonsmooth.steps.flights import (
-    FLIGHT_FIELDS,
-    SUNK,
-    YOUNG,
-    first_landing,
-)
-from fecontact.integrate.nonsmooth.steps.rates import GIVEN, nothing_given
+from fecontact.integrate.nonsmooth.steps.flights import Flights, first_landing
 from fecontact.integrate.nonsmooth.steps.releases import QUARTERS, first_let_go
+from fecontact.integrate.rodas5p.event_kernels import Watch
 from fecontact.laws.signatures import ground_at
 from fecontact.system.node_forces import normal_force
-from fecontact.system.nodes import MODES, NODES, ground_motion
+from fecontact.system.nodes import NODES, ground_motion
 
 # Rounding of a sum, relative to its parts.
 ROUNDING = 2e-15
@@ -60,7 +58,7 @@ _FIT = fit(_PLACES)
 
 _NESTED = of_nested(PARTS)
 # A contact whose force grows so much between the ends of a step was missed by its stages.
-MISSED = 10.0
+_MISSED = 10.0
 ROUGHLY = 2.0**-12
 
 
@@ -95,11 +93,9 @@ class Workspace(NamedTuple):
         go on slipping through an event of others; infinite for other clusters.
     touched, parting : (n,) boolean arrays
         Stops that are struck and nodes that touch down, and stops that open.
-    given, loads, pushes : (GIVEN,), (m,), (m,) arrays
-        Prescribed motions and loads, see :mod:`fecontact.integrate.nonsmooth.steps.rates`.
-    flights, pull, heights : (n, FLIGHT_FIELDS), (SLOPES,), (PARTS + 2,) arrays
-        Flights that have just begun, see :mod:`fecontact.integrate.nonsmooth.steps.flights`, and
-        the acceleration and the height of one of them over the step.
+    flights, node_acceleration, heights : Flights, (SLOPES,), (PARTS + 2,) arrays
+        Flights that have just begun, and the acceleration and the height of one of them over the
+        step.
     """
 
     slopes: Annotated[Array, SLOPES, WITH_WORK]
@@ -125,17 +121,22 @@ class Workspace(NamedTuple):
     gaining: Annotated[Array, CLUSTERS]
     touched: Annotated[Flags, NODES]
     parting: Annotated[Flags, NODES]
-    given: Annotated[Array, GIVEN]
-    loads: Annotated[Array, MODES]
-    applied_forces: Annotated[Array, MODES]
-    flights: Annotated[Array, NODES, FLIGHT_FIELDS]
+    flights: Flights
     node_acceleration: Annotated[Array, SLOPES]
     heights: Annotated[Array, PARTS + 2]
 
 
-def workspace_for(problem: NonsmoothProblem) -> Workspace:
-    """Workspace for a problem."""
-    return allocate(Workspace, sizes_of(problem), given=nothing_given())
+class Data(NamedTuple):
+    """A run from event to event; what is watched for is noted in ``watch``."""
+
+    problem: NonsmoothProblem
+    limits: Limits
+    progress: Progress
+    output: Output
+    kept: Output
+    evaluation: Evaluation
+    workspace: Workspace
+    watch: Watch
 
 
 @helper
@@ -240,7 +241,7 @@ def first_pressed(b, above, finest, j, s, workspace):
 
 
 @helper
-def _search_stops(step, p, progress, workspace):
+def _search_stops(step, p, progress, w, workspace):
     """Note where open stops close.
 
     Returns the first such part, the one to which the step has to be shortened, and whether stops
@@ -253,8 +254,8 @@ def _search_stops(step, p, progress, workspace):
         if progress.closed[j]:
             forces = True
             continue
-        if workspace.flights[j, YOUNG] != 0.0:
-            workspace.place[clusters + j] = first_landing(j, step, p, progress, workspace)
+        if workspace.flights.young[j]:
+            workspace.place[clusters + j] = first_landing(j, step, p, progress, w, workspace)
             first = min(first, workspace.place[clusters + j])
             continue
         size = _along(s.rows[j, 1], 0, Y, workspace, b)
@@ -265,7 +266,7 @@ def _search_stops(step, p, progress, workspace):
             continue
         shorter = min(shorter, _add_ground(j, step, p, Y, workspace))
         # On waves a place at which a flight has begun is no landing.
-        size = ROUNDING * size + workspace.flights[j, SUNK]
+        size = ROUNDING * size + workspace.flights.sunk[j]
         for i in range(len(b)):
             b[i] = size - b[i]
         workspace.place[clusters + j] = first_below(b, workspace.halves)
@@ -298,6 +299,17 @@ def least_depth(j, p, limits):
 
 
 @helper
+def missed_force(b, part, j, p, limits):
+    """Force of node j in a step that shows a contact which both its ends have missed.
+
+    ``b`` are the coefficients of the penetration; ``part`` of its tolerance is no contact.
+    """
+    s = p.system
+    ends = max(pressed(b[0], j, s), pressed(b[len(b) - 1], j, s))
+    return _MISSED * ends + pressed(part * limits.rtol * least_depth(j, p, limits), j, s)
+
+
+@helper
 def _search_nodes(first, forces, step, p, limits, progress, workspace):
     """Note where clusters that are open touch the ground; returns as :func:`_search_stops`."""
     s, b, Y, place = p.system, workspace.bound, progress.state, workspace.place
@@ -321,8 +333,7 @@ def _search_nodes(first, forces, step, p, limits, progress, workspace):
             else:
                 forces = True
             continue
-        above = MISSED * max(before, pressed(b[PARTS], j, s)) + pressed(
-            0.01 * limits.rtol * least_depth(j, p, limits), j, s)
+        above = missed_force(b, 0.01, j, p, limits)
         if max(low, high) <= above and p.relief[0] == p.relief[1] == 0.0:
             continue
         if max(pressed(smallest(b), j, s), pressed(largest(b), j, s)) > above:
@@ -341,7 +352,7 @@ def first_changes(step, p, limits, progress, w, workspace):
     """
     workspace.place[:] = NOWHERE
     if p.rigid != 0:
-        first, shorter, forces = _search_stops(step, p, progress, workspace)
+        first, shorter, forces = _search_stops(step, p, progress, w, workspace)
         rest, sticking = _search_clusters(step, p, progress, workspace)
         first, forces = min(first, rest), forces or sticking
     else:

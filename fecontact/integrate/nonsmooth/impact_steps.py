@@ -17,9 +17,12 @@ with, for penetration rates u' and slip velocities s,
 
 where e(.) is the unit direction, and the whole disc at zero. In a step with an impact kappa is
 e_T; else it is 1 at nodes that slip on in about their direction, which makes the path of second
-order, and 0 at others. Closed contacts beside the one that is struck take part, and nodes need not
-be independent: what counts are the velocities. The impulses of all nodes are found by projected
-Gauss-Seidel sweeps; at unilateral contact without friction these minimise the kinetic energy.
+order, and 0 at others. Closed contacts beside the one that is struck take part.
+
+The impulses of all nodes are found by projected Gauss-Seidel sweeps, which stop where nothing
+changes; at unilateral contact without friction these minimise the kinetic energy. A tangential
+impulse takes more energy than any other in its disc. Nodes need not be independent: then the
+velocities are found, and one of the ways in which the nodes share the impulses.
 
 A step is compared with two of half its length, which are kept: to the tolerance in its places, and
 without impact in its velocities too; nor may a node come deeper into the ground. Across impacts and
@@ -28,21 +31,29 @@ step.
 
 References
 ----------
-J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, CISM Courses and
+P. Alart, A. Curnier, A mixed formulation for frictional contact problems prone to Newton like
+solution methods, Computer Methods in Applied Mechanics and Engineering 92 (1991). J. J. Moreau,
+Unilateral contact and dry friction in finite freedom dynamics, CISM Courses and
 Lectures 302 (1988). M. Jean, The non-smooth contact dynamics method, Computer Methods in Applied
 Mechanics and Engineering 177 (1999).
 """
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from fecontact.core.compiled import helper, routine
 from fecontact.core.copies import put
-from fecontact.core.dense_lu import solve
-from fecontact.integrate.nonsmooth.equations import stick_limit
+from fecontact.core.dense_lu import factorise, solve
+from fecontact.core.types import Array, Integers
+from fecontact.integrate.nonsmooth.equations import (
+    set_implicit_matrix,
+    slipping_force,
+    stick_limit,
+)
 from fecontact.integrate.nonsmooth.problem import (
     GAINED,
     IMPACTS,
+    WITH_WORK,
     Limits,
     NonsmoothProblem,
     Output,
@@ -51,14 +62,6 @@ from fecontact.integrate.nonsmooth.problem import (
     next_target,
     pace,
     pass_break,
-)
-from fecontact.integrate.nonsmooth.space_impulses import (
-    ImpactWorkspace,
-    find_impulses,
-    put_on_ground,
-    set_impulse_responses,
-    set_matrix,
-    set_rows,
 )
 from fecontact.integrate.step_loop import (
     FAILED,
@@ -70,10 +73,16 @@ from fecontact.integrate.step_loop import (
     Method,
     step_loop,
 )
-from fecontact.laws.friction_curve import CREEP
 from fecontact.system.kernels import body_acceleration, prescribed_at
-from fecontact.system.node_forces import friction_scale, plane_friction
-from fecontact.system.nodes import ground_motion, ground_speed, node_contact, node_motion
+from fecontact.system.node_forces import friction_scale
+from fecontact.system.nodes import (
+    MODES,
+    NODES,
+    ground_motion,
+    ground_speed,
+    node_contact,
+    node_motion,
+)
 from fecontact.system.powers import (
     BELT_FRICTION,
     BELT_NORMAL,
@@ -90,6 +99,215 @@ _STILL = 1e-9
 _GAIN = 1e-10
 # How often the impulses of a step are computed again with coefficients of its middle.
 _PASSES = 4
+_SWEEPS = 20000
+# Change of the impulses in a sweep at which they count as found, relative to the largest.
+_SETTLED = 1e-13
+# How deep nodes that touch are left in the ground, relative to the largest displacements.
+_MARGIN = 1e-12
+
+
+class ImpactWorkspace(NamedTuple):
+    """Workspace for steps of impulses.
+
+    Entries of the nodes are normal ones (n,), then those along the first and the second tangents.
+
+    Attributes
+    ----------
+    rows, impulse_responses
+        Changes of [-u', s] by the modes, and of the velocities by unit impulses.
+    coupling
+        Changes of [-u', s] by unit impulses [L, P].
+    given, before, after, impulses, rest
+        [-u', s] without contact, and at both ends of a step; [L, P]; what is left of the
+        conditions.
+    slopes, sides
+        Of the ground, and velocities of the other side.
+    weights, grip
+        kappa, and what friction sees of a unit normal force.
+    sticking, slipping
+        Coefficients of friction.
+    matrix
+        1 + h C / 2 + h^2 K / 4, factorised.
+    middle, change, rates, largest
+        State in the middle, change of the velocities, powers, largest coordinates so far.
+    whole, half, end
+        Y after a whole step, and after one and two halves.
+    forces, closed
+        Forces and contacts in the whole step, and in the halves.
+    """
+
+    rows: Annotated[Array, 3 * NODES, MODES]
+    impulse_responses: Annotated[Array, 3 * NODES, MODES]
+    coupling: Annotated[Array, 3 * NODES, 3 * NODES]
+    given: Annotated[Array, 3 * NODES]
+    before: Annotated[Array, 3 * NODES]
+    after: Annotated[Array, 3 * NODES]
+    impulses: Annotated[Array, 3 * NODES]
+    rest: Annotated[Array, 3 * NODES]
+    slopes: Annotated[Array, 2 * NODES]
+    sides: Annotated[Array, 2 * NODES]
+    weights: Annotated[Array, NODES]
+    grip: Annotated[Array, NODES]
+    sticking: Annotated[Array, NODES]
+    slipping: Annotated[Array, NODES]
+    matrix: Annotated[Array, MODES, MODES]
+    middle: Annotated[Array, 2 * MODES]
+    change: Annotated[Array, MODES]
+    rates: Annotated[Array, NODES + POWER_COUNT]
+    largest: Annotated[Array, 2 * MODES]
+    whole: Annotated[Array, WITH_WORK]
+    half: Annotated[Array, WITH_WORK]
+    end: Annotated[Array, WITH_WORK]
+    forces: Annotated[Array, 3, 3 * NODES]
+    closed: Annotated[Integers, 3, NODES]
+    touching: Annotated[Integers, NODES]
+    pivots: Annotated[Integers, MODES]
+
+
+@helper
+def _set_matrix(h, p, workspace):
+    """Factorise the matrix of a step."""
+    set_implicit_matrix(0.5 * h, 0.25 * h * h, p.system, workspace.matrix)
+    factorise(workspace.matrix, len(workspace.pivots), workspace.pivots)
+
+
+@helper
+def _set_rows(j, contact, p, workspace):
+    """Fill the rows of node j: how modes change its height over the ground and its place."""
+    s, rows = p.system, workspace.rows
+    n, _, m = s.rows.shape
+    for i in range(m):
+        rows[j, i] = (s.rows[j, 1, i] - contact.slope[0] * s.rows[j, 0, i]
+                      - contact.slope[1] * s.rows[j, 2, i])
+        rows[n + j, i], rows[2 * n + j, i] = s.rows[j, 0, i], s.rows[j, 2, i]
+
+
+@routine
+def _set_impulse_responses(p, workspace):
+    """Fill ``impulse_responses`` and ``coupling`` of touching nodes, with the factorised matrix."""
+    s, rows, responses, touching = (p.system, workspace.rows, workspace.impulse_responses,
+                                    workspace.touching)
+    n, _, m = s.rows.shape
+    for b in range(3 * n):
+        j = b % n
+        if not touching[j]:
+            continue
+        for i in range(m):
+            if b >= n:
+                responses[b, i] = -rows[b, i]
+            else:
+                responses[b, i] = rows[b, i] if s.follows_surface else s.rows[j, 1, i]
+        solve(workspace.matrix, workspace.pivots, responses[b])
+        for a in range(3 * n):
+            if touching[a % n]:
+                total = 0.0
+                for i in range(m):
+                    total += rows[a, i] * responses[b, i]
+                workspace.coupling[a, b] = total
+
+
+@helper
+def _stiffest(j, n, workspace):
+    """Largest change of the slip velocity of node j by a unit impulse along the ground."""
+    c = workspace.coupling
+    a, b = -c[n + j, n + j], -c[2 * n + j, 2 * n + j]
+    mixed = -0.5 * (c[n + j, 2 * n + j] + c[2 * n + j, n + j])
+    return 0.5 * (a + b) + math.hypot(0.5 * (a - b), mixed)
+
+
+@routine
+def _add_impulse(a, change, n, workspace):
+    """Change an impulse, and with it the residual of the conditions."""
+    workspace.impulses[a] += change
+    for b in range(3 * n):
+        if workspace.touching[b % n]:
+            workspace.rest[b] += workspace.coupling[b, a] * change
+
+
+@routine
+def _find_impulses(restitution, n, workspace):
+    """Fill ``impulses`` of the touching nodes, and ``after``; whether they were found."""
+    x, y, c = workspace.impulses, workspace.rest, workspace.coupling
+    x[:] = 0.0
+    for j in range(n):
+        y[j] = workspace.given[j] - restitution[j] * max(-workspace.before[j], 0.0)
+        for a in (n + j, 2 * n + j):
+            y[a] = workspace.given[a] + workspace.weights[j] * workspace.before[a]
+    found = False
+    for _ in range(_SWEEPS):
+        moved, scale = 0.0, 0.0
+        for j in range(n):
+            if not workspace.touching[j]:
+                continue
+            pressed = max(0.0, x[j] - y[j] / c[j, j]) if c[j, j] > 0.0 else 0.0
+            moved = max(moved, abs(pressed - x[j]))
+            scale = max(scale, pressed)
+            _add_impulse(j, pressed - x[j], n, workspace)
+            stiffest = _stiffest(j, n, workspace)
+            if stiffest <= 0.0:
+                continue
+            one, two = x[n + j] + y[n + j] / stiffest, x[2 * n + j] + y[2 * n + j] / stiffest
+            size = math.hypot(one, two)
+            if size > workspace.sticking[j] * pressed:
+                part = workspace.slipping[j] * pressed / size
+                one, two = part * one, part * two
+            moved = max(moved, abs(one - x[n + j]), abs(two - x[2 * n + j]))
+            scale = max(scale, abs(one), abs(two))
+            _add_impulse(n + j, one - x[n + j], n, workspace)
+            _add_impulse(2 * n + j, two - x[2 * n + j], n, workspace)
+        if moved <= _SETTLED * scale:
+            found = True
+            break
+    for j in range(n):
+        workspace.after[j] = y[j] + restitution[j] * max(-workspace.before[j], 0.0)
+        for a in (n + j, 2 * n + j):
+            workspace.after[a] = y[a] - workspace.weights[j] * workspace.before[a]
+    return found
+
+
+@routine
+def _put_on_ground(t, Y, closed, p, workspace):
+    """Move closed nodes, and nodes in the ground, to where they just touch it."""
+    s, middle, x = p.system, workspace.middle, workspace.impulses
+    n, _, m = s.rows.shape
+    moved = ground_motion(t, s)
+    margin = 0.0
+    for i in range(m):
+        for j in range(n):
+            margin = max(margin, _MARGIN * abs(s.rows[j, 1, i]) * workspace.largest[i])
+    put(Y[: 2 * m], middle)
+    _set_matrix(0.0, p, workspace)
+    deepest = 0.0
+    for j in range(n):
+        contact = node_contact(j, node_motion(j, middle, s), moved, s)
+        workspace.touching[j] = 1 if closed[j] or contact.penetration > margin else 0
+        _set_rows(j, contact, p, workspace)
+        workspace.rest[j] = margin - contact.penetration
+        if workspace.touching[j]:
+            deepest = max(deepest, abs(workspace.rest[j]))
+    x[:] = 0.0
+    if deepest <= margin:
+        return
+    _set_impulse_responses(p, workspace)
+    for _ in range(_SWEEPS):
+        furthest = 0.0
+        for j in range(n):
+            if not workspace.touching[j] or workspace.coupling[j, j] <= 0.0:
+                continue
+            change = -workspace.rest[j] / workspace.coupling[j, j]
+            if not closed[j]:
+                change = max(change, -x[j])
+            furthest = max(furthest, abs(change * workspace.coupling[j, j]))
+            x[j] += change
+            for b in range(n):
+                if workspace.touching[b]:
+                    workspace.rest[b] += workspace.coupling[b, j] * change
+        if furthest <= 0.1 * margin:
+            break
+    for j in range(n):
+        if workspace.touching[j]:
+            for i in range(m):
+                Y[i] += x[j] * workspace.impulse_responses[j, i]
 
 
 class Data(NamedTuple):
@@ -101,13 +319,6 @@ class Data(NamedTuple):
     output: Output
     kept: Output
     workspace: ImpactWorkspace
-
-
-@helper
-def _coefficient(j, slip, grip, p):
-    """Coefficient of friction of node j at a slip velocity."""
-    s = p.system
-    return plane_friction(j, max(slip, CREEP), grip, s)[0]
 
 
 @helper
@@ -126,7 +337,7 @@ def _look_again(n, p, workspace):
             changed = True
         slip = 0.5 * math.hypot(workspace.before[a] + workspace.after[a],
                                 workspace.before[b] + workspace.after[b])
-        fresh = _coefficient(j, slip, workspace.grip[j], p)
+        fresh = slipping_force(j, slip, 1.0, workspace.grip[j], p.system)
         changed = changed or abs(fresh - workspace.slipping[j]) > 1e-12 * fresh
         workspace.slipping[j] = fresh
         workspace.sticking[j] = max(workspace.sticking[j], fresh)
@@ -148,7 +359,7 @@ def _observe_nodes(t, Y, closed, quick, p, workspace):
         workspace.touching[j] = 1 if closed[j] or contact.penetration >= 0.0 else 0
         if not workspace.touching[j]:
             continue
-        set_rows(j, contact, p, workspace)
+        _set_rows(j, contact, p, workspace)
         workspace.slopes[j], workspace.slopes[n + j] = contact.slope[0], contact.slope[1]
         sides[j], sides[n + j] = ground_speed(0, j, moved, s), ground_speed(1, j, moved, s)
         lifted = contact.slope[0] * sides[j] + contact.slope[1] * sides[n + j]
@@ -161,7 +372,7 @@ def _observe_nodes(t, Y, closed, quick, p, workspace):
         struck = struck or (not closed[j] and -workspace.before[j] > _STILL * quick)
         slip = math.hypot(workspace.before[n + j], workspace.before[2 * n + j])
         workspace.grip[j] = friction_scale(j, contact, s)[0]
-        workspace.slipping[j] = _coefficient(j, slip, workspace.grip[j], p)
+        workspace.slipping[j] = slipping_force(j, slip, 1.0, workspace.grip[j], p.system)
         workspace.sticking[j] = max(stick_limit(j, workspace.grip[j], p), workspace.slipping[j])
         workspace.weights[j] = 1.0 if slip > _STILL * quick else 0.0
     if struck:
@@ -215,20 +426,20 @@ def _go(step, Y, closed, which, quick, p, workspace, out):
         middle[m + i] = Y[m + i]
     prescribed_at(at, s, change)
     body_acceleration(change, middle, s, change)
-    set_matrix(h, p, workspace)
+    _set_matrix(h, p, workspace)
     solve(workspace.matrix, workspace.pivots, change)
     for i in range(m):
         change[i] = Y[m + i] + h * change[i]
     struck = _observe_nodes(at, Y, closed, quick, p, workspace)
     workspace.impulses[:] = 0.0
     if workspace.touching.any():
-        set_impulse_responses(p, workspace)
-        if not find_impulses(p.restitution, n, workspace):
+        _set_impulse_responses(p, workspace)
+        if not _find_impulses(p.restitution, n, workspace):
             return -1
         for _ in range(_PASSES):
             if struck or not _look_again(n, p, workspace):
                 break
-            if not find_impulses(p.restitution, n, workspace):
+            if not _find_impulses(p.restitution, n, workspace):
                 return -1
     for a in range(3 * n):
         if workspace.touching[a % n]:
@@ -325,7 +536,7 @@ def _begin(t, data):
     progress, workspace = data.progress, data.workspace
     for i in range(len(workspace.largest)):
         workspace.largest[i] = abs(progress.state[i])
-    put_on_ground(t, progress.state, progress.closed, data.problem, workspace)
+    _put_on_ground(t, progress.state, progress.closed, data.problem, workspace)
     progress.counts[OUTPUTS] = 0
     return RUNNING
 
@@ -365,7 +576,7 @@ def _go_on(step, h, data):
     p, progress, workspace = data.problem, data.progress, data.workspace
     put(workspace.end, progress.state)
     put(workspace.closed[2], progress.closed)
-    put_on_ground(step.target, progress.state, progress.closed, p, workspace)
+    _put_on_ground(step.target, progress.state, progress.closed, p, workspace)
     if step.at_break:
         pass_break(step, p, progress, data.output)
     return pace(step, progress, data.output.times), h

@@ -19,10 +19,10 @@ from fecontact.integrate.step_loop import (
     STEPS,
     TIME,
 )
-from fecontact.system.nodes import AXES, MODES, NODES, SystemArrays
+from fecontact.system.nodes import AXES, COMBINATIONS, MODES, NODES, SystemArrays
 from fecontact.system.powers import DRIVE, POWER_COUNT, drive_jump
 
-# Columns of `Workspace.nodes`; the last two in space only.
+# Columns of `Evaluation.nodes`; the last two in space only.
 NODE_COLUMNS, SPACE_NODE_COLUMNS = 9, 11
 (FORCE, PRESSING, PENETRATION, RATE, SLIP, SLOPE, CURVED, LIMIT, GRIP, SLIP_ACROSS,
  SLOPE_ACROSS) = range(SPACE_NODE_COLUMNS)
@@ -52,6 +52,10 @@ _MANY_STEPS, _LEAST_PART = 20_000, 1e-8
 SIZES = 3
 SLIP_SIZE, RATE_SIZE, DEPTH_SIZE = range(SIZES)
 
+# Entries of what is given in time: the time, travel and speed of the ground, and from MOTION on
+# the motion of the drive along each axis and its rate.
+GIVEN = 7
+WHEN, TRAVEL, SPEED, MOTION = range(4)
 
 # Groups of nodes that slip as one, and entries of a node; a state with the work after it.
 CLUSTERS, NODE_ENTRIES = Size("clusters"), Size("entries of a node")
@@ -88,6 +92,13 @@ class NonsmoothProblem(NamedTuple):
     steady: int
     derivative: int
     change: int
+
+
+class ContactState(NamedTuple):
+    """Status (k,) of the clusters, and whether stops are closed, (n,)."""
+
+    status: Annotated[Integers, CLUSTERS]
+    closed: Annotated[Integers, NODES]
 
 
 class Limits(NamedTuple):
@@ -195,7 +206,10 @@ def pass_break(step, p, progress, output):
 
 
 class Evaluation(NamedTuple):
-    """Results per node and per cluster of the last evaluation, and workspace for small systems."""
+    """Results per node and per cluster of the last evaluation, and workspace for small systems.
+
+    ``given`` (GIVEN,) and ``loads`` (m,) are given in time, ``applied_forces`` (m,) with the drive.
+    """
 
     nodes: Annotated[Array, NODES, NODE_ENTRIES]
     friction: Annotated[Array, NODES]
@@ -207,28 +221,17 @@ class Evaluation(NamedTuple):
     right: Annotated[Array, NODES + CLUSTERS]
     indices: Annotated[Integers, NODES + CLUSTERS]
     pivots: Annotated[Integers, NODES + CLUSTERS]
-
-
-def tangents(problem: NonsmoothProblem) -> int:
-    """Number of tangents of a node."""
-    return 2 if problem.system.rows.shape[1] > 2 else 1
-
-
-def node_columns(problem: NonsmoothProblem) -> int:
-    """Number of columns of `Workspace.nodes`."""
-    return SPACE_NODE_COLUMNS if problem.system.rows.shape[1] > 2 else NODE_COLUMNS
-
-
-def evaluation_for(problem: NonsmoothProblem) -> Evaluation:
-    """Workspace for a problem."""
-    return allocate(Evaluation, sizes_of(problem))
+    given: Annotated[Array, GIVEN]
+    loads: Annotated[Array, MODES]
+    applied_forces: Annotated[Array, MODES]
 
 
 def sizes_of(problem: NonsmoothProblem) -> dict[Size, int]:
     """Sizes of the records of a run."""
-    k, m = problem.rows.shape
-    return {MODES: m, NODES: len(problem.cluster), CLUSTERS: k, AXES: 1 + tangents(problem),
-            NODE_ENTRIES: node_columns(problem)}
+    n, d, m = problem.system.rows.shape
+    return {MODES: m, NODES: n, CLUSTERS: len(problem.rows), AXES: d,
+            COMBINATIONS: len(problem.system.polynomial_rows),
+            NODE_ENTRIES: SPACE_NODE_COLUMNS if d > 2 else NODE_COLUMNS}
 
 
 def progress_for(

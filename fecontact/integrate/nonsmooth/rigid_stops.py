@@ -34,24 +34,27 @@ from fecontact.core.copies import put
 from fecontact.core.records import Vector
 from fecontact.integrate.nonsmooth.contact_conditions import (
     Conditions,
+    friction_limit,
     new_case,
     solve_conditions,
     solve_uniquely,
 )
 from fecontact.integrate.nonsmooth.equations import (
+    coupling,
     derivative,
     force_size,
     held_row,
+    hold,
     pushing_row,
+    residual,
+    set_prescribed,
     slipping_force,
-    solve_small,
     speed_rate,
     stick_limit,
 )
 from fecontact.integrate.nonsmooth.event_search import ROUNDING, Workspace
 from fecontact.integrate.nonsmooth.problem import (
     CLOSED,
-    CURVED,
     FIXED,
     GAINED,
     GRIP,
@@ -68,8 +71,7 @@ from fecontact.integrate.nonsmooth.problem import (
     NonsmoothProblem,
     Progress,
 )
-from fecontact.integrate.nonsmooth.steps.flights import CLIMB, YOUNG, begin_flight
-from fecontact.integrate.nonsmooth.steps.rates import set_prescribed
+from fecontact.integrate.nonsmooth.steps.flights import begin_flight
 from fecontact.laws.friction_curve import CREEP
 from fecontact.system.nodes import ground_motion
 from fecontact.system.powers import (
@@ -89,7 +91,6 @@ _NEAR, _GAIN = 1e-9, 1e-10
 RATE_ROUNDING = 1e-14
 # Corrections of the places of stops that close or open.
 _MOST_CORRECTIONS = 5
-
 
 
 class Rebound(NamedTuple):
@@ -128,26 +129,6 @@ change_contacts_at = function_at(CHANGE)
 
 
 @routine
-def _hold_constraints(count, first, p, w, Y):
-    """Change Y[first:] by contact forces so that the residuals ``w.right`` of constraints vanish.
-
-    The constraints are the first of ``w.indices``, clusters behind the nodes.
-    """
-    m = p.rows.shape[1]
-    w.friction[:] = 0.0
-    for a in range(count):
-        for b in range(count):
-            total = 0.0
-            for i in range(m):
-                total += held_row(w.indices[a], i, p, w) * pushing_row(w.indices[b], i, p, w)
-            w.matrix[a, b] = total
-    solve_small(w, count)
-    for a in range(count):
-        for i in range(m):
-            Y[first + i] += pushing_row(w.indices[a], i, p, w) * w.right[a]
-
-
-@routine
 def _place(t, p, progress, workspace, w, out):
     """Move stops that are touched or part onto their ground, by Newton's method.
 
@@ -165,7 +146,8 @@ def _place(t, p, progress, workspace, w, out):
                 count += 1
         if distance == 0.0 or distance > 0.5 * before:
             break
-        _hold_constraints(count, 0, p, w, Y)
+        w.friction[:] = 0.0
+        hold(count, p, w, Y)
         derivative(t, Y, p, status, closed, w, out)
         before = distance
 
@@ -186,20 +168,8 @@ def settle(t, p, status, closed, w, out, Y):
         if status[c] == STICK:
             w.indices[count], w.right[count] = n + c, -w.slip[c]
             count += 1
-    _hold_constraints(count, m, p, w, Y)
-
-
-@routine
-def _set_matrix(p, w, matrix):
-    """Fill matrix (n + k, n + k) with the change of [-u', -s] by unit impulses."""
-    n, _, m = p.system.rows.shape
     w.friction[:] = 0.0
-    for a in range(len(matrix)):
-        for b in range(len(matrix)):
-            total = 0.0
-            for i in range(m):
-                total += held_row(a, i, p, w) * pushing_row(b, i, p, w)
-            matrix[a, b] = total if a < n else -total
+    hold(count, p, w, Y[m : 2 * m])
 
 
 @routine
@@ -216,16 +186,21 @@ def _size(sizes, p, w):
 
 
 @routine
-def _conditions(touching, sizes, p, w):
+def _conditions(touching, sizes, status, p, w):
     """Conditions of contact at the touching nodes, all of whose clusters may stick or slip.
 
-    Coefficients are those of the slip velocities in w; nothing is given yet. ``sizes`` (m,) are
-    those of the terms of modal velocities or accelerations.
+    Clusters on which friction has no effect are left out. Coefficients are those of the slip
+    velocities in w; nothing is given yet. ``sizes`` (m,) are those of the terms of modal velocities
+    or accelerations.
     """
     n, k = len(p.cluster), len(p.rows)
     matrix, mode = np.empty((n + k, n + k)), np.zeros(k, np.int64)
     sticking, slipping = np.zeros(n), np.zeros(n)
-    _set_matrix(p, w, matrix)
+    w.friction[:] = 0.0
+    for a in range(n + k):
+        for b in range(n + k):
+            # Of [-u', -s] by unit impulses.
+            matrix[a, b] = coupling(a, b, p, w) if a < n else -coupling(a, b, p, w)
     for j in range(n):
         c = p.cluster[j]
         if touching[j]:
@@ -233,17 +208,9 @@ def _conditions(touching, sizes, p, w):
             slipping[j] = slipping_force(j, abs(w.slip[c]), 1.0, grip, p.system)
             sticking[j] = max(stick_limit(j, grip, p),
                               slipping_force(j, CREEP, 1.0, grip, p.system))
-            mode[c] = STICK
+            mode[c] = OPEN if status[c] == FIXED else STICK
     return Conditions(matrix, np.zeros(n + k), np.zeros(n), sticking, slipping, p.cluster,
                       touching, mode, _size(sizes, p, w))
-
-
-@routine
-def _omit_fixed(status, conditions):
-    """Leave out the clusters on which friction has no effect."""
-    for c in range(len(status)):
-        if status[c] == FIXED:
-            conditions.mode[c] = OPEN
 
 
 @routine
@@ -255,8 +222,8 @@ def _strike(t, touching, p, progress, w):
     s, Y = p.system, progress.state
     n, _, m = s.rows.shape
     k = len(p.rows)
-    conditions, case = _conditions(touching, np.abs(Y[m : 2 * m]), p, w), new_case(n, k)
-    _omit_fixed(progress.status, conditions)
+    conditions = _conditions(touching, np.abs(Y[m : 2 * m]), progress.status, p, w)
+    case = new_case(n, k)
     given, x = conditions.given, np.zeros(n + k)
     # An impact knows one coefficient, whether its contact sticks or slips.
     put(conditions.slipping, conditions.sticking)
@@ -293,10 +260,7 @@ def _strike(t, touching, p, progress, w):
         Y[first + CONTACT_DAMPING] += damped
         if progress.status[c] != FIXED:
             slip -= mean[n + c]
-            limit = 0.0
-            for other in range(n):
-                if p.cluster[other] == c:
-                    limit += conditions.slipping[other] * x[other]
+            limit = friction_limit(c, conditions.slipping, conditions, x)
             if limit > 0.0:
                 rubbed = x[n + c] * conditions.slipping[j] * x[j] / limit
                 Y[first + BELT_FRICTION] -= rubbed * s.sliding[j, 0, 0] * speed
@@ -316,14 +280,14 @@ def _strike(t, touching, p, progress, w):
 @routine
 def _set_gaining(t, p, progress, workspace, w, out):
     """Fill ``workspace.gaining`` from w and Y' in ``out`` before contacts change."""
-    s, Y, status = p.system, progress.state, progress.status
+    Y, status = progress.state, progress.status
     m = p.rows.shape[1]
-    speed, ground = ground_motion(t, s).speed, speed_rate(t, p)
+    speed, ground = ground_motion(t, p.system).speed, speed_rate(t, p)
     for c in range(len(p.rows)):
-        size, gain = abs(p.sliding[c] * speed), -p.sliding[c] * ground
+        size = abs(p.sliding[c] * speed)
         for i in range(m):
             size += abs(p.rows[c, i] * Y[m + i])
-            gain += p.rows[c, i] * out[m + i]
+        gain = -residual(len(p.cluster) + c, ground, out[m : 2 * m], p, w)
         changes = workspace.released[c] or workspace.arrived[c]
         slips = (status[c] == 1 or status[c] == -1) and not changes
         workspace.gaining[c] = ROUNDING * size if slips and status[c] * gain > 0.0 else math.inf
@@ -341,18 +305,15 @@ def _accelerate(moment, resting, fall, case):
     n, k = len(p.cluster), len(p.rows)
     status, friction = progress.status, False
     sizes = np.empty(p.rows.shape[1])
-    set_prescribed(moment.t, p.system, workspace)
+    set_prescribed(moment.t, p.system, w)
     for i in range(len(sizes)):
-        sizes[i] = force_size(i, progress.state, workspace.applied_forces, p.system)
-    conditions = _conditions(resting, sizes, p, w)
-    _omit_fixed(status, conditions)
+        sizes[i] = force_size(i, progress.state, w.applied_forces, p.system)
+    conditions = _conditions(resting, sizes, status, p, w)
     ground = speed_rate(moment.t, p)
     for j in range(n):
         conditions.given[j] = -fall[j]
     for c in range(k):
-        conditions.given[n + c] = p.sliding[c] * ground
-        for i in range(p.rows.shape[1]):
-            conditions.given[n + c] -= p.rows[c, i] * workspace.rate[i]
+        conditions.given[n + c] = residual(n + c, ground, workspace.rate, p, w)
         if conditions.mode[c] != STICK:
             continue
         friction = True
@@ -376,23 +337,16 @@ def _decide(touching, rebound, moment):
     s, Y, status, closed = p.system, progress.state, progress.status, progress.closed
     n, _, m = s.rows.shape
     k = len(p.rows)
-    # Without contact; the status is kept for what depends on it.
     kept = closed == HELD
     closed[:] = 0
-    before = status.copy()
-    for c in range(k):
-        if status[c] != FIXED:
-            status[c] = OPEN
-    derivative(t, Y, p, status, closed, w, out)
+    # Without contact.
+    derivative(t, Y, p, np.where(status == FIXED, FIXED, OPEN), closed, w, out)
     put(out[m : 2 * m], workspace.rate[:m])
-    put(before, status)
     ground = speed_rate(t, p)
     fall, resting = np.empty(n), np.zeros(n, np.bool_)
     w.friction[:] = 0.0
     for j in range(n):
-        fall[j] = w.nodes[j, CURVED] - w.nodes[j, SLOPE] * ground
-        for i in range(m):
-            fall[j] -= held_row(j, i, p, w) * workspace.rate[i]
+        fall[j] = residual(j, ground, workspace.rate, p, w)
         blurred = (30.0 * math.sqrt(2.2e-16 * rebound.height * abs(fall[j]))
                    + rebound.brief * abs(fall[j]))
         resting[j] = (touching[j] and not workspace.parting[j]
@@ -407,6 +361,7 @@ def _decide(touching, rebound, moment):
         workspace.fresh[k + j] = touching[j] and closed[j] == 0
         if workspace.fresh[k + j] and fall[j] > 0.0:
             flight = min(flight, max(0.0, -2.0 * w.nodes[j, RATE] / fall[j]))
+    begun = status.copy()
     for c in range(k):
         if status[c] == FIXED:
             continue
@@ -416,17 +371,17 @@ def _decide(touching, rebound, moment):
                 status[c] = case.mode[c]
         workspace.fresh[c] = workspace.fresh[c] and (status[c] == 1 or status[c] == -1)
         # Slip that begins here starts from zero slip velocity.
-        before[c] = STICK if workspace.fresh[c] else status[c]
-    settle(t, p, before, closed, w, out, Y)
+        begun[c] = STICK if workspace.fresh[c] else status[c]
+    settle(t, p, begun, closed, w, out, Y)
     derivative(t, Y, p, status, closed, w, out)
     noise = RATE_ROUNDING / _NEAR * moment.near
     for j in range(n):
         if closed[j]:
-            workspace.flights[j, YOUNG] = 0.0
+            workspace.flights.young[j] = False
         elif touching[j]:
             begin_flight(j, noise, p, w, workspace)
         elif moment.struck and abs(w.nodes[j, RATE]) > noise:
-            workspace.flights[j, CLIMB] = -w.nodes[j, RATE]
+            workspace.flights.climb[j] = -w.nodes[j, RATE]
     return flight
 
 

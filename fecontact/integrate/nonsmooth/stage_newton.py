@@ -57,11 +57,6 @@ from fecontact.system.polynomial_forces import (
     set_polynomial_gradient,
 )
 
-# Stiffness that holds a sticking node during Newton's iteration, relative to its inertia.
-GRIP = 1e6
-ROUNDING = 2e-8
-# Part of the softness against rounding that is enough for a node in space.
-_FINER = 1e-4
 _ITERATIONS = 60
 # Newton steps without shortening.
 _HASTY = 8
@@ -127,31 +122,13 @@ class NewtonWorkspace(NamedTuple):
 
 
 @helper
-def _grip(j, g, hold, s):
-    """Parameter r of node j in stick, in space larger where rounding limits it.
-
-    Across a fast belt slip velocities are small, and nodes must come to rest in shorter steps.
-    """
-    if s.rows.shape[1] == 2 or hold.grip[j] == 0.0:
-        return hold.grip[j]
-    inertia = 0.0
-    for axis in range(0, s.rows.shape[1], 2):
-        total = 0.0
-        for i in range(s.rows.shape[2]):
-            total += s.rows[j, axis, i] * s.rows[j, axis, i]
-        inertia = max(inertia, total)
-    softest = inertia * g / GRIP
-    return 1.0 / (softest + _FINER * max(1.0 / hold.grip[j] - softest, 0.0))
-
-
-@helper
 def along_tangents(values, j, n):
     """Entries of node j in an array (n,), in space (2 n,), along the tangents."""
     return values[j], values[n + j] if len(values) > n else 0.0
 
 
 @helper
-def _set_friction(j, node, g, p, hold, turning, partial, force):
+def _set_friction(j, node, p, hold, turning, partial, force):
     """Fill ``force`` and ``hold.side`` of node j; returns its creep velocity.
 
     Fills rows 0 and 2 of ``partial`` (d + 1, 2 d) with the derivatives of the friction force to V
@@ -161,7 +138,7 @@ def _set_friction(j, node, g, p, hold, turning, partial, force):
     """
     s, side, slip, pressing = p.system, hold.side, node.contact.slip, node.pressing
     n, d, _ = s.rows.shape
-    grip, limit = _grip(j, g, hold, s), stick_limit(j, pressing, p)
+    grip, limit = hold.grip[j], stick_limit(j, pressing, p)
     for k in range(d - 1):
         force[k * n + j] = hold.multiplier[k * n + j] + grip * slip[k]
     trial, before = along_tangents(force, j, n), along_tangents(side, j, n)
@@ -225,7 +202,7 @@ def _linearise(stage, moved, p, hold, turning, workspace, force):
             for axis in range(d):
                 partial[row, axis] = g * partial[row, axis] + partial[row, d + axis]
         node = NodeForces(F, pressing, contact)
-        creep = max(creep, _set_friction(j, node, g, p, hold, turning, partial, force))
+        creep = max(creep, _set_friction(j, node, p, hold, turning, partial, force))
         for k in range(d - 1):
             if s.follows_surface:
                 for axis in range(d):

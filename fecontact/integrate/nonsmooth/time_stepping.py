@@ -10,23 +10,33 @@ Numerical Analysis 14 (1977).
 """
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
+
+import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.copies import put, put_rows
+from fecontact.core.copies import put
 from fecontact.core.dense_lu import solve
-from fecontact.integrate.bernstein import NOWHERE, first_below
-from fecontact.integrate.nonsmooth.equations import contact_powers, observe
-from fecontact.integrate.nonsmooth.event_search import MISSED, ROUGHLY, first_pressed, pressed
+from fecontact.core.types import Array
+from fecontact.integrate.bernstein import DEPTH, NOWHERE, first_below, fit, largest, smallest
+from fecontact.integrate.nonsmooth.equations import contact_powers, observe, set_implicit_matrix
+from fecontact.integrate.nonsmooth.event_search import (
+    ROUGHLY,
+    first_pressed,
+    missed_force,
+    pressed,
+)
 from fecontact.integrate.nonsmooth.problem import (
     CUTS,
     FORCE,
     KNOWN,
     LIMIT,
+    NODE_ENTRIES,
     PENETRATION,
     RATE,
     SLIP_OF,
     SLIP_SIZE,
+    WITH_WORK,
     Evaluation,
     Limits,
     NonsmoothProblem,
@@ -36,15 +46,7 @@ from fecontact.integrate.nonsmooth.problem import (
     pace,
     pass_break,
 )
-from fecontact.integrate.nonsmooth.stage_newton import GRIP, ROUNDING, Stage, solve_stage
-from fecontact.integrate.nonsmooth.stepping_workspace import (
-    IN_A_ROW,
-    SLOWEST,
-    STAGES,
-    THIRDS,
-    UNSOLVED,
-    Workspace,
-)
+from fecontact.integrate.nonsmooth.stage_newton import Hold, NewtonWorkspace, Stage, solve_stage
 from fecontact.integrate.step_loop import (
     CUT,
     FAILED,
@@ -56,9 +58,9 @@ from fecontact.integrate.step_loop import (
     Method,
     step_loop,
 )
-from fecontact.system.nodes import ground_motion, ground_speed, size_of
+from fecontact.system.nodes import AXES, MODES, NODES, ground_motion, ground_speed, size_of
 from fecontact.system.polynomial_forces import add_polynomial_product, has_polynomial
-from fecontact.system.powers import body_powers
+from fecontact.system.powers import POWER_COUNT, body_powers
 
 GAMMA = 0.43586652150845899942
 A21 = 0.5 * (1.0 - GAMMA)
@@ -66,14 +68,69 @@ B1 = -0.25 * (6.0 * GAMMA**2 - 16.0 * GAMMA + 1.0)
 B2 = 0.25 * (6.0 * GAMMA**2 - 20.0 * GAMMA + 5.0)
 ERROR_1 = B1 - GAMMA / (1.0 - GAMMA)
 ERROR_2 = B2 - (1.0 - 2.0 * GAMMA) / (1.0 - GAMMA)
-NODES = (GAMMA, GAMMA + A21, 1.0)
+MOMENTS = (GAMMA, GAMMA + A21, 1.0)
+STAGES = len(MOMENTS)
 # A step is cut so often at most before the rest counts as error.
 MOST_CUTS = 3
 # Stages may fail in a range of lengths that short steps, of less than this part of the longest one,
 # do not get past as they grow: after so many failures a longest step is tried.
 _SHORT, _MOST_UNSOLVED = 1e-3, 50.0
+# Stiffness that holds a sticking node during Newton's iteration, relative to its inertia, rounding
+# of slip velocities, and the part of the softness against it that is enough for a node in space.
+_GRIP, _ROUNDING, _FINER = 1e6, 2e-8, 1e-4
 # Outputs nearer to an end of a step, in parts of it, are at that end.
 _NEAR = 1e-9
+# Entries of `Workspace.tries`: the largest floor of the slip velocities, attempts in a row whose
+# error was too large, and attempts at short steps whose stages could not be solved.
+TRIES = 3
+SLOWEST, IN_A_ROW, UNSOLVED = range(TRIES)
+# From values at the thirds of a step to the coefficients of a cubic.
+_THIRDS = fit(np.arange(4) / 3.0)
+
+
+class Workspace(NamedTuple):
+    """Workspace of implicit steps.
+
+    Attributes
+    ----------
+    newton, hold : NewtonWorkspace, Hold
+        Workspace and stick variables of the stages.
+    states, accelerations, forces, rates : (3, 2 m), (3, m), (3, n), (3, p + n) arrays
+        Of the stages: Y, q'', friction forces, in space (3, 2 n), and powers.
+    start, known : (m,) arrays
+        Places and velocities that a stage adds to.
+    new, before, after : (size,), (m + p + n,), (m + p + n,) arrays
+        Y at the end of the step; accelerations and powers at both ends.
+    old : (n, columns) array
+        Results at the begin of the step.
+    sides : (n,) array, in space (2 n,)
+        ``hold.side`` at the begin of the step.
+    inertia : (n,) array
+        Tx Tx^T of each node, or in space T2 T2^T if that is larger.
+    tries : (3,) array
+        Results of an attempt at a step for the next attempt.
+    cubic, speed, halves : (4,), (4,), (DEPTH, 5) arrays
+        Polynomials over the step, and parts of it.
+    """
+
+    newton: NewtonWorkspace
+    hold: Hold
+    states: Annotated[Array, STAGES, 2 * MODES]
+    accelerations: Annotated[Array, STAGES, MODES]
+    forces: Annotated[Array, STAGES, (AXES - 1) * NODES]
+    rates: Annotated[Array, STAGES, NODES + POWER_COUNT]
+    start: Annotated[Array, MODES]
+    known: Annotated[Array, MODES]
+    new: Annotated[Array, WITH_WORK]
+    before: Annotated[Array, MODES + NODES + POWER_COUNT]
+    after: Annotated[Array, MODES + NODES + POWER_COUNT]
+    old: Annotated[Array, NODES, NODE_ENTRIES]
+    sides: Annotated[Array, (AXES - 1) * NODES]
+    inertia: Annotated[Array, NODES]
+    tries: Annotated[Array, TRIES]
+    cubic: Annotated[Array, 4]
+    speed: Annotated[Array, 4]
+    halves: Annotated[Array, DEPTH, 5]
 
 
 class Data(NamedTuple):
@@ -122,7 +179,7 @@ def _slips_back(j, step, p, w, tolerance, workspace):
         for third in range(4):
             moved = ground_motion(step.t + h * third / 3.0, s)
             for i in range(4):
-                speed[i] += THIRDS[i, third] * e * ground_speed(k, j, moved, s)
+                speed[i] += _THIRDS[i, third] * e * ground_speed(k, j, moved, s)
     if last <= tolerance:
         return 1.0
     b[0], b[3] = first + speed[0], last + speed[3]
@@ -142,12 +199,8 @@ def _touches(j, h, p, w, limits, workspace):
     s, b = p.system, workspace.cubic
     b[0], b[3] = workspace.old[j, PENETRATION], w.nodes[j, PENETRATION]
     b[1], b[2] = b[0] + h * workspace.old[j, RATE] / 3.0, b[3] - h * w.nodes[j, RATE] / 3.0
-    depth = 0.0
-    for i in range(s.rows.shape[2]):
-        depth = max(depth, abs(s.rows[j, 1, i]) * limits.floor[i])
-    above = MISSED * max(pressed(b[0], j, s), pressed(b[3], j, s))
-    above += pressed(limits.rtol * depth, j, s)
-    if max(pressed(b.min(), j, s), pressed(b.max(), j, s)) > above:
+    above = missed_force(b, 1.0, j, p, limits)
+    if max(pressed(smallest(b), j, s), pressed(largest(b), j, s)) > above:
         return first_pressed(b, above, ROUGHLY, j, s, workspace.halves)
     return 1.0
 
@@ -191,15 +244,10 @@ def _fill(row, output, step, data):
     states, time = output.states, output.times[row]
     x = (time - step.t) / h
     early, late = (1.0 - x) * (1.0 - x), x * x
-    for i in range(m):
-        q, q_new, v, v_new = Y[i], new[i], Y[m + i], new[m + i]
-        states[row, i] = (early * ((1.0 + 2.0 * x) * q + x * h * v)
-                          + late * ((3.0 - 2.0 * x) * q_new + (x - 1.0) * h * v_new))
-        states[row, m + i] = (early * ((1.0 + 2.0 * x) * v + x * h * before[i])
-                              + late * ((3.0 - 2.0 * x) * v_new + (x - 1.0) * h * after[i]))
-    for i in range(2 * m, len(Y)):
-        states[row, i] = (early * ((1.0 + 2.0 * x) * Y[i] + x * h * before[i - m])
-                          + late * ((3.0 - 2.0 * x) * new[i] + (x - 1.0) * h * after[i - m]))
+    for i in range(len(Y)):
+        rate, rate_new = (Y[m + i], new[m + i]) if i < m else (before[i - m], after[i - m])
+        states[row, i] = (early * ((1.0 + 2.0 * x) * Y[i] + x * h * rate)
+                          + late * ((3.0 - 2.0 * x) * new[i] + (x - 1.0) * h * rate_new))
     observe(ground_motion(time, p.system), states[row], p, w.nodes)
     put(w.nodes[:, FORCE], output.normal[row])
     for j in range(len(progress.carried)):
@@ -226,20 +274,19 @@ def _set_inertia(p, limits, workspace):
 
 
 @routine
-def _prepare(step, quick, p, progress, w, workspace):
+def _prepare(step, quick, p, progress, workspace):
     """Set the linear matrix of a step, and the parameters r of the nodes in stick."""
-    s, hold, inertia, linear = p.system, workspace.hold, workspace.inertia, workspace.newton.linear
-    g = GAMMA * step.h
-    n, _, m = s.rows.shape
-    for i in range(m):
-        for k in range(m):
-            linear[i, k] = g * s.damping[i, k] + g * g * s.stiffness[i, k]
-        linear[i, i] += 1.0
-    for j in range(n):
+    hold, inertia, old, g = workspace.hold, workspace.inertia, workspace.old, GAMMA * step.h
+    set_implicit_matrix(g, g * g, p.system, workspace.newton.linear)
+    rounding = _ROUNDING * quick
+    if p.system.rows.shape[1] > 2:
+        # Across a fast belt slip velocities are small; nodes must come to rest in shorter steps.
+        rounding *= _FINER
+    for j in range(len(inertia)):
         # Of a force within its limit the rounding of the slip velocity may move no more.
-        softest = inertia[j] * g / GRIP
-        if w.nodes[j, LIMIT] > 0.0:
-            softest += ROUNDING * quick / w.nodes[j, LIMIT]
+        softest = inertia[j] * g / _GRIP
+        if old[j, LIMIT] > 0.0:
+            softest += rounding / old[j, LIMIT]
         hold.grip[j] = 1.0 / softest if inertia[j] > 0.0 else 0.0
     put(progress.carried, hold.multiplier)
 
@@ -262,7 +309,7 @@ def _solve_stages(step, finest, p, limits, progress, workspace):
                 start[i] += h * (B1 * states[0, m + i] + B2 * states[1, m + i])
                 known[i] += h * (B1 * accelerations[0, i] + B2 * accelerations[1, i])
             state[m + i] = Y[m + i] if k == 0 else states[k - 1, m + i]
-        stage = Stage(min(step.t + NODES[k] * h, step.latest), g, start, known, state)
+        stage = Stage(min(step.t + MOMENTS[k] * h, step.latest), g, start, known, state)
         if not solve_stage(stage, p, workspace.hold, limits, finest, workspace.newton,
                            workspace.forces[k]):
             return k
@@ -301,11 +348,11 @@ def _error(step, p, limits, Y, workspace):
 def _set_rates(step, p, w, workspace):
     """Fill ``workspace.rates`` with the powers at the stages, and w with the nodes at the end."""
     for k in range(STAGES):
-        moment = min(step.t + NODES[k] * step.h, step.latest)
+        moment = min(step.t + MOMENTS[k] * step.h, step.latest)
         moved = ground_motion(moment, p.system)
         observe(moved, workspace.states[k], p, w.nodes)
         body_powers(moment, workspace.states[k], p.system, workspace.rates[k])
-        contact_powers(moved, p.system, w.nodes, workspace.forces[k], True, workspace.rates[k])
+        contact_powers(moved, p, w.nodes, workspace.forces[k], workspace.rates[k])
 
 
 @routine
@@ -333,14 +380,13 @@ def _attempt(step, last, smallest, data):
     """Try a step; its outcome, and the length of the next one."""
     p, limits, progress, output, w, workspace = (data.problem, data.limits, data.progress,
                                                  data.output, data.evaluation, data.workspace)
-    Y, counts, largest, tries = progress.state, progress.counts, progress.largest, workspace.tries
+    Y, counts, sizes, tries = progress.state, progress.counts, progress.largest, workspace.tries
     n, _, m = p.system.rows.shape
     length, slowest = step.h, tries[SLOWEST]
     moved = ground_motion(step.t, p.system)
-    observe(moved, Y, p, w.nodes)
-    put_rows(w.nodes, workspace.old)
-    quick = largest[SLIP_SIZE] + _fastest_side(moved, p)
-    _prepare(step, quick, p, progress, w, workspace)
+    observe(moved, Y, p, workspace.old)
+    quick = sizes[SLIP_SIZE] + _fastest_side(moved, p)
+    _prepare(step, quick, p, progress, workspace)
     finest = (1e-2 * limits.rtol + 1e-11) * max(slowest, quick)
     if p.system.rows.shape[1] > 2:
         # Athwart a fast belt slip velocities are small, and their errors count.
@@ -374,7 +420,7 @@ def _attempt(step, last, smallest, data):
         slip = 0.0
         for k in range(p.system.rows.shape[1] - 1):
             slip = size_of((w.nodes[j, SLIP_OF[k]], slip))
-        largest[SLIP_SIZE] = max(largest[SLIP_SIZE], slip)
+        sizes[SLIP_SIZE] = max(sizes[SLIP_SIZE], slip)
     _set_end(length, m, progress, workspace)
     if counts[STEPS] == 0:
         put(workspace.forces[0], progress.carried)

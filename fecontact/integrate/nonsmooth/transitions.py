@@ -20,12 +20,14 @@ from fecontact.core.compiled import helper, routine
 from fecontact.core.dense_lu import factorise, solve
 from fecontact.integrate.nonsmooth.equations import (
     derivative,
+    hold,
     place_size,
-    solve_small,
+    residual,
+    sinking_row,
     speed_rate,
 )
 from fecontact.integrate.nonsmooth.event_search import ROUNDING, pressed
-from fecontact.integrate.nonsmooth.problem import FIXED, OPEN, PENETRATION, RATE, SLOPE, STICK
+from fecontact.integrate.nonsmooth.problem import FIXED, OPEN, PENETRATION, RATE, STICK
 
 # Sweeps at most, and between two solutions for the forces below their limits.
 SWEEPS, _TOGETHER = 20000, 20
@@ -40,25 +42,12 @@ _PRESSES = 4
 @helper
 def hold_velocity(p, held, w, Y):
     """Change q' so that the held clusters have no slip velocity; w.slip must be theirs."""
-    clusters, m = p.rows.shape
-    count = 0
-    for c in range(clusters):
+    count, m = 0, p.rows.shape[1]
+    for c in range(len(p.rows)):
         if held[c]:
-            w.indices[count] = c
+            w.indices[count], w.right[count] = len(p.cluster) + c, -w.slip[c]
             count += 1
-    if count == 0:
-        return
-    for a in range(count):
-        w.right[a] = w.slip[w.indices[a]]
-        for b in range(count):
-            total = 0.0
-            for i in range(m):
-                total += p.rows[w.indices[a], i] * p.rows[w.indices[b], i]
-            w.matrix[a, b] = total
-    solve_small(w, count)
-    for a in range(count):
-        for i in range(m):
-            Y[m + i] -= p.rows[w.indices[a], i] * w.right[a]
+    hold(count, p, w, Y[m : 2 * m])
 
 
 @helper
@@ -149,16 +138,14 @@ def press(t, p, touched, w, Y):
             continue
         size, stretch = place_size(j, Y, p), 0.0
         for i in range(m):
-            row = s.rows[j, 1, i] - w.nodes[j, SLOPE] * s.rows[j, 0, i]
-            stretch += row * row
+            stretch += sinking_row(j, i, w, s) ** 2
         depth = ROUNDING * size + abs(rate) * _TIME_ROUNDING * (abs(t) + _TICKS * p.tick)
         for _ in range(_PRESSES):
             way = depth if pressed(u + depth, j, s) > 0.0 else (
                 -depth if pressed(u - depth, j, s) > 0.0 else 0.0)
             if way != 0.0 and stretch > 0.0:
                 for i in range(m):
-                    row = s.rows[j, 1, i] - w.nodes[j, SLOPE] * s.rows[j, 0, i]
-                    Y[i] -= row / stretch * way
+                    Y[i] -= sinking_row(j, i, w, s) / stretch * way
                 break
             depth *= 4.0
 
@@ -204,9 +191,7 @@ def decide_clusters(t, p, progress, workspace, near, w, out):
         ground = speed_rate(t, p)
         largest = 0.0
         for c in range(clusters):
-            relative[c] = -p.sliding[c] * ground
-            for i in range(m):
-                relative[c] += p.rows[c, i] * out[m + i]
+            relative[c] = -residual(len(p.cluster) + c, ground, out[m : 2 * m], p, w)
             largest = max(largest, abs(relative[c]))
         _least_friction(p, candidate, relative, w)
         changed = False

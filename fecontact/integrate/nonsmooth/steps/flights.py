@@ -10,17 +10,19 @@ therefore the double integral of its acceleration from the moment at which the s
 over each step, until places tell it from zero.
 """
 
+from typing import Annotated, NamedTuple
+
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
+from fecontact.core.records import Flags
+from fecontact.core.types import Array
 from fecontact.integrate.bernstein import NOWHERE, first_below, from_nested, value
 from fecontact.integrate.nonsmooth.dop853 import DENSE, PARTS, SLOPES, STAGES, B
 from fecontact.integrate.nonsmooth.equations import force_size, place_size
 from fecontact.integrate.nonsmooth.problem import PENETRATION, RATE, RATE_SIZE
+from fecontact.system.nodes import NODES
 
-# Columns of ``workspace.flights``: whether a flight has just begun, its height and the rate of
-# that, and how far places were from the stop where it began.
-YOUNG, HEIGHT, CLIMB, SUNK, FLIGHT_FIELDS = 0, 1, 2, 3, 4
 # Rounding of an acceleration relative to its terms, and heights that places tell from zero,
 # relative to the places.
 _ROUNDING, _CLEAR = 1e-15, 2e-12
@@ -32,6 +34,18 @@ _LOOKS, _HALVINGS = 64, 50
 _TICK = 1e-4
 
 
+class Flights(NamedTuple):
+    """Whether flights have just begun, their heights and the rates of these, (n,).
+
+    ``sunk`` is how far places were from the stop where they began.
+    """
+
+    young: Annotated[Flags, NODES]
+    height: Annotated[Array, NODES]
+    climb: Annotated[Array, NODES]
+    sunk: Annotated[Array, NODES]
+
+
 @helper
 def begin_flight(j, noise, p, w, workspace):
     """Begin a flight at a stop that has just opened, as w sees it; rates below ``noise`` are none.
@@ -39,25 +53,25 @@ def begin_flight(j, noise, p, w, workspace):
     Its height is counted from where it is, up to rounding and the errors of the steps at rest.
     """
     level, rate = p.relief[2] == np.inf or not p.system.on_ground[j], w.nodes[j, RATE]
-    workspace.flights[j, YOUNG] = 1.0 if level else 0.0
-    workspace.flights[j, HEIGHT] = 0.0
-    workspace.flights[j, CLIMB] = -rate if -rate > noise else 0.0
-    workspace.flights[j, SUNK] = abs(w.nodes[j, PENETRATION])
+    flights = workspace.flights
+    flights.young[j], flights.height[j] = level, 0.0
+    flights.climb[j] = -rate if -rate > noise else 0.0
+    flights.sunk[j] = abs(w.nodes[j, PENETRATION])
 
 
 @helper
-def _acceleration_size(j, p, progress, workspace):
+def _acceleration_size(j, p, progress, w, workspace):
     """Size of the terms of the acceleration of the height of stop j."""
     s, Y = p.system, progress.state
     m, total = s.rows.shape[2], 0.0
     for i in range(m):
-        size = force_size(i, Y, workspace.applied_forces, s) + abs(workspace.slopes[0, m + i])
+        size = force_size(i, Y, w.applied_forces, s) + abs(workspace.slopes[0, m + i])
         total += abs(s.rows[j, 1, i]) * size
     return total
 
 
 @routine
-def _rise(j, step, p, progress, workspace):
+def _rise(j, step, p, progress, w, workspace):
     """Fill ``workspace.heights`` with Bernstein coefficients of a young flight over the step.
 
     Coefficients of its rate go into ``workspace.along``. Returns the rounding of the height at the
@@ -73,7 +87,7 @@ def _rise(j, step, p, progress, workspace):
     change = 0.0
     for k in range(STAGES):
         change += h * B[k] * node_acceleration[k]
-    c[0], c[1] = workspace.flights[j, CLIMB], change
+    c[0], c[1] = workspace.flights.climb[j], change
     c[2] = h * node_acceleration[0] - change
     c[3] = 2.0 * change - h * (node_acceleration[STAGES] + node_acceleration[0])
     for q in range(len(DENSE)):
@@ -81,22 +95,22 @@ def _rise(j, step, p, progress, workspace):
         for k in range(SLOPES):
             c[4 + q] += h * DENSE[q, k] * node_acceleration[k]
     from_nested(c, rate)
-    heights[0] = workspace.flights[j, HEIGHT]
+    heights[0] = workspace.flights.height[j]
     for k in range(PARTS + 1):
         heights[k + 1] = heights[k] + h / (PARTS + 1) * rate[k]
     # Prescribed values have the rounding of the time, a speed that of the largest so far.
     return (_ROUNDING * (1.0 + _TICK * abs(step.t) / p.tick)
-            * _acceleration_size(j, p, progress, workspace) * h * h
+            * _acceleration_size(j, p, progress, w, workspace) * h * h
             + _ROUNDING * progress.largest[RATE_SIZE] * h)
 
 
 @routine
-def first_landing(j, step, p, progress, workspace):
+def first_landing(j, step, p, progress, w, workspace):
     """First part of the step at which a young flight is at its end; NOWHERE if it is not.
 
     A fall below the rounding of the height tells that it has ended, its height when.
     """
-    rounding = _rise(j, step, p, progress, workspace)
+    rounding = _rise(j, step, p, progress, w, workspace)
     heights, scratch = workspace.heights, workspace.halves[0]
     for i in range(len(heights)):
         heights[i] += rounding
@@ -118,17 +132,16 @@ def first_landing(j, step, p, progress, workspace):
 
 
 @routine
-def advance(part, step, p, progress, workspace):
+def advance(part, step, p, progress, w, workspace):
     """Take young flights up to a part of the step, of which ``workspace`` knows."""
-    s, Y = p.system, progress.state
-    for j in range(len(workspace.flights)):
-        if workspace.flights[j, YOUNG] == 0.0:
+    s, Y, flights = p.system, progress.state, workspace.flights
+    for j in range(len(flights.young)):
+        if not flights.young[j]:
             continue
-        _rise(j, step, p, progress, workspace)
+        _rise(j, step, p, progress, w, workspace)
         size = place_size(j, Y, p)
         for i in range(p.rows.shape[1]):
             size += abs(s.rows[j, 1, i] * workspace.parts[0, i])
-        workspace.flights[j, HEIGHT] = max(value(workspace.heights, part, workspace.halves[0]), 0.0)
-        workspace.flights[j, CLIMB] = value(workspace.along, part, workspace.halves[0])
-        if workspace.flights[j, HEIGHT] > _CLEAR * size + _ABOVE * workspace.flights[j, SUNK]:
-            workspace.flights[j, YOUNG] = 0.0
+        flights.height[j] = max(value(workspace.heights, part, workspace.halves[0]), 0.0)
+        flights.climb[j] = value(workspace.along, part, workspace.halves[0])
+        flights.young[j] = flights.height[j] <= _CLEAR * size + _ABOVE * flights.sunk[j]

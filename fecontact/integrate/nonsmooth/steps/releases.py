@@ -11,9 +11,8 @@ from fecontact.core.compiled import helper, routine
 from fecontact.core.copies import put
 from fecontact.integrate.bernstein import NOWHERE, fit
 from fecontact.integrate.nonsmooth.dop853 import interpolate
-from fecontact.integrate.nonsmooth.equations import set_limits
+from fecontact.integrate.nonsmooth.equations import set_limits, set_rates
 from fecontact.integrate.nonsmooth.problem import FORCE, OPEN, STICK
-from fecontact.integrate.nonsmooth.steps.rates import set_rates
 
 # Rounding of forces that come from a system of equations, relative to their size.
 _FORCE_ROUNDING = 1e-13
@@ -63,7 +62,7 @@ def set_left(p, progress, w, out):
 def _forces(part, step, p, progress, w, workspace, out):
     """Fill out (2 k + n,) with the margins at a part of the step."""
     interpolate(part, progress.state, workspace.parts, workspace.state[: 2 * p.rows.shape[1]])
-    set_rates(min(step.t + part * step.h, step.latest), workspace.state, p, progress, w, workspace,
+    set_rates(min(step.t + part * step.h, step.latest), workspace.state, p, progress, w,
               workspace.rate)
     set_left(p, progress, w, out)
 
