@@ -166,6 +166,13 @@ def test_read_only_leaves_what_holds_no_array():
             """Two arrays."""
             return np.zeros(1), [np.ones(1)]
 
+        @property
+        def count(self) -> int:
+            """A number, which is read as often as by a plain class."""
+            return 2
+
+    assert Plain().count == 2
+    assert not hasattr(Plain.count.fget, "__wrapped__")
     assert [one.flags.writeable for one in (Plain().both[0], Plain().both[1][0])] == [False] * 2
     assert Plain.both.__doc__ == "Two arrays."
 

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 _Owner = TypeVar("_Owner", bound=type)
+_PLAIN = (int, float, bool, str)
 
 
 def read_only(value: Any) -> Any:
@@ -60,7 +61,8 @@ def read_only_arrays(owner: _Owner) -> _Owner:
             continue
         if isinstance(member, cached_property):
             member.func = _returning_read_only(member.func)
-        elif isinstance(member, property) and member.fget is not None:
+        elif (isinstance(member, property) and member.fget is not None
+              and _may_hold_arrays(member.fget)):
             setattr(owner, name, property(_returning_read_only(member.fget), member.fset,
                                           member.fdel, member.__doc__))
     if "__init__" in vars(owner):
@@ -68,6 +70,11 @@ def read_only_arrays(owner: _Owner) -> _Owner:
         for name, function in (("__init__", made), ("__setstate__", restored)):
             setattr(owner, name, _freezing(function))
     return owner
+
+
+def _may_hold_arrays(function: Callable[..., Any]) -> bool:
+    """Whether a property is not declared as a number or a text, which are read often."""
+    return function.__annotations__.get("return") not in _PLAIN
 
 
 def _returning_read_only(function: Callable[[Any], Any]) -> Callable[[Any], Any]:

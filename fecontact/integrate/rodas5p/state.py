@@ -1,5 +1,6 @@
 """Records of the compiled integrator: limits, state of a run, workspace."""
 
+from collections.abc import Callable
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -236,10 +237,12 @@ def workspace_for(
         reduced=stage_solver.reduced_for(modes, nodes, states, dimension))
 
 
-def output_for(times: Array, size: int, nodes: int) -> Output:
-    """Rows for so many times, to be filled."""
-    return Output(times, np.zeros((len(times), size)),
-                  np.zeros((len(times), POWER_COUNT + NODE_POWERS * nodes)))
+def output_for(
+    times: Array, size: int, nodes: int, made: Callable[..., Array] = np.zeros
+) -> Output:
+    """Rows for so many times, to be filled; by ``np.empty`` their memory is not touched before."""
+    return Output(times, made((len(times), size)),
+                  made((len(times), POWER_COUNT + NODE_POWERS * nodes)))
 
 
 def progress_for(
