@@ -189,9 +189,10 @@ def test_derivatives_of_the_resonance_are_those_of_its_residual(condition, windo
     field = contact_field(system, [FREQUENCY, name])
     orbit = problem_for(field, field.values_with(**{FREQUENCY: f}), 0, HarmonicBalance(3),
                         np.append(np.ones(field.dimension + 1), 1.0 / TURN))
+    orbit = replace(orbit, row=field.displacement_row("a.p", "y"))
     rng = np.random.default_rng(2)
     u = np.concatenate([rng.normal(size=orbit.size), [f, 0.5]])
-    problem = PeakProblem(orbit, 1, 1.0, field.displacement_row("a.p", "y"), condition,
+    problem = PeakProblem(orbit, 1, 1.0, condition,
                           rng.normal(size=orbit.size + 1), rest_state(field, field.values),
                           window=window)
     if window:
