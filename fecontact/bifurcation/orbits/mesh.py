@@ -50,7 +50,7 @@ def lagrange(nodes: Array) -> list[np.polynomial.Polynomial]:
 
 
 def basis_polynomials(degree: int) -> list[np.polynomial.Polynomial]:
-    """Those of m + 1 equidistant nodes in [0, 1]."""
+    """The polynomials of :func:`lagrange` for m + 1 equidistant nodes in [0, 1]."""
     return lagrange(np.linspace(0.0, 1.0, degree + 1))
 
 

@@ -288,7 +288,10 @@ def coupling(a, b, p, w):
 
 @helper
 def residual(a, ground, acceleration, p, w):
-    """What u'' of node a, or -a of a cluster, is at an acceleration, if the ground has another."""
+    """Acceleration at which the height of node a falls, by those of modes and ground.
+
+    Of a cluster, which is counted behind the nodes, what it lacks to move with the ground.
+    """
     n = len(p.cluster)
     total = (w.nodes[a, CURVED] - w.nodes[a, SLOPE] * ground if a < n
              else p.sliding[a - n] * ground)
