@@ -28,7 +28,7 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
-from fecontact.bifurcation.continuation.inner_product import weighted_norm
+from fecontact.bifurcation.continuation.inner_product import unit, weighted_norm
 from fecontact.bifurcation.continuation.newton import newton
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.predictor import BENT
@@ -207,9 +207,7 @@ class PeakLinearised(BorderedEquations):
     @cached_property
     def along(self) -> Array:
         """Direction (n + 1,) of the response."""
-        unit = np.zeros(len(self.u) - 1)
-        unit[-1] = 1.0
-        return self.inner.solve(self.problem.border, unit)
+        return self.inner.solve(self.problem.border, unit(len(self.u) - 1))
 
     @cached_property
     def force_row(self) -> Array:
