@@ -9,6 +9,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch, labelled, regular, shortened
 from fecontact.bifurcation.continuation.heading import heading
+from fecontact.bifurcation.continuation.inner_product import unit
 from fecontact.bifurcation.continuation.newton import newton, norm
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import special_point
@@ -246,9 +247,7 @@ def _starts(
                                   options.iterations)
                 if found is None or not problem.linearise(found[0]).least.left > 0.0:
                     continue
-                unit = np.zeros(len(u))
-                unit[-1] = 1.0
-                ahead = found[1].solve(row, unit)
+                ahead = found[1].solve(row, unit(len(u)))
             except FecontactError:
                 continue
             if np.isfinite(ahead).all():

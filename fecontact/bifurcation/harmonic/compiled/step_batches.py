@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.inner_product import weighted_norm
+from fecontact.bifurcation.continuation.inner_product import unit, weighted_norm
 from fecontact.bifurcation.continuation.newton import Solution, completed
 from fecontact.bifurcation.continuation.point import BranchHeader
 from fecontact.bifurcation.continuation.points import branch_points
@@ -246,10 +246,8 @@ class StepBatches:
 
         Tangents come from the derivatives where Newton's method began.
         """
-        unit = np.zeros(len(u))
-        unit[-1] = 1.0
         try:
-            exact = problem.linearise(u).solve(weights * tangent, unit)
+            exact = problem.linearise(u).solve(weights * tangent, unit(len(u)))
         except AnalysisError:
             return False
         exact = exact / np.sqrt(weights @ exact**2)
