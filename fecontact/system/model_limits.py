@@ -304,8 +304,8 @@ def _duration(planned: Planned) -> Iterator[str]:
             ("of drive, loads, ground and waves", 1.0 / system.shortest_period(0.0, duration),
              MOST_PERIODS, "lower that frequency")):
         if PERIODS < duration * highest <= most:
-            yield (f"it lasts {duration * highest:.2g} periods of the fastest {what}, "
-                   f"{highest:.4g} Hz, and will take long; end it earlier, or {remedy}.")
+            yield (f"the duration is {duration * highest:.2g} periods of the fastest {what}, "
+                   f"{highest:.4g} Hz, which takes long; end it earlier, or {remedy}.")
 
 
 def _unheld(planned: Planned) -> Iterator[str]:

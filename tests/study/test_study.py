@@ -572,7 +572,7 @@ def test_a_decimal_comma_is_recognised(tiny):
     ({"gap": 50.0, "simulation.t_end": 2.0}, "smallest gap of 50 m is more than 100 times"),
     ({"simulation.t_end": 1e5}, "periods of the fastest mode"),
     ({"drive.amplitude_x": 1e-6, "drive.stiffness_x": 1.0, "drive.frequency_hz": 1e11 / TURN},
-     r"lasts 1\.6e\+07 periods of the fastest of drive")])
+     r"duration is 1\.6e\+07 periods of the fastest of drive")])
 def test_implausible_values_are_warned_of_before_a_run(tiny, changes, message):
     found, = implausible(tiny.with_(**changes))
     assert re.search(message, found)
