@@ -24,6 +24,7 @@ import numpy as np
 
 from fecontact.bifurcation.equilibria.normal_forms import (
     along_null_vector,
+    bordered,
     critical_pair,
     null_vectors,
 )
@@ -156,9 +157,9 @@ def _bautin(A: Array, forms: _Forms, w: float) -> tuple[Array, float]:
 def _bogdanov_takens(A: Array, forms: _Forms) -> tuple[Array, float]:
     """Coefficients a and b of a double eigenvalue zero with one eigenvector."""
     q0, p1 = null_vectors(A)
-    q1 = _bordered(A, p1, q0, q0)
+    q1 = bordered(A, p1, q0, q0)
     p1 = p1 / (p1 @ q1)
-    p0 = _bordered(A.T, q0, p1, p1)
+    p0 = bordered(A.T, q0, p1, p1)
     p0 = p0 - (p0 @ q1) * p1
     B = forms.B(q0).real
     a, b = 0.5 * p1 @ B @ q0, p0 @ B @ q0 + p1 @ B @ q1
@@ -224,12 +225,4 @@ def _projected(p: ComplexArray, terms: list[Any], divisor: float) -> tuple[Array
 
 def _within(M: Any, q: Any, p: Any, rhs: Any) -> Any:
     """Solution h of M h = rhs with conj(p) h = 0, for M q = 0 = conj(p) M."""
-    return _bordered(M, q, p.conj(), rhs)
-
-
-def _bordered(M: Any, column: Any, row: Any, rhs: Any) -> Any:
-    """Solution h of [[M, column], [row, 0]] [h, s] = [rhs, 0]."""
-    d = len(M)
-    whole = np.zeros((d + 1, d + 1), dtype=np.result_type(M, column, row, rhs))
-    whole[:d, :d], whole[:d, d], whole[d, :d] = M, column, row
-    return np.linalg.solve(whole, np.append(rhs, 0.0))[:d]
+    return bordered(M, q, p.conj(), rhs)

@@ -186,18 +186,15 @@ def along_null_vector(
     """Null vector v of J, and w B(v, v) and w [C(v, v, v) - 3 B(v, J^+ B(v, v))], each with the
     sum of the sizes of its terms, from two differences; none where zero is a double eigenvalue.
     """
-    d = len(x)
     _, J, _ = field.derivatives(np.zeros(1), x[None], values)
     v, w = null_vectors(J[0])
     if abs(w @ v) < _DEFECTIVE:
         return v, []
-    bordered = np.zeros((d + 1, d + 1))
-    bordered[:d, :d], bordered[:d, d], bordered[d, :d] = J[0], w, v
-    w = w / (w @ v)
+    border, w = w, w / (w @ v)
     found = []
     for part in bend(field, x, values, v, scales):
         bent = part.first @ v
-        inner = np.linalg.solve(bordered, np.append(bent, 0.0))[:d]
+        inner = bordered(J[0], border, v, bent)
         sizes = np.abs(part.second) @ np.abs(v) + 3.0 * np.abs(part.first) @ np.abs(inner)
         found.append((float(w @ bent), float(w @ (part.second @ v - 3.0 * part.first @ inner)),
                       float(np.abs(w) @ np.abs(part.first) @ np.abs(v)),
@@ -235,3 +232,11 @@ def branching_tangents(
         return None
     other = -0.5 * own / mixed * t + s
     return np.asarray(other / np.linalg.norm(other))
+
+
+def bordered(M: Array, column: Array, row: Array, rhs: Array) -> Any:
+    """Solution h (d,) of [[M, column], [row, 0]] [h, s] = [rhs, 0]; all may be complex."""
+    d = len(M)
+    whole = np.zeros((d + 1, d + 1), dtype=np.result_type(M, column, row, rhs))
+    whole[:d, :d], whole[:d, d], whole[d, :d] = M, column, row
+    return np.linalg.solve(whole, np.append(rhs, 0.0))[:d]

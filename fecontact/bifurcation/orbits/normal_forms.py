@@ -33,9 +33,12 @@ from fecontact.bifurcation.orbits.curves.singularity import (
     SecondDerivatives,
     Singularity,
     at_points,
+    mean_size,
     of_doubling,
     of_fold,
     of_torus,
+    ranges_of,
+    widths_at_points,
 )
 from fecontact.bifurcation.orbits.kinks import JacobianKinks
 
@@ -131,7 +134,7 @@ class Expansion:
         self._problem, self._linearised, self._at = problem, linearised, at
         self._u, self._T = u, linearised.period
         self._J = linearised.derivatives[1]
-        self._h = np.repeat(problem.widths, problem.degree)[:, None]
+        self._h = widths_at_points(problem)
 
     def fold(self, second_derivatives: Sequence[SecondDerivatives]) -> Share:
         """Size of the coefficient b of a fold; its sign is that of the direction of v."""
@@ -139,7 +142,7 @@ class Expansion:
         V, drift = term.states, -term.period / self._T
         found, size = self._share(term.left, V, _applied(second_derivatives[0].first, V) / 2.0
                                   - drift * _applied(self._J, V))
-        unit = self._size(V)
+        unit = mean_size(self._problem, V)
         return Share(abs(found.real) / unit, size / unit)
 
     def doubling(self, second_derivatives: Sequence[SecondDerivatives]) -> Share:
@@ -150,7 +153,7 @@ class Expansion:
         found, size = self._share(
             term.left, V, _applied(second, V) / 6.0 + _applied(first, h2) / 2.0
             - drift / 2.0 * _applied(self._J, V))
-        unit = self._size(V) ** 2
+        unit = mean_size(self._problem, V) ** 2
         return Share(found.real / unit, size / unit)
 
     def torus(self, second_derivatives: Sequence[SecondDerivatives]) -> Share:
@@ -167,7 +170,7 @@ class Expansion:
                  + _complex(p, q, h20, -1.0) / 2.0
                  - drift * (_complex(self._J, across, V) - 1j * angle / self._T * V))
         found, size = self._share(one.left - 1j * other.left, V, third)
-        unit = self._size(V) ** 2
+        unit = mean_size(self._problem, V) ** 2
         return Share(found.real / unit, size / unit)
 
     def coefficient(
@@ -182,7 +185,7 @@ class Expansion:
         if formula == self.fold or not self._kinks.passages:
             return formula(second_derivatives), 0.0
         found, perturbed = [], []
-        span = self._span()
+        span = ranges_of(self._problem, self._u)
         for bend, term in zip(second_derivatives, self._at.terms, strict=True):
             change, error = self._kinks.second(term.states, self._step(term.states, step), span)
             found.append(bend._replace(second=bend.second + change))
@@ -210,17 +213,9 @@ class Expansion:
         return SecondDerivatives(np.asarray((8.0 * odd - far_odd) / (12.0 * h)),
                     np.asarray((16.0 * even - far_even - 30.0 * self._J) / (12.0 * h * h)), P[0])
 
-    def _span(self) -> Array:
-        """Ranges (d,) of the states over the orbit, at least a tenth of the largest scaled one."""
-        nodes = self._problem.nodes(self._u)
-        scales = self._problem.scales[: nodes.shape[1]]
-        size = np.ptp(nodes, axis=0) / scales
-        span: Array = np.maximum(size, 0.1 * size.max()) * scales
-        return span
-
     def _step(self, direction: Array, step: float) -> float:
         """Factor of a direction (N m, d) for a step in ranges; 0 if the direction is zero."""
-        largest = float(np.max(np.abs(direction) / self._span()))
+        largest = float(np.max(np.abs(direction) / ranges_of(self._problem, self._u)))
         return step / largest if largest > 0.0 else 0.0
 
     def _share(self, left: Array, V: Array, g: Array) -> tuple[complex, float]:
@@ -228,13 +223,6 @@ class Expansion:
         weighted = self._h * left
         products, whole = weighted * g, (weighted * V).sum() / self._T
         return complex(products.sum() / whole), float(np.abs(products).sum() / abs(whole))
-
-    def _size(self, V: Array) -> float:
-        """Root of the mean square of the scaled states."""
-        problem = self._problem
-        weights = np.tile(problem.rule.weights, problem.intervals)[:, None] * self._h
-        scales = problem.scales[: V.shape[1]]
-        return float(np.sqrt(np.sum(weights * np.abs(V / scales) ** 2)))
 
     def _response(self, bend: Array) -> tuple[Array, float]:
         """Periodic h with h' - A h = T bend - a x' at the points, and a."""

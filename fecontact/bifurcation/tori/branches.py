@@ -8,6 +8,7 @@ import numpy as np
 from fecontact.bifurcation.continuation.attempts import first_that_goes
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
+from fecontact.bifurcation.continuation.inner_product import unit
 from fecontact.bifurcation.continuation.newton import damped_newton
 from fecontact.bifurcation.continuation.point import BranchPoint, attributes_of
 from fecontact.bifurcation.continuation.points import NeimarkSackerPoint
@@ -267,9 +268,7 @@ def _converged(problem: TorusProblem, u: Array) -> tuple[TorusProblem, Array]:
     AnalysisError
         If it does not converge, or to an orbit.
     """
-    row = np.zeros_like(u)
-    row[-1] = 1.0
-    u, _, converged = damped_newton(problem, u, row, _TOLERANCE, _CORRECTIONS)
+    u, _, converged = damped_newton(problem, u, unit(len(u)), _TOLERANCE, _CORRECTIONS)
     X = problem.coefficients(u) / problem.sizes
     orbit = 1 in problem.unknown and np.abs(X[2 * problem.orders[0] + 1 :]).max() < (
         _ORBIT * np.abs(X).max())

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.inner_product import unit
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem
 from fecontact.bifurcation.harmonic.estimates import responses
 from fecontact.bifurcation.harmonic.layout import Layout, SeriesUnknowns
@@ -447,9 +448,7 @@ class TorusLinearisation(BorderedEquations):
         problem = self.problem
         finer = replace(problem, samples=(2 * problem.samples[0], 2 * problem.samples[1]))
         residual = TorusLinearisation(finer, self.u).residual
-        row = np.zeros(len(self.u))
-        row[-1] = 1.0
-        change = self.solve(row, np.append(-residual, 0.0))
+        change = self.solve(unit(len(self.u)), np.append(-residual, 0.0))
         scaled = problem.coefficients(change) / self.problem.sizes
         return float(np.sqrt((scaled**2).sum())) / self._size
 

@@ -25,7 +25,12 @@ from fecontact.bifurcation.orbits.collocation_equations import (
     CollocationEquations,
     CollocationLinearisation,
 )
-from fecontact.bifurcation.orbits.curves.singularity import at_points
+from fecontact.bifurcation.orbits.curves.singularity import (
+    at_points,
+    mean_size,
+    ranges_of,
+    widths_at_points,
+)
 from fecontact.core.ties import first_largest
 
 Array = NDArray[Any]
@@ -37,8 +42,6 @@ _SAME = 1e-6
 _MORE, _OVER = 3, 3
 # Numbers in the states whose rates are evaluated at once.
 _AT_ONCE = 2_000_000
-# Least range of a state, in the largest one in the scales of the orbit.
-_LEAST_RANGE = 0.1
 
 
 class Linear(NamedTuple):
@@ -76,14 +79,11 @@ class CentreManifold:
     ) -> None:
         self.problem, self.at, self.values = problem, linearised, problem.parameters(u)
         self.multipliers, self.chain = tuple(complex(one) for one in multipliers), chain
-        nodes = problem.nodes(u)
-        self.x, self.period = problem.at_gauss_points(nodes)[0], linearised.period
+        self.x = problem.at_gauss_points(problem.nodes(u))[0]
+        self.period, self.span = linearised.period, ranges_of(problem, u)
         rates, self.jacobian, _ = linearised.derivatives
         self.velocity = self.period * rates
-        self.widths = np.repeat(problem.widths, problem.degree)[:, None]
-        scales = problem.scales[: nodes.shape[1]]
-        size = np.ptp(nodes, axis=0) / scales
-        self.span = np.maximum(size, _LEAST_RANGE * size.max()) * scales
+        self.widths = widths_at_points(problem)
         self._known: dict[tuple[int, int], _Closing] = {}
         self.linear: list[Linear] = []
         for place, multiplier in enumerate(self.multipliers):
@@ -112,13 +112,13 @@ class CentreManifold:
         return self._known[key]
 
     def _size(self, h: Array, multiplier: complex) -> float:
-        weights = np.tile(self.problem.rule.weights, self.problem.intervals)[:, None] * self.widths
+        problem = self.problem
         if self.closing(multiplier).drifts:
             # It is free along the orbit: at right angles to it, as in the phase condition.
+            weights = np.tile(problem.rule.weights, problem.intervals)[:, None] * self.widths
             along = np.sum(weights * h * self.velocity) / np.sum(weights * self.velocity**2)
             h = h - along * self.velocity
-        scales = self.problem.scales[: h.shape[1]]
-        return float(np.sqrt(np.sum(weights * np.abs(h / scales) ** 2)))
+        return mean_size(problem, h)
 
 
 class _Closing:

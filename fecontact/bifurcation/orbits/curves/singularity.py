@@ -126,8 +126,8 @@ def of_fold(at: CollocationLinearisation) -> Singularity:
 
 def along_parameter(at: CollocationLinearisation, term: Term) -> float:
     """Derivative of the residual to the first parameter, along the multiples w."""
-    h = np.repeat(at.problem.widths, at.problem.degree)[:, None]
-    return -float((h * term.left * at.derivatives[2][:, :, -1]).sum()) * at.period
+    return -float((widths_at_points(at.problem) * term.left
+                   * at.derivatives[2][:, :, -1]).sum()) * at.period
 
 
 def of_doubling(at: CollocationLinearisation) -> Singularity:
@@ -256,3 +256,23 @@ def at_points(problem: CollocationEquations, nodes: Array, end: Array) -> Array:
     out = np.empty_like(nodes)
     open_values(nodes, np.ascontiguousarray(end), problem.rule.values, out)
     return out
+
+
+def widths_at_points(problem: CollocationEquations) -> Array:
+    """Width (N m, 1) of the interval of each Gauss point, in periods."""
+    return np.repeat(problem.widths, problem.degree)[:, None]
+
+
+def mean_size(problem: CollocationEquations, states: Array) -> float:
+    """Root of the mean square of states (N m, d) at the Gauss points, in their scales."""
+    weights = np.tile(problem.rule.weights, problem.intervals)[:, None] * widths_at_points(problem)
+    scales = problem.scales[: states.shape[1]]
+    return float(np.sqrt(np.sum(weights * np.abs(states / scales) ** 2)))
+
+
+def ranges_of(problem: CollocationEquations, u: Array) -> Array:
+    """Ranges (d,) of the states over the orbit, at least a tenth of the largest scaled one."""
+    nodes = problem.nodes(u)
+    scales = problem.scales[: nodes.shape[1]]
+    size = np.ptp(nodes, axis=0) / scales
+    return np.asarray(np.maximum(size, _LEAST_RANGE * size.max()) * scales)
