@@ -245,9 +245,8 @@ def of_doubled(field: VectorField, point: BranchPoint, kind: str) -> BranchPoint
         If none is found on either side.
     """
     single = over_first(point, "period doubling")
-    first, second = point.branch.parameter_name, str(point.branch.attributes["parameters"][1])
-    width = dict(zip((second, first),
-                     np.asarray(point.branch.attributes["scales"])[-2:].tolist(), strict=True))
+    first, width = point.branch.parameter_name, widths_of(point)
+    second = str(point.branch.attributes["parameters"][1])
     problem, u, attributes = orbit_curve(field, single, second, width, None, "period doubling")
     attributes |= {"parameters": [first, second]}
     tangent = tangent_at(problem, u, 1.0)
@@ -268,8 +267,8 @@ def of_doubled(field: VectorField, point: BranchPoint, kind: str) -> BranchPoint
 
 def _over_that_of(field: VectorField, point: BranchPoint, found: BranchPoint) -> BranchPoint:
     """An orbit beside a point of a curve, as one of a branch over the curve's first parameter."""
-    return _over(field, found, point.branch.parameter_name,
-                 float(np.asarray(point.branch.attributes["scales"])[-1]))
+    first = point.branch.parameter_name
+    return _over(field, found, first, widths_of(point)[first])
 
 
 _Found = Callable[[VectorField, BranchPoint, str], BranchPoint]

@@ -40,10 +40,14 @@ def other_curve(
 
 
 def widths_of(point: BranchPoint) -> dict[str, float]:
-    """Widths of the diagram in both parameters of the curve of a point, by name."""
-    first, second = map(str, point.branch.attributes["parameters"])
-    width = np.asarray(point.branch.attributes["widths"], dtype=float).tolist()
-    return {second: width[0], first: width[1]}
+    """Widths of the diagram in both parameters of the curve of a point, by name, second one first.
+
+    Curves of orbits have them behind the scales of the states.
+    """
+    known = point.branch.attributes
+    first, second = map(str, known["parameters"])
+    width = np.asarray(known["widths" if "widths" in known else "scales"], dtype=float)[-2:]
+    return dict(zip((second, first), width.tolist(), strict=True))
 
 
 def values_at(field: VectorField, point: BranchPoint, parameter: str) -> Array:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint, attributes_of
 from fecontact.bifurcation.continuation.points import HopfPoint
 from fecontact.bifurcation.continuation.problem import sizes_of
 from fecontact.bifurcation.equilibria.codim2_problems import (
@@ -55,8 +55,7 @@ def equilibrium_curve(
     width = [widths.get(name, abs(float(begin.values[index])) or 1.0)
              for name, index in zip((second, first), active, strict=True)]
     plane = begin.values[list(active)]
-    known = {"parameter_names": list(field.parameters), "parameter_values": begin.values,
-             "widths": np.array(width)}
+    known = attributes_of(field, begin.values) | {"widths": np.array(width)}
     if square is None:
         v, w = null_vectors(scaled(begin.jacobian, sizes))
         fold = FoldCurve(field, begin.values, active, np.concatenate([sizes, width]),

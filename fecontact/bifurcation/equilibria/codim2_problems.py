@@ -137,9 +137,7 @@ class FoldCurve(PlaneCurve):
     ) -> Mapping[str, Any] | None:
         """Data of a point of codimension two; None if it is none."""
         if kind == "zero-Hopf":
-            others = _others(linearisation.jacobian, 0.0, 1)
-            nearest = others[np.argmin(np.abs(others.real))] if len(others) else 0.0
-            w = float(abs(nearest.imag))
+            w = _nearest_frequency(_others(linearisation.jacobian, 0.0, 1))
             return {"frequency_hz": w / (2.0 * np.pi), **self.form(kind, u, w)} if w else None
         return None if kind == "fold" else self.form(kind, u)
 
@@ -229,8 +227,7 @@ class HopfCurve(PlaneCurve):
             return None  # the end at a Bogdanov-Takens point
         w = float(np.sqrt(max(square, 0.0)))
         if kind == "double Hopf":
-            nearest = others[np.argmin(np.abs(others.real))]
-            other = float(abs(nearest.imag))
+            other = _nearest_frequency(others)
             return {"second_frequency_hz": other / (2.0 * np.pi),
                     **self.form(kind, u, w, other)} if other else None
         return None if kind == "fold" else self.form(kind, u, w)
@@ -265,3 +262,10 @@ def _others(J: Array, square: float, count: int) -> ComplexArray:
     if count == 2 and len(rest):
         rest = np.delete(rest, np.argmin(np.abs(rest + root)))
     return np.asarray(rest)
+
+
+def _nearest_frequency(eigenvalues: ComplexArray) -> float:
+    """Angular frequency of the eigenvalue nearest to the imaginary axis; 0 if it is real."""
+    if not len(eigenvalues):
+        return 0.0
+    return float(abs(eigenvalues[np.argmin(np.abs(eigenvalues.real))].imag))

@@ -153,10 +153,7 @@ def pair_test(eigenvalues: ComplexArray) -> float:
     The sign is that of the product of all sums of two; it changes at each of them. The size is
     that of the smallest real sum.
     """
-    real = eigenvalues[eigenvalues.imag == 0.0].real
-    first, second = np.triu_indices(len(real), 1)
-    sums = np.concatenate([2.0 * eigenvalues[eigenvalues.imag > 0.0].real,
-                           real[first] + real[second]])
+    sums = np.concatenate(_real_sums(eigenvalues))
     if not len(sums):
         return 1.0
     sign = -1.0 if (sums < 0.0).sum() % 2 else 1.0
@@ -165,13 +162,15 @@ def pair_test(eigenvalues: ComplexArray) -> float:
 
 def crossing_is_complex(eigenvalues: ComplexArray) -> bool:
     """Whether the sum nearest to zero in :func:`pair_test` is that of a complex pair."""
+    of_pairs, of_reals = (np.abs(sums).min(initial=np.inf) for sums in _real_sums(eigenvalues))
+    return bool(of_pairs < of_reals)
+
+
+def _real_sums(eigenvalues: ComplexArray) -> tuple[Array, Array]:
+    """Sums of two eigenvalues that are real: of complex pairs, and of two real ones."""
     real = eigenvalues[eigenvalues.imag == 0.0].real
-    pairs = eigenvalues[eigenvalues.imag > 0.0]
-    if not len(pairs):
-        return False
     first, second = np.triu_indices(len(real), 1)
-    of_reals = np.abs(real[first] + real[second]).min(initial=np.inf)
-    return bool(2.0 * np.abs(pairs.real).min() < of_reals)
+    return 2.0 * eigenvalues[eigenvalues.imag > 0.0].real, real[first] + real[second]
 
 
 def equilibrium_at(field: VectorField, point: BranchPoint) -> Equilibrium:

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.point import attributes_of
 from fecontact.bifurcation.continuation.points import DiscontinuityPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, sizes_of
 from fecontact.bifurcation.continuation.rounding import Rounding
@@ -233,9 +234,8 @@ def border_curve(
     beside = frozenset(named(each) for each in orbit.linearise(u).conditions
                        if abs(each.left) < _SAME) | {(what, phase, event)}
     problem = BorderCurve(orbit, second, width, what, phase, event, beside)
-    return problem, np.concatenate([u[:-1], [value], u[-1:]]), {
-        "parameter_names": list(field.parameters), "parameter_values": orbit.values,
-        "scales": sizes}
+    return problem, np.concatenate([u[:-1], [value], u[-1:]]), (
+        attributes_of(field, orbit.values) | {"scales": sizes})
 
 
 def _other_side(

@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.inner_product import unit
-from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.point import BranchPoint, attributes_of
 from fecontact.bifurcation.continuation.problem import sizes_of
-from fecontact.bifurcation.equilibria.equilibrium import newton
 from fecontact.bifurcation.homoclinic import open_mesh
 from fecontact.bifurcation.homoclinic.problem import HomoclinicProblem
 from fecontact.bifurcation.homoclinic.saddle import left_subspaces, saddle_of
 from fecontact.bifurcation.orbit_methods import Collocation
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.orbits.same_orbit import beside_rest
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField
@@ -24,7 +24,6 @@ _INTERVALS, _DEGREE = 80, 4
 _NEAR = 0.3
 # Samples of an orbit from which a start is taken.
 _SAMPLES = 4001
-_TOLERANCE = 1e-10
 _CORRECTIONS, _LENGTHENINGS = 25, 4
 
 
@@ -78,9 +77,8 @@ def homoclinic_curve(
                                 active[0], intervals=len(mesh) - 1)
     u = np.concatenate([nodes.reshape(-1), rest, values[list(active)]])
     problem, u = _converged(problem, u, point)
-    attributes = {"parameter_names": list(field.parameters), "parameter_values": values,
-                  "scales": problem.scales, "method": Collocation(len(mesh) - 1, degree)}
-    return problem, u, attributes
+    return problem, u, attributes_of(field, values) | {
+        "scales": problem.scales, "method": Collocation(len(mesh) - 1, degree)}
 
 
 def _cut_open(
@@ -89,14 +87,12 @@ def _cut_open(
 ) -> tuple[Array, Array, Array, float]:
     """Nodes, saddle, mesh and time of an orbit that begins and ends next to a saddle."""
     times, states = motion.times - motion.times[0], np.ascontiguousarray(motion.states)
-    speed = np.linalg.norm(field.rates(np.zeros(len(times)), states, values) / sizes, axis=1)
-    found = newton(field, states[int(np.argmin(speed))].copy(), values, _TOLERANCE)
-    away = (np.full(len(times), np.inf) if found is None else
-            np.linalg.norm((states - found[0]) / sizes, axis=1))
-    if found is None or away.min() > _NEAR * away.max():
+    found = beside_rest(field, values, states, sizes)
+    if found is None or found[2].min() > _NEAR * found[2].max():
         raise InputError(f"{point.place} passes no equilibrium, as orbits beside a homoclinic one "
                          f"do; follow the branch to a longer period first.")
-    if not found[1].size or not (np.linalg.eigvals(found[1]).real > 0.0).any():
+    rest, jacobian, away = found
+    if not jacobian.size or not (np.linalg.eigvals(jacobian).real > 0.0).any():
         raise InputError(f"{point.place} is slowest beside an equilibrium that is no saddle; "
                          f"follow the branch to a longer period first.")
     time, begin = float(times[-1]), float(times[int(np.argmin(away))])
@@ -108,7 +104,7 @@ def _cut_open(
     fine = np.linspace(0.0, 1.0, 4 * intervals + 1)
     mesh = open_mesh.equidistributed(fine, sampled(open_mesh.node_times(fine, degree)), degree,
                                      intervals)
-    return sampled(open_mesh.node_times(mesh, degree)), np.asarray(found[0]), mesh, time
+    return sampled(open_mesh.node_times(mesh, degree)), rest, mesh, time
 
 
 def _converged(

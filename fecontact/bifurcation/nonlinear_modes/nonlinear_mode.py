@@ -450,13 +450,13 @@ def _solved(
     points, A = mode.branch.points, mode.amplitude
     for k in (place, place + 1):
         if abs(A[k] - amplitude) <= _MET * amplitude:
-            return replace(mode, branch=replace(mode.branch, points=(points[k],)))
+            return _with_points(mode, points[k])
     rises = A[place + 1] > A[place]
     bounds = (0.5 * A[place], amplitude) if rises else (amplitude / _BELOW, 2.0 * A[place])
     point, _, component = mode.observed.rpartition(" ")
-    known = replace(mode, branch=replace(mode.branch, points=points[: place + 1]))
     length = float(np.log(max(A[place + 1], amplitude) / min(A[place], amplitude)))
     step = float(np.clip(abs(length), 1e-4, _STEP))
+    known = _with_points(mode, *points[: place + 1])
     found = continued_mode(
         system, known, bounds, (int(point) if point.isdigit() else point, component),
         ContinuationOptions(points=place + _MOST_BETWEEN, step=step, largest_step=_LARGEST), wave)
@@ -464,7 +464,7 @@ def _solved(
     if abs(float(last.values["observed_amplitude"]) / amplitude - 1.0) > _MET:
         raise AnalysisError(f"The mode was not found at the amplitude {amplitude:g}; take its "
                             f"points beside it.")
-    return replace(mode, branch=replace(mode.branch, points=(last,)))
+    return _with_points(mode, last)
 
 
 def with_point(
@@ -473,8 +473,12 @@ def with_point(
     """The mode with one more point, behind that of number ``place`` and before the next."""
     points = mode.branch.points
     between = _solved(mode, system, place, amplitude, None).branch.points
-    return replace(mode, branch=replace(
-        mode.branch, points=(*points[: place + 1], *between, *points[place + 1 :])))
+    return _with_points(mode, *points[: place + 1], *between, *points[place + 1 :])
+
+
+def _with_points(mode: NonlinearMode, *points: BranchPoint) -> NonlinearMode:
+    """The mode with these points alone."""
+    return replace(mode, branch=replace(mode.branch, points=points))
 
 
 def mode_of(branch: Branch) -> NonlinearMode:

@@ -183,21 +183,36 @@ def near_saddle(
     if not _period_alone(problem, tangent):
         return False
     sizes = problem.scales[: problem.field.dimension]
-    if rates is None:
-        rates = problem.field.rates(np.zeros(len(x)), x, values)
-    speed = np.linalg.norm(rates / sizes, axis=1)
-    if speed.min() > _SLOW * speed.max():
-        return False
-    found = newton(problem.field, x[np.argmin(speed)].copy(), values, _TOLERANCE)
+    found = beside_rest(problem.field, values, x, sizes, _SLOW, rates)
     if found is None:
         return False
+    _, jacobian, away = found
     amplitude = float(np.linalg.norm(np.ptp(x, axis=0) / sizes)) / 2.0
-    away = np.linalg.norm((x - found[0]) / sizes, axis=1)
     beside = float(shares[away < _BESIDE * amplitude].sum())
     if away.min() > _NEAREST * amplitude or beside < _MOST_TIME:
         return False
-    real = sorted_eigenvalues(found[1]).real
+    real = sorted_eigenvalues(jacobian).real
     return bool(real[0] > 0.0 > real[-1])
+
+
+def beside_rest(
+    field: VectorField, values: Array, x: Array, sizes: Array, slow: float = np.inf,
+    rates: Array | None = None,
+) -> tuple[Array, Array, Array] | None:
+    """The equilibrium next to the slowest of the states x (N, d) of an orbit.
+
+    ``sizes`` are the scales of the states. Gives it, its Jacobian, and the distances (N,) of all
+    states from it; None if there is none, or no speed is below ``slow`` times the largest one.
+    """
+    if rates is None:
+        rates = field.rates(np.zeros(len(x)), x, values)
+    speed = np.linalg.norm(rates / sizes, axis=1)
+    if speed.min() > slow * speed.max():
+        return None
+    found = newton(field, x[int(np.argmin(speed))].copy(), values, _TOLERANCE)
+    if found is None:
+        return None
+    return *found, np.linalg.norm((x - found[0]) / sizes, axis=1)
 
 
 def _period_alone(problem: _Scaled, tangent: Array) -> bool:
