@@ -316,6 +316,17 @@ def test_special_points_of_the_curve(function, q, states, kind, at):
     assert point.values["q"] == pytest.approx(at, abs=2e-4)
 
 
+def test_a_parameter_that_is_zero_at_the_orbit():
+    """The width of the branch counts where no bounds give one, not the value of the parameter."""
+    field = vector_field(dragged, {"a": -0.5, "q": 0.9}, 3)
+    hopf = equilibrium_branch(field, [1.0, 0.0, -0.2], "a", bounds=(-0.5, 0.5)).of_kind("Hopf")[0]
+    orbits = orbit_branch(field, hopf, method=Collocation(intervals=60), bounds=(-0.5, 0.5))
+    curve = codim2_curve(field, orbits.points[-1], "q", to="homoclinic",
+                         options=ContinuationOptions(points=4))
+    assert len(curve) >= 4
+    assert np.abs(curve.parameter).max() < 1e-7
+
+
 def pendulum(t, x, p, out):
     # phi'' + a phi' + sin(phi) = I on the circle x = cos(phi), y = sin(phi).
     growth = 1.0 - x[0] * x[0] - x[1] * x[1]

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.inner_product import unit
+from fecontact.bifurcation.continuation.newton import damped_newton
 from fecontact.bifurcation.continuation.point import BranchPoint, attributes_of
 from fecontact.bifurcation.continuation.problem import sizes_of
 from fecontact.bifurcation.homoclinic import open_mesh
@@ -24,7 +25,7 @@ _INTERVALS, _DEGREE = 80, 4
 _NEAR = 0.3
 # Samples of an orbit from which a start is taken.
 _SAMPLES = 4001
-_CORRECTIONS, _LENGTHENINGS = 25, 4
+_CORRECTIONS, _TOLERANCE, _LENGTHENINGS = 25, 1e-9, 4
 
 
 def homoclinic_curve(
@@ -57,10 +58,11 @@ def homoclinic_curve(
         raise InputError(f"{point.place} is one of an excited system, whose orbits approach no "
                          f"saddle at rest.")
     d = field.dimension
-    sizes = np.asarray(known["scales"], dtype=float)[:d]
-    sizes = sizes_of(scales, sizes)[0] if scales is not None else sizes
-    width = [widths.get(name, abs(float(values[index])) or 1.0)
-             for name, index in zip(names, active, strict=True)]
+    branch_scales = np.asarray(known["scales"], dtype=float)
+    sizes = branch_scales[:d] if scales is None else sizes_of(scales, branch_scales[:d])[0]
+    # The parameter of the branch may be zero at the orbit, but the branch has a width in it.
+    width = [widths.get(second, abs(float(values[active[0]])) or 1.0),
+             widths.get(names[1], float(branch_scales[-1]))]
     if motion is None:
         mesh = np.asarray(point.values["mesh"], dtype=float)
         nodes = open_mesh.nodes_of(point.u, d)
@@ -128,19 +130,10 @@ def _converged(
 
 
 def _newton(problem: HomoclinicProblem, u: Array, point: BranchPoint) -> Array:
-    row = unit(len(u), -2)
-    weights, amplitude = problem.weights(), problem.amplitude(u)
-    for _ in range(_CORRECTIONS):
-        linearised = problem.linearise(u)
-        change = linearised.solve(row, -np.append(linearised.residual, 0.0))
-        size = float(np.sqrt(weights @ change**2))
-        if not np.isfinite(size) or size > 1e6:
-            break
-        # Far from the orbit a full step may lead to the saddle itself.
-        u = u + min(1.0, 0.5 * amplitude / size if size > 0.0 else 1.0) * change
-        if size <= 1e-9 * (1.0 + float(np.sqrt(weights @ u**2))):
-            if problem.amplitude(u) < 0.1 * amplitude:
-                break
-            return u
+    amplitude = problem.amplitude(u)
+    u, _, converged = damped_newton(problem, u, unit(len(u), -2), _TOLERANCE, _CORRECTIONS)
+    # A step may lead to the saddle itself.
+    if converged and problem.amplitude(u) >= 0.1 * amplitude:
+        return u
     raise AnalysisError(f"{point.place}: no homoclinic orbit was found beside it; follow the "
                         f"branch to a longer period, or take more intervals.")
