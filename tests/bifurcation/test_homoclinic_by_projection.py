@@ -327,6 +327,21 @@ def test_a_parameter_that_is_zero_at_the_orbit():
     assert np.abs(curve.parameter).max() < 1e-7
 
 
+@pytest.mark.parametrize(("function", "states"), [(spiral, 4), (pushed, 3)])
+def test_orbits_that_come_back_faster_than_the_leading_eigenvalue_says(function, states):
+    """They have no part along its direction; that at a = 0 is found from any of long period."""
+    field = vector_field(function, {"a": -0.5, "q": 0.1 if states == 4 else 0.3}, states)
+    begin = np.array([1.0, 0.0, 0.0, 0.0])[:states]
+    hopf = equilibrium_branch(field, begin, "a", bounds=(-0.5, 0.5)).of_kind("Hopf")[0]
+    orbits = orbit_branch(field, hopf, method=Collocation(intervals=60), bounds=(-0.5, 0.5))
+    long = [point for point in orbits.points if point.values["period"] > 10.0]
+    assert len(long) > 20
+    for point in long[::6]:
+        problem, u, _ = homoclinic_curve(field, point, "q", {}, None)
+        assert abs(u[-1]) < 1e-9
+        assert problem.amplitude(u) == pytest.approx(1.5, rel=1e-4)
+
+
 def pendulum(t, x, p, out):
     # phi'' + a phi' + sin(phi) = I on the circle x = cos(phi), y = sin(phi).
     growth = 1.0 - x[0] * x[0] - x[1] * x[1]

@@ -194,12 +194,22 @@ class HomoclinicProblem(OpenOrbit, Problem):
         rates = self.saddle(u).rates
         wanted = [float(np.log(end / self.distance)) for end in self.distances(u)]
         if max(map(abs, wanted)) > np.log(_WITHIN):
-            times = [min(part / rate, _LONGEST * self.time) for part, rate in
-                     zip(wanted, rates, strict=True)]
+            times = [max(min(part / rate, _LONGEST * self.time), -spare) for part, rate, spare in
+                     zip(wanted, rates, self._spare_times(u), strict=True)]
             problem, u, tangent = self.stretched(u, tangent, times[0], times[1])
         mesh = open_mesh.equidistributed(problem.mesh, problem.nodes(u), self.degree,
                                          self.intervals)
         return problem._renewed(mesh, u, tangent)
+
+    def _spare_times(self, u: Array) -> tuple[float, float]:
+        """Times [s] at both ends within the distance from the saddle to which T is fitted.
+
+        An orbit without a part along a leading direction takes less time than its rate says.
+        """
+        away = np.linalg.norm(self.away(u), axis=1)
+        far = np.flatnonzero(away >= self.distance * away.max())
+        times = open_mesh.node_times(self.mesh, self.degree) * self.time
+        return float(times[far[0]]), float(self.time - times[far[-1]])
 
     def _renewed(
         self, mesh: Array, u: Array, tangent: Array
