@@ -147,11 +147,12 @@ def null_vectors(J: Array) -> tuple[Array, Array]:
 
 
 def fold_coefficient(field: VectorField, x: Array, values: Array, scales: Array) -> float:
-    """Quadratic coefficient a = w B(v, v) / 2 of a fold, v and w the null vectors, w v = 1."""
-    _, J, _ = field.derivatives(np.zeros(1), x[None], values)
-    v, w = null_vectors(J[0])
-    quadratic = bend(field, x, values, v, scales)[0].first @ v
-    return 0.5 * float(w @ quadratic) / float(w @ v)
+    """Quadratic coefficient a = w B(v, v) / 2 of a fold, v and w the null vectors, w v = 1.
+
+    It is NaN where zero is a double eigenvalue.
+    """
+    _, along = along_null_vector(field, x, values, scales)
+    return 0.5 * along[0][0] if along else np.nan
 
 
 def crossing_form(field: VectorField, x: Array, values: Array, scales: Array) -> dict[str, Any]:

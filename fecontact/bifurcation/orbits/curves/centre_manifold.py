@@ -27,6 +27,7 @@ from fecontact.bifurcation.orbits.collocation_equations import (
 )
 from fecontact.bifurcation.orbits.curves.singularity import (
     at_points,
+    balanced_ends,
     mean_size,
     ranges_of,
     widths_at_points,
@@ -128,13 +129,12 @@ class _Closing:
     """
 
     def __init__(self, of: CentreManifold, closing: complex, resonant: bool) -> None:
-        factors, d = of.at.factors, len(of.at.factors.end)
+        start, end, self._balance = balanced_ends(of.at.factors)
+        d = len(start)
         self._of, self._closing, self.resonant = of, closing, resonant
         self.drifts = of.problem.autonomous and abs(closing - 1.0) < _SAME
-        self._balance = 1.0 / np.abs(factors.end[:, : 2 * d]).max(axis=1)
         base = np.zeros((d + self.drifts, d + self.drifts), dtype=complex)
-        matrix = factors.end[:, :d] + closing * factors.end[:, d : 2 * d]
-        base[:d, :d] = matrix * self._balance[:, None]
+        base[:d, :d] = start + closing * end
         if self.drifts:
             drive = _reduced(of.at, of.widths * of.velocity)[1] * self._balance
             # Scaled to the size of the other columns.

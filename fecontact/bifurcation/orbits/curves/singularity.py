@@ -132,7 +132,7 @@ def along_parameter(at: CollocationLinearisation, term: Term) -> float:
 
 def of_doubling(at: CollocationLinearisation) -> Singularity:
     """Smallest singular value of the equations at the ends of v for v(1) = -v(0)."""
-    start, end, balance = _ends(at.factors)
+    start, end, balance = balanced_ends(at.factors)
     lefts, sizes, rights = np.linalg.svd(start - end)
     v = rights[-1]
     return Singularity(float(sizes[-1]), (_term(at, -lefts[:, -1] * balance, v, -v),))
@@ -145,7 +145,7 @@ def of_torus(
 
     With an ``angle`` those that are nearest to exp(+- i angle); the value alone if not ``whole``.
     """
-    start, end, balance = _ends(at.factors)
+    start, end, balance = balanced_ends(at.factors)
     real, imag, size, lefts, rights, *_ = dggev(start, -end, compute_vl=whole, compute_vr=whole)
     with np.errstate(divide="ignore", invalid="ignore"):
         mu = (real + 1j * imag) / size
@@ -219,7 +219,7 @@ def gradient(
     return out
 
 
-def _ends(factors: CondensedFactors) -> tuple[Array, Array, Array]:
+def balanced_ends(factors: CondensedFactors) -> tuple[Array, Array, Array]:
     """Equations (d, d) of x_0 and x_N, in rows of the same size, and the factors (d,) for that."""
     d = len(factors.end)
     balance = 1.0 / np.abs(factors.end[:, : 2 * d]).max(axis=1)
