@@ -249,10 +249,11 @@ def convert_fields(instance: Any) -> None:
         ``RenderSettings: frames = "many" must be a whole number.``
     """
     cls: Any = type(instance)
-    for name, hint in _hints(cls).items():
-        if name in cls.__dataclass_fields__:
-            object.__setattr__(instance, name,
-                               convert(getattr(instance, name), hint, cls.__name__, name))
+    hints = _hints(cls)
+    # Class variables have annotations too, but are no fields.
+    for entry in fields(cls):
+        value = convert(getattr(instance, entry.name), hints[entry.name], cls.__name__, entry.name)
+        object.__setattr__(instance, entry.name, value)
 
 
 def _decimal_point(value: Any) -> str:

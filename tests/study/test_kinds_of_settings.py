@@ -1,13 +1,15 @@
 """Sections of a study built in Python: values of the wrong kind are refused by name."""
 
 import math
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, dataclass, fields
+from typing import ClassVar
 
 import pytest
 
 from fecontact.bifurcation.diagram_options import BranchSettings
 from fecontact.bifurcation.response_options import ResponseSettings
 from fecontact.core.errors import FecontactError, InputError
+from fecontact.core.tables import convert_fields
 from fecontact.integrate import ContactEvents
 from fecontact.study import RenderSettings, sections
 from fecontact.study.bodies_section import BodyBasisSettings, Placement
@@ -44,3 +46,21 @@ def test_values_become_what_a_file_would_give():
     assert found == RenderSettings(size=(640, 360), fps=25.0)
     with pytest.raises(InputError, match=r'RenderSettings: frames = "many" must be a whole number'):
         RenderSettings(frames="many")
+
+
+def test_class_variables_are_no_fields():
+    @dataclass(frozen=True)
+    class Section:
+        rate: float
+        kernel: ClassVar = "any"
+        most: ClassVar[int] = "three"
+
+        def __post_init__(self):
+            convert_fields(self)
+
+    found = Section(2)
+    assert type(found.rate) is float
+    assert vars(found) == {"rate": 2.0}
+    assert (found.kernel, found.most) == ("any", "three")
+    with pytest.raises(InputError, match='Section: rate = "fast" must be a number'):
+        Section("fast")
