@@ -12,21 +12,29 @@ decide whether it changes sign within the step; if they are inconclusive, those 
 References
 ----------
 G. Farin, Curves and Surfaces for CAGD, 5th ed., chapters 4 and 5 (de Casteljau's algorithm,
-the convex hull, multiplication by s and 1 - s).
+the convex hull, multiplication by s and 1 - s). J. M. Lane, R. F. Riesenfeld, Bounds on a
+polynomial, BIT 21 (1981) 112. L. L. Schumaker, W. Volk, Efficient evaluation of multivariate
+polynomials, Computer Aided Geometric Design 3 (1986) 149 (values by one loop).
 """
 
+import math
+from collections.abc import Callable
 from fractions import Fraction
 from math import comb
+from typing import Any
 
 import numpy as np
 
 from fecontact.core.compiled import helper
 from fecontact.core.types import Array
 
-# Resolution within a step, and the depth of bisection that reaches it plus two.
+# Resolution within a step, and rows of the workspace: the depth of bisection that reaches it and
+# three more, for the whole step, for a part that is looked at, and for what is found.
 FINEST = 2.0**-46
-DEPTH = 48
-NOWHERE = 2.0
+DEPTH = 49
+# Where there is no change, and what a look says of a part that is to be halved.
+NOWHERE, UNDECIDED = 2.0, -1.0
+_MOST_NEWTON = 60
 
 
 @helper
@@ -79,95 +87,163 @@ def split(b, left):
 
 
 @helper
-def first_below(b, workspace):
-    """First s at which p falls below zero, to a resolution of FINEST; NOWHERE if it does not.
+def changes_of_sign(look, data, b, sign, places, stack):
+    """Fill ``places`` with the s at which a quantity changes its sign, ascending; their number.
 
-    Zero is not below, and a dip shorter than FINEST may be missed. ``workspace`` (DEPTH, n + 1) is
-    workspace; b is kept.
-
-    The step is bisected, the left half first, until the coefficients of an interval have one sign
-    or the interval is as short as FINEST.
-    """
-    if smallest(b) >= 0.0:
-        return NOWHERE
-    n = len(b)
-    # Stack of the remaining intervals, the earliest on top, with their widths in the last column.
-    for i in range(n):
-        workspace[0, i] = b[i]
-    workspace[0, n] = 1.0
-    waiting, begin = 1, 0.0
-    while waiting > 0:
-        part, width = workspace[waiting - 1, :n], workspace[waiting - 1, n]
-        if part[0] < 0.0:
-            return begin
-        bound = smallest(part)
-        if bound < 0.0 and width > FINEST:
-            split(part, workspace[waiting, :n])
-            workspace[waiting - 1, n] = workspace[waiting, n] = 0.5 * width
-            waiting += 1
-            continue
-        begin += width
-        if bound < 0.0 and part[n - 1] < 0.0:
-            return begin
-        waiting -= 1
-    return NOWHERE
-
-
-@helper
-def variations(b):
-    """Sign changes of the coefficients, an upper bound of those of p within the step."""
-    count, last = 0, 0.0
-    for i in range(len(b)):
-        if b[i] != 0.0:
-            if b[i] * last < 0.0:
-                count += 1
-            last = b[i]
-    return count
-
-
-@helper
-def sign_changes(b, workspace, row, places):
-    """Fill ``places`` with the s at which p changes sign, ascending; return their number.
-
-    Sign changes closer than FINEST may be missed, as may those beyond the length of ``places``.
-    ``workspace`` (DEPTH, n + 1) and ``row`` (n + 1,) are workspace; b is kept.
+    The step is halved, the left half first, until a look at each part tells the sign of the
+    quantity there. ``look(part, begin, width, row, data)`` is a compiled function that returns the
+    signs at the begin and at the end of a part, zero for none, and the place at which they change
+    between these; or UNDECIDED as the place, for a part that is to be halved. ``part`` (n + 1,) are
+    the coefficients of p over the part. ``row`` (n + 1,) and ``stack`` (DEPTH, n + 2) are
+    workspace; b is kept. ``sign`` is the sign before the step, zero for none. Changes beyond the
+    length of ``places`` are left out.
     """
     n = len(b)
+    # Parts that are left, the earliest on top, with their widths in the last column.
     for i in range(n):
-        workspace[0, i] = b[i]
-    workspace[0, n] = 1.0
-    waiting, begin, found, sign = 1, 0.0, 0, 0.0
-    while waiting > 0:
-        part, width = workspace[waiting - 1, :n], workspace[waiting - 1, n]
-        changes = variations(part)
-        if changes > 1 and width > FINEST:
-            split(part, workspace[waiting, :n])
-            workspace[waiting - 1, n] = workspace[waiting, n] = 0.5 * width
+        stack[0, i] = b[i]
+    stack[0, n] = 1.0
+    waiting, begin, found = 1, 0.0, 0
+    while waiting > 0 and found < len(places):
+        part, row, width = stack[waiting - 1, :n], stack[waiting, :n], stack[waiting - 1, n]
+        first, last, place = look(part, begin, width, row, data)
+        if place == UNDECIDED:
+            split(part, row)
+            stack[waiting - 1, n] = stack[waiting, n] = 0.5 * width
             waiting += 1
             continue
-        first, last = 0.0, 0.0
-        for i in range(n):
-            if part[i] != 0.0:
-                first = part[i] if first == 0.0 else first
-                last = part[i]
-        # At the start if p is zero there, then within.
-        if sign * first < 0.0 and found < len(places):
+        if first * sign < 0.0:
             places[found] = begin
             found += 1
-        if first * last < 0.0 and found < len(places):
-            low, high = 0.0, 1.0
-            while (high - low) * width > FINEST:
-                middle = 0.5 * (low + high)
-                if value(part, middle, row) * first > 0.0:
-                    low = middle
-                else:
-                    high = middle
-            places[found] = begin + high * width
+        sign = first if first != 0.0 else sign
+        if last * sign < 0.0 and found < len(places):
+            places[found] = place
             found += 1
         sign = last if last != 0.0 else sign
         begin += width
         waiting -= 1
     return found
+
+
+@helper
+def first_change(look, data, b, stack):
+    """First s at which a quantity falls below zero, as :func:`changes_of_sign`; NOWHERE if none."""
+    places = stack[DEPTH - 1, :1]
+    return places[0] if changes_of_sign(look, data, b, 1.0, places, stack) > 0 else NOWHERE
+
+
+@helper
+def only_zero(evaluate, c, size, part, begin, width):
+    """Zero, to rounding, in a part of the step where the coefficients change their sign once.
+
+    By Newton's method from the zero of the control polygon, within what encloses the zero.
+    ``evaluate(c, s)`` is a compiled function that returns p(s) and p'(s), ``size`` the size of what
+    it sums up.
+    """
+    n, k = len(part), 1
+    while k < n - 1 and part[k - 1] == 0.0:
+        k += 1
+    sign = math.copysign(1.0, part[k - 1])
+    while k < n - 1 and not part[k] * sign < 0.0:
+        k += 1
+    low, high = begin, begin + width
+    s = begin + width * (k - 1 + part[k - 1] / (part[k - 1] - part[k])) / (n - 1)
+    for _ in range(_MOST_NEWTON):
+        p, slope = evaluate(c, s)
+        if abs(p) <= 2e-16 * size:
+            break
+        if p * sign > 0.0:
+            low = s
+        else:
+            high = s
+        before = s
+        s = s - p / slope if slope * sign < 0.0 else low
+        if not low < s < high:
+            s = 0.5 * (low + high)
+        if abs(s - before) <= 4e-16 * s:
+            break
+    return s
+
+
+def signs_by(zero: Callable[..., Any]) -> Any:
+    """A look for :func:`changes_of_sign` that tells the signs of p itself.
+
+    p has at most as many zeros as its coefficients have changes of sign, and with one change
+    exactly one (Descartes' rule; Lane and Riesenfeld). The compiled function
+    ``zero(part, begin, width, row, given)`` returns this one. The data of the look are ``dip`` and
+    ``given``: changes closer than FINEST are missed, but for those that enclose values below
+    -``dip``.
+    """
+
+    @helper
+    def signs(part, begin, width, row, data):
+        """Signs of p at the begin and at the end of a part, and the place of a change."""
+        dip, given = data
+        first, last, changes = 0.0, 0.0, 0
+        for i in range(len(part)):
+            if part[i] != 0.0:
+                if part[i] * last < 0.0:
+                    changes += 1
+                first = part[i] if first == 0.0 else first
+                last = part[i]
+        if changes == 1:
+            return first, last, zero(part, begin, width, row, given)
+        if changes > 1 and width > FINEST:
+            return first, last, UNDECIDED
+        if changes > 1 and smallest(part) < -dip:
+            return first, -1.0, begin
+        return first, last, begin + width
+
+    return signs
+
+
+@helper
+def _value_and_slope(c, s):
+    """p(s) and p'(s) for c_k = b_k n! / (k! (n - k)!), in one loop."""
+    p, slope, power, rest = c[0], 0.0, 1.0, 1.0 - s
+    for k in range(1, len(c)):
+        slope = slope * rest - p + k * c[k] * power
+        power *= s
+        p = p * rest + c[k] * power
+    return p, slope
+
+
+@helper
+def _zero(part, begin, width, row, given):
+    """End of the interval of length FINEST in which p has its only zero in a part of the step."""
+    n, many, size = len(part), 1.0, 0.0
+    for k in range(n):
+        row[k] = many * part[k]
+        many *= (n - 1 - k) / (k + 1)
+        size = max(size, abs(part[k]))
+    s = begin + width * only_zero(_value_and_slope, row, size, part, 0.0, 1.0)
+    return min((math.floor(s / FINEST) + 1.0) * FINEST, begin + width)
+
+
+_signs = signs_by(_zero)
+_NO_DIPS = np.inf, 0.0
+
+
+@helper
+def first_below(b, stack):
+    """First s at which p falls below zero, to a resolution of FINEST; NOWHERE if it does not.
+
+    Zero is not below, and a dip shorter than FINEST may be missed. ``stack`` (DEPTH, n + 2) is
+    workspace; b is kept.
+    """
+    if smallest(b) >= 0.0:
+        return NOWHERE
+    return first_change(_signs, _NO_DIPS, b, stack)
+
+
+@helper
+def sign_changes(b, places, stack):
+    """Fill ``places`` with the s at which p changes sign, ascending; return their number.
+
+    Sign changes closer than FINEST may be missed, as may those beyond the length of ``places``.
+    ``stack`` (DEPTH, n + 2) is workspace; b is kept.
+    """
+    return changes_of_sign(_signs, _NO_DIPS, b, 0.0, places, stack)
 
 
 @helper

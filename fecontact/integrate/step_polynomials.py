@@ -223,6 +223,27 @@ def _ground_bound(polynomial):
 
 
 @helper
+def _signs_on_moving_ground(part, begin, width, row, data):
+    """Signs of a step polynomial, for :func:`fecontact.integrate.bernstein.changes_of_sign`.
+
+    ``data`` are a bound on the rate of change of the ground over the step, and the polynomial.
+    """
+    bound, polynomial = data
+    shift = polynomial.shift
+    ground = ground_part(begin + 0.5 * width, polynomial) - shift
+    low = bernstein.smallest(part) - ground - 0.5 * bound * width
+    high = bernstein.largest(part) - ground + 0.5 * bound * width
+    if low > 0.0 or high < 0.0:
+        return low, low, begin
+    if width > _FINEST:
+        return 0.0, 0.0, bernstein.UNDECIDED
+    first = part[0] + shift - ground_part(begin, polynomial)
+    last = part[COEFFICIENTS - 1] + shift - ground_part(begin + width, polynomial)
+    share = first / (first - last) if first * last < 0.0 else 0.0
+    return first, last, begin + share * width
+
+
+@helper
 def changes(b, polynomial, halves, places):
     """Fill ``places`` with the parts of the step at which a step polynomial changes its sign.
 
@@ -232,53 +253,12 @@ def changes(b, polynomial, halves, places):
     _set_own(polynomial, b)
     bound = _ground_bound(polynomial)
     if bound > 0.0:
-        return _changes_on_moving_ground(b, bound, polynomial, halves, places)
+        return bernstein.changes_of_sign(_signs_on_moving_ground, (bound, polynomial), b, 0.0,
+                                         places, halves)
     constant = polynomial.shift - ground_part(0.0, polynomial)
     for k in range(COEFFICIENTS):
         b[k] += constant
-    found = bernstein.sign_changes(b, halves, polynomial.row, places)
+    found = bernstein.sign_changes(b, places, halves)
     for k in range(COEFFICIENTS):
         b[k] -= constant
     return found
-
-
-@helper
-def _changes_on_moving_ground(b, bound, polynomial, workspace, places):
-    shift = polynomial.shift
-    bend = 0.0
-    for k in range(COEFFICIENTS - 2):
-        bend = max(bend, 12.0 * abs(b[k] - 2.0 * b[k + 1] + b[k + 2]))
-    # Stack of intervals, the earliest on top: start, width, own motion and ground at both ends.
-    found, waiting = 0, 1
-    workspace[0, 0], workspace[0, 1] = 0.0, 1.0
-    workspace[0, 2], workspace[0, 3] = b[0] + shift, b[COEFFICIENTS - 1] + shift
-    workspace[0, 4], workspace[0, 5] = ground_part(0.0, polynomial), ground_part(1.0, polynomial)
-    sign = workspace[0, 2] - workspace[0, 4]
-    while waiting > 0:
-        top = workspace[waiting - 1]
-        begin, width, p, q, f, g = top[0], top[1], top[2], top[3], top[4], top[5]
-        reach = 0.125 * bend * width * width + 0.5 * bound * width
-        middle = 0.5 * (f + g)
-        first, last = p - f, q - g
-        decided = min(p, q) - reach > middle or max(p, q) + reach < middle
-        if not decided and width > _FINEST:
-            half = begin + 0.5 * width
-            u = bernstein.value(b, half, polynomial.row) + shift
-            v = ground_part(half, polynomial)
-            top[0], top[1], top[2], top[3], top[4], top[5] = half, 0.5 * width, u, q, v, g
-            below = workspace[waiting]
-            below[0], below[1], below[2], below[3], below[4], below[5] = (begin, 0.5 * width, p, u,
-                                                                          f, v)
-            waiting += 1
-            continue
-        waiting -= 1
-        if sign == 0.0:
-            sign = first
-        if last * sign < 0.0:
-            if found < len(places):
-                share = first / (first - last) if first * last < 0.0 else 0.0
-                places[found] = begin + share * width
-                found += 1
-            sign = last
-    return found
-

@@ -28,8 +28,7 @@ def _first_below(b):
 @njit
 def _sign_changes(b):
     places = np.empty(len(b))
-    found = bernstein.sign_changes(b, np.empty((bernstein.DEPTH, len(b) + 1)), np.empty(len(b)),
-                                   places)
+    found = bernstein.sign_changes(b, places, np.empty((bernstein.DEPTH, len(b) + 1)))
     return places[:found]
 
 

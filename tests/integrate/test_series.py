@@ -122,7 +122,7 @@ def assert_no_contact_missed(seed):
 def test_the_first_zero_of_random_polynomials():
     rng = np.random.default_rng(0)
     count = polynomials.COEFFICIENTS
-    workspace = np.zeros((polynomials.DEPTH + 3, count))
+    workspace = np.zeros(polynomials.WORKSPACE)
     for trial in range(3000):
         if trial % 2:
             p = np.poly(rng.uniform(0.0, 1.5, rng.integers(1, 7)))[::-1]
@@ -141,8 +141,7 @@ def test_the_first_zero_of_random_polynomials():
 
 def test_zeros_that_touch():
     """(x - a)^2 + e has two zeros, or none, however near they are."""
-    count, workspace = polynomials.COEFFICIENTS, np.zeros((polynomials.DEPTH + 3,
-                                                           polynomials.COEFFICIENTS))
+    count, workspace = polynomials.COEFFICIENTS, np.zeros(polynomials.WORKSPACE)
     for a in np.random.default_rng(1).uniform(0.05, 0.95, 300):
         for distance in (1e-3, 1e-5, 1e-7):
             c = np.zeros(count)

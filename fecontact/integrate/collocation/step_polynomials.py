@@ -226,7 +226,7 @@ def _first_change(after, noise, c):
     low, high = bernstein.smallest(b), bernstein.largest(b)
     if low > 0.0 or high < 0.0 or max(-low, high) <= noise:
         return 2.0
-    for k in range(bernstein.sign_changes(b, c.halves, c.line[2], c.found)):
+    for k in range(bernstein.sign_changes(b, c.found, c.halves)):
         if c.found[k] > after:
             return c.found[k]
     return 2.0

@@ -87,7 +87,7 @@ def _note_linear(k, upto, step, data):
     from_nested(c, b)
     sign = b[0] if b[0] != 0.0 else watch.own_values[k]
     places = watch.changed[:MOST]
-    for i in range(sign_changes(b, workspace.halves, workspace.along, places)):
+    for i in range(sign_changes(b, places, workspace.halves)):
         sign = -sign
         if places[i] <= upto and _counts(sign > 0.0, k, watch):
             t = _look(places[i], step, data)

@@ -21,12 +21,13 @@ from fecontact.integrate.bernstein import (
     DEPTH,
     FINEST,
     NOWHERE,
+    UNDECIDED,
     first_below,
+    first_change,
     fit,
     largest,
     of_nested,
     smallest,
-    split,
     value,
 )
 from fecontact.integrate.nonsmooth.dop853 import PARTS, SLOPES
@@ -210,34 +211,31 @@ def pressed(u, j, s):
 
 
 @helper
-def first_pressed(b, above, finest, j, s, workspace):
+def _pressed_signs(part, begin, width, row, data):
+    """Signs of a bound less the force of a penetration polynomial.
+
+    For :func:`fecontact.integrate.bernstein.changes_of_sign`.
+    """
+    above, finest, j, s = data
+    first, end = above - pressed(part[0], j, s), begin + width
+    if first < 0.0:
+        return first, first, end
+    if max(pressed(smallest(part), j, s), pressed(largest(part), j, s)) <= above:
+        return first, first, end
+    if width > finest:
+        return first, first, UNDECIDED
+    return first, above - pressed(part[len(part) - 1], j, s), end
+
+
+@helper
+def first_pressed(b, above, finest, j, s, stack):
     """Fraction of the step at which the force of a penetration polynomial first exceeds a bound.
 
     ``b`` are the coefficients of the polynomial. The fraction is exact to ``finest``, the later end
     of that interval. The law's force must not fall while penetration grows, into the ground or into
     a stop above.
     """
-    n = len(b)
-    for i in range(n):
-        workspace[0, i] = b[i]
-    workspace[0, n] = 1.0
-    waiting, begin = 1, 0.0
-    while waiting > 0:
-        part, width = workspace[waiting - 1, :n], workspace[waiting - 1, n]
-        if pressed(part[0], j, s) > above:
-            return begin
-        clear = max(pressed(smallest(part), j, s), pressed(largest(part), j, s)) <= above
-        if not clear and width > finest:
-            split(part, workspace[waiting, :n])
-            # The right half stays below, the left one comes on top.
-            workspace[waiting - 1, n] = workspace[waiting, n] = 0.5 * width
-            waiting += 1
-            continue
-        begin += width
-        if not clear and pressed(part[n - 1], j, s) > above:
-            return begin
-        waiting -= 1
-    return NOWHERE
+    return first_change(_pressed_signs, (above, finest, j, s), b, stack)
 
 
 @helper

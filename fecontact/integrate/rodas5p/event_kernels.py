@@ -331,7 +331,7 @@ def _keep_between(count, row, watch):
 @helper
 def set_own_places(before, workspace, watch):
     """Fill the rows of ``watch.places`` of users' functions for a step."""
-    b, row = workspace.bound[0], workspace.bound[2]
+    b = workspace.bound[0]
     for k in range(len(watch.own)):
         count = 0
         if watch.linear[k] != 0:
@@ -344,7 +344,7 @@ def set_own_places(before, workspace, watch):
                 b[2] += p[1 + i] * workspace.inner[1, i]
                 b[3] += p[1 + i] * workspace.inner[2, i]
                 b[4] += p[1 + i] * workspace.after[i]
-            count = bernstein.sign_changes(b, workspace.halves, row, watch.changed[:MOST])
+            count = bernstein.sign_changes(b, watch.changed[:MOST], workspace.halves)
         _keep_between(count, len(watch.zones) + k, watch)
 
 

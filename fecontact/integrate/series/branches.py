@@ -11,7 +11,7 @@ from fecontact.core.errors import InputError
 from fecontact.core.records import ANY, Matrix, Vector, allocate
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.events import AnyEvent, ContactEvents
-from fecontact.integrate.series.polynomials import COEFFICIENTS, DEPTH
+from fecontact.integrate.series.polynomials import COEFFICIENTS, WORKSPACE
 from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.pieces import PIECE, UPPER
 from fecontact.laws.signals.base import Signal
@@ -139,7 +139,7 @@ def _tables(
         longest=np.inf if max_step is None else float(max_step),
         tolerance=max(_PART * rtol, _ROUNDING), states=_first_states(system, pieces, state),
         signal=np.zeros((len(parts) if work else 0, COEFFICIENTS)),
-        line=np.zeros((3, max(COEFFICIENTS, n))), workspace=np.zeros((DEPTH + 3, COEFFICIENTS)))
+        line=np.zeros((3, max(COEFFICIENTS, n))), workspace=np.zeros(WORKSPACE))
 
 
 def from_state(series: Series, system: ContactSystem, state: Array) -> Series:
