@@ -111,7 +111,7 @@ def ensemble(
     The results are those of :func:`fecontact.simulate`, but compiled solvers integrate no powers,
     which limit no steps. Threads share the cores. On each, eight runs of plane systems of one node
     and up to three modes, or two of each, go side by side: on level and even ground, with at most
-    eight internal variables per node, constant or harmonic excitation, no events, by Rodas5P, or
+    160 internal variables per node, constant or harmonic excitation, no events, by Rodas5P, or
     Auto at any tolerance. They differ by rounding from single runs without it.
 
     Parameters

@@ -82,6 +82,16 @@ def test_signs_at_the_ends() -> None:
     assert touch == bernstein.NOWHERE or touch == pytest.approx(0.5, abs=1e-7)
 
 
+def test_the_first_crossing_is_exact_to_the_resolution() -> None:
+    """At the end of the interval of length FINEST with the zero, but for rounding of the latter."""
+    rng = np.random.default_rng(5)
+    for root in 10.0 ** rng.uniform(-9.0, 0.0, 200):
+        polynomial = Polynomial([root, -1.0]) * Polynomial([1.0, 0.3, 0.5, 20.0 * rng.random()])
+        b = _of(polynomial)
+        assert -0.1 * bernstein.FINEST < _first_below(b) - root < 1.1 * bernstein.FINEST
+        assert _sign_changes(b) == pytest.approx([_first_below(b)], abs=0.0)
+
+
 def test_many_random_polynomials_against_dense_sampling() -> None:
     rng = np.random.default_rng(7)
     places = np.linspace(0.0, 1.0, 2001)

@@ -39,6 +39,7 @@ from fecontact.laws import (
     LuGreFriction,
     NormalLaw,
     ParabolicSurface,
+    ParallelSliders,
     PowerContact,
     PrescribedForce,
     ProductFriction,
@@ -156,6 +157,7 @@ MEMORY = {
     "Bouc-Wen": slider(friction=BoucWenFriction(0.5, 1e-5)),
     "Jenkins": slider(friction=JenkinsFriction(1e5, 0.5)),
     "Iwan": slider(friction=IwanFriction(1e5, 0.5, 3)),
+    "Iwan, many elements": slider(friction=IwanFriction(1e5, 0.5, 16)),
     "Jenkins, two nodes": block(2, 2, friction=JenkinsFriction(1e5, 0.5)),
 }
 
@@ -176,6 +178,21 @@ def test_friction_with_internal_variables(name):
     assert (part.states == found.states[:9]).all()
     for k in range(0, 64, 13):
         assert_as_a_single_one(systems[k], state, times, found.states[k], found.steps[k])
+
+
+def test_many_internal_variables_side_by_side_as_one_by_one():
+    """Twelve springs and sliders of a node: the motion of single runs, to a third of its error."""
+    springs = tuple(1.3 ** np.arange(12.0))
+    base = block(2, 2, friction=ParallelSliders(1e5, 0.5, springs, springs[::-1]))
+    systems = [base.with_(**{"drive.frequency_hz": w / TURN}) for w in np.linspace(11.0, 16.0, 64)]
+    state, times = np.zeros(base.size), np.linspace(0.0, 0.1, 11)
+    assert kind_of(base, 0.0, 0.1).size == (2, 2, 12)
+    found = ensemble(systems, times, initial=state, rtol=1e-8)
+    for k in range(0, 64, 9):
+        alone = single(systems[k], state, times, 1e-8)
+        assert found.steps[k] == pytest.approx(alone.statistics["steps"], rel=0.03)
+        size = np.abs(alone.states).max(axis=0) + 1e-300
+        assert (np.abs(found.states[k] - alone.states) / size).max() < 1e-7
 
 
 def test_against_an_integrator_of_another_library():
@@ -372,6 +389,7 @@ def test_initial_states_that_are_not_finite():
 @pytest.mark.parametrize("other", [
     friction_oscillator(2, ground=Ground(speed=1e-3, profile=Sine(1e-4, 2.5e-3))),
     friction_oscillator(2, friction=DahlFriction(0.5, 1e-6)),
+    friction_oscillator(2, friction=IwanFriction(1e5, 0.5, 161)),
     block(4, 1), block(1, 2), block(3, 2), block(2, 3),
     friction_oscillator(2, load=Load(14.0, (
         PointLoad("C", "y", signal=Pulse("half-sine", -3.0, 0.01, 0.05)),))),
