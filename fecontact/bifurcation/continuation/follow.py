@@ -1,6 +1,6 @@
 """Continuation of a whole branch, to one side or to both."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -45,20 +45,38 @@ def continue_branch(
     """
     require_finite("A branch", direction=direction)
     header = BranchHeader(name, labelled(problem, name, attributes or {}))
-    points, end = _collected(problem, u, options, tangent, direction, header)
-    if both and end.status not in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
-        start = start_of(problem, u, options, tangent, direction)
-        # The start counts once.
-        left = options.points + 1 - min(regular(points), options.points // 2 + 1)
-        others, _ = _collected(problem, u, replace(options, points=left), -start.tangent, direction,
-                               header)
-        points, whole = shortened(points, options.points + 1 - regular(others))
-        end = end if whole else End(BranchStatus.POINTS)
-        turned = [replace(point, tangent=-point.tangent) for point in others[:0:-1]]
-        points = [*turned, *points]
+
+    def side(wanted: ContinuationOptions, *, turned: bool) -> tuple[list[BranchPoint], End]:
+        heading = tangent
+        if turned:
+            heading = -start_of(problem, u, options, tangent, direction).tangent
+        return _collected(problem, u, wanted, heading, direction, header)
+
+    points, end = by_sides(side, options, both=both)
     branch = Branch(name, tuple(points), end.status, end.message, header.attributes)
     message = " ".join(filter(None, (end.message, problem.note(branch.points))))
     return replace(branch, message=message)
+
+
+def by_sides(
+    side: Callable[..., tuple[list[BranchPoint], End]], options: ContinuationOptions, *, both: bool
+) -> tuple[list[BranchPoint], End]:
+    """Points of a branch, and how it ended.
+
+    ``side(options, turned=...)`` gives those to one side of the start or, turned, to the other one,
+    each with the start. With ``both`` they go from the end of the other side to that of the first,
+    and the options limit the number of regular ones on both sides together.
+    """
+    points, end = side(options, turned=False)
+    if not both or end.status in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
+        return points, end
+    # The start counts once.
+    most = options.points + regular(points[:1])
+    left = most - min(regular(points), options.points // 2 + regular(points[:1]))
+    others, _ = side(replace(options, points=max(left, 2)), turned=True)
+    points, whole = shortened(points, most - regular(others))
+    turned = [replace(point, tangent=-point.tangent) for point in others[:0:-1]]
+    return [*turned, *points], end if whole else End(BranchStatus.POINTS)
 
 
 def labelled(problem: Problem, name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import continue_branch, regular, shortened
+from fecontact.bifurcation.continuation.follow import by_sides, continue_branch, labelled
 from fecontact.bifurcation.continuation.point import BranchPoint, attributes_of
 from fecontact.bifurcation.continuation.points import CrossingPoint
 from fecontact.bifurcation.continuation.problem import (
@@ -17,6 +17,7 @@ from fecontact.bifurcation.continuation.problem import (
     sizes_of,
     width_of,
 )
+from fecontact.bifurcation.continuation.pseudo_arclength import End
 from fecontact.bifurcation.equilibria.equilibrium import (
     Equilibrium,
     default_scales,
@@ -124,28 +125,23 @@ def _crossing(
     """The other branch through a branch point."""
     weights = problem.weights()
     tangent = tangent / np.sqrt(weights * tangent @ tangent)
-    points: list[BranchPoint] = [replace(point, tangent=tangent)]
-    branch: Branch | None = None
-    left, whole = options.points, True
-    for side in (1.0, -1.0) if both else (1.0,):
+
+    def side(wanted: ContinuationOptions, *, turned: bool) -> tuple[list[BranchPoint], End]:
+        ahead = -tangent if turned else tangent
+        start = replace(point, tangent=ahead)
         # At the branch point the system is singular; correct the first step away from it.
-        first = point.u + side * options.step * tangent
+        first = point.u + options.step * ahead
         if not options.bounds[0] <= first[-1] <= options.bounds[1]:
-            continue
-        found = continue_branch(problem, first, replace(options, points=left), name=parameter,
-                                tangent=side * tangent, attributes=attributes)
-        if side < 0.0:
-            points, whole = shortened(points, options.points - regular(found))
-            points = [*found.reversed().points, *points]
-        else:
-            points += found.points
-            left -= min(regular(found), left // 2)
-        branch = branch or found
-    if branch is None:
+            return [start], End(BranchStatus.BOUND)
+        found = continue_branch(problem, first, wanted, name=parameter, tangent=ahead)
+        return [start, *found.points], End(found.status, found.message)
+
+    points, end = by_sides(side, options, both=both)
+    if len(points) == 1:
         raise InputError(f"The other branch leaves the bounds of {parameter} at once, at "
                          f"{point.parameter:.6g}; widen them.")
-    return replace(branch, points=tuple(points),
-                   status=branch.status if whole else BranchStatus.POINTS)
+    return Branch(parameter, tuple(points), end.status, end.message,
+                  labelled(problem, parameter, attributes))
 
 
 def _start(field: VectorField, start: Equilibrium | ArrayLike | None) -> Equilibrium:

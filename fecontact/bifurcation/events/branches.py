@@ -7,7 +7,13 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.continuation.branch import Branch
-from fecontact.bifurcation.continuation.follow import continue_branch, labelled, regular, shortened
+from fecontact.bifurcation.continuation.follow import (
+    by_sides,
+    continue_branch,
+    labelled,
+    regular,
+    shortened,
+)
 from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.inner_product import unit
 from fecontact.bifurcation.continuation.newton import newton, norm
@@ -83,23 +89,21 @@ def followed(
     FecontactError
         If there is no orbit near the start.
     """
-    ahead, end = _side(problem, u, options, name, tangent, direction)
-    attributes = labelled(problem, name, attributes)
-    if not both or end.status in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
-        return Branch(name, tuple(ahead), end.status, end.message, attributes)
-    kept = max(options.points // 2 + 1, 2)
-    left = max(options.points + 1 - min(regular(ahead), kept), 2)
-    message = end.message
-    try:
-        back, _ = _side(problem, u, replace(options, points=left), name,
-                        None if tangent is None else -tangent, -direction)
-    except FecontactError as error:
-        back = ahead[:1]
-        message = " ".join(filter(None, (message, f"Nothing was found to the other side: {error}")))
-    points, whole = shortened(ahead, options.points + 1 - regular(back))
-    turned = [replace(point, tangent=-point.tangent) for point in back[:0:-1]]
-    return Branch(name, (*turned, *points), end.status if whole else BranchStatus.POINTS,
-                  message, attributes)
+    notes: list[str] = []
+
+    def side(wanted: ContinuationOptions, *, turned: bool) -> tuple[list[BranchPoint], End]:
+        if not turned:
+            return _side(problem, u, wanted, name, tangent, direction)
+        try:
+            return _side(problem, u, wanted, name, None if tangent is None else -tangent,
+                         -direction)
+        except FecontactError as error:
+            notes.append(f"Nothing was found to the other side: {error}")
+            return [], End(BranchStatus.STALLED)
+
+    points, end = by_sides(side, options, both=both)
+    message = " ".join(filter(None, (end.message, *notes)))
+    return Branch(name, tuple(points), end.status, message, labelled(problem, name, attributes))
 
 
 def _side(

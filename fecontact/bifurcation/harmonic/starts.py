@@ -8,6 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.inner_product import unit
 from fecontact.bifurcation.continuation.newton import damped_newton
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.predictor import BENT
@@ -213,8 +214,7 @@ def converged_orbit(
     AnalysisError
         If Newton's method does not converge, or converges to an equilibrium.
     """
-    row = np.zeros_like(u)
-    row[-1] = 1.0
+    row = unit(len(u))
     found = problem.found(u, row, tolerance)
     if found is not None:
         return problem, found[0]
