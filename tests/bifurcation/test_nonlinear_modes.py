@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from oscillators import jenkins_system, one_mode
 from scipy.interpolate import CubicSpline
+from scipy.optimize import brentq
 from scipy.special import ellipk
 from systems import TURN, two_mass_field, two_mass_system
 
@@ -16,6 +17,7 @@ from fecontact.bifurcation import (
     BranchStatus,
     ContinuationOptions,
     HarmonicBalance,
+    Shooting,
     contact_field,
     equilibrium_branch,
     nonlinear_mode,
@@ -30,7 +32,14 @@ from fecontact.bifurcation.nonlinear_modes.linear_start import (
 from fecontact.bifurcation.nonlinear_modes.nonlinear_mode import returned_noted
 from fecontact.cli.mode_results import mode_csv
 from fecontact.core.errors import AnalysisError, InputError
-from fecontact.laws import FourParameterIwanFriction, Harmonic, JenkinsFriction, PrescribedForce
+from fecontact.laws import (
+    FourParameterIwanFriction,
+    Frictionless,
+    Harmonic,
+    JenkinsFriction,
+    LinearContact,
+    PrescribedForce,
+)
 from fecontact.reduction import PolynomialSpring, point_masses
 from fecontact.system.forcing_period import common_period
 
@@ -91,7 +100,7 @@ def test_modes_of_two_equal_masses_have_the_frequencies_of_elliptic_integrals(
         assert errors[-1] < 1e-8
     # Kinetic and potential energy of both masses.
     energy = 2.0 * (0.5 * linear * A**2 + 0.25 * cubic * A**4)
-    assert mode.energy == pytest.approx(energy, rel=2e-6)
+    assert mode.energy == pytest.approx(energy, rel=1e-7)
     shape = mode.coordinates()
     assert shape[:, 1] == pytest.approx((1.0 if number == 1 else -1.0) * shape[:, 0], abs=1e-9)
     assert np.abs(mode.harmonic(3)[-1]) > (0.02 if cubic else -1.0)
@@ -528,3 +537,31 @@ def test_the_undamped_mode_beside_stiff_ones_is_found_in_few_steps(monkeypatch):
             A, E, complex(-rate, np.sqrt(w[0] ** 2 - rate**2)))
         assert found == pytest.approx(w[0], rel=1e-8)
         assert xi == pytest.approx(2.0 * rate, rel=1e-8)
+
+
+@pytest.mark.parametrize("method", [HarmonicBalance(41, samples=2048), Shooting()])
+def test_energies_depend_neither_on_the_begin_of_a_mode_nor_on_its_steps(method):
+    """A mass on a spring, and on a second one from a gap on: all motion is known from its energy.
+
+    A half turn of the first spring's circle, and an arc about the place where both are in balance.
+    """
+    stiffness, gap = 5.0, 1.0
+    row = np.array([[0.0], [1.0], [0.0]])
+    basis = fc.basis_from_matrices([[1.0]], [[1.0]], {"contact": row[None], "B": row, "C": row})
+    system = fc.ContactSystem(basis, normal=LinearContact(stiffness), friction=Frictionless(),
+                              gap=gap)
+
+    def amplitude(above):
+        energy = 0.5 * above**2
+        pressed = np.sqrt(2.0 * energy * (1.0 + stiffness) - stiffness * gap**2)
+        return 0.5 * (above + (stiffness * gap + pressed) / (1.0 + stiffness))
+
+    for low, options in ((0.5, None), (1.3, None),
+                         (1.2, ContinuationOptions(step=0.3, largest_step=0.5))):
+        mode = nonlinear_mode(system, (low, 4.0), observe=("B", "y"), method=method,
+                              options=options)
+        A = mode.amplitude
+        assert A[[0, -1]] == pytest.approx([low, 4.0], rel=1e-6)
+        tops = [a if a <= gap else brentq(lambda top, a=a: amplitude(top) - a, gap, 3.0 * a)
+                for a in A]
+        assert mode.energy == pytest.approx(0.5 * np.square(tops), rel=5e-6)

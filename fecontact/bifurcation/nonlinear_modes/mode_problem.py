@@ -25,6 +25,7 @@ from fecontact.bifurcation.orbits.shooting import ShootingProblem
 from fecontact.bifurcation.orbits.unknowns import OrbitUnknowns
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.types import Array, ComplexArray
+from fecontact.system.fields.vector_field import VectorField
 
 # Harmonics of what is observed, from the samples of runs.
 _HARMONICS = 63
@@ -40,6 +41,8 @@ PERIOD_SCALE, _FOLLOWED = 0.2, 1.3
 # Change of period and xi in a step, in their scales, up to which it may be longer than the largest
 # one, and how many times as long.
 _RESTS, _LONGER = 1e-4, 4.0
+# Gauss points on each piece of the way from rest, and pieces, since contact forces have kinks.
+_GAUSS, _PIECES = 4, 32
 
 
 class ModeLinearisation(HarmonicLinearisation):
@@ -167,7 +170,22 @@ class ModeProblem(AlongMode, HarmonicProblem):
         square = (mean_square_velocity(self.layout, X, T) if self.waves is None
                   else self.waves.mean_square_velocity(
                       X, linearisation.free_balance, T, float(u[-1]), self.harmonics_kept))
-        return {**super().point(u, linearisation, tangent), "mean_square_velocity": square}
+        return {**super().point(u, linearisation, tangent), "mean_square_velocity": square,
+                **self._energy(u, linearisation)}
+
+    def _energy(self, u: Array, linearisation: Any) -> dict[str, float]:
+        """Energy of a conservative motion of modal coordinates, its mean over the period."""
+        m = self.layout.displacements
+        if not (self.conservative and m and self.waves is None):
+            return {}
+        states, force = linearisation.states, linearisation.rates[:, m : 2 * m]
+        kinetic, near = 0.5 * (states[:, m : 2 * m] ** 2).sum(axis=1), nearest(states, self.home)
+        power = np.fft.rfft((force * states[:, m : 2 * m]).sum(axis=1))
+        power[0] = 0.0
+        turns = 2j * np.pi / self.period(u) * np.maximum(np.arange(len(power)), 1)
+        work = np.fft.irfft(power / turns, len(states))
+        return {"energy": energy_at(self.field, self.parameters(u), states[near], self.home)
+                + float(kinetic.mean() - kinetic[near] + work[near])}
 
     def _stability(self, linearisation: Any) -> dict[str, Any]:
         """Stability of conservative motions alone, for which multipliers of one count as stable."""
@@ -211,10 +229,13 @@ class ShootingMode(AlongMode, ShootingProblem):
         Row of the observed displacement.
     conservative : bool
         Whether xi is zero within rounding where the mode begins.
+    home : (m,) array
+        Displacements at rest.
     """
 
     row: Array = field(default_factory=lambda: np.zeros(0))
     conservative: bool = False
+    home: Array = field(default_factory=lambda: np.zeros(0))
 
     ends: ClassVar[Mapping[str, BranchStatus]] = {}
 
@@ -228,8 +249,10 @@ class ShootingMode(AlongMode, ShootingProblem):
         waves = 2.0 / len(samples) * np.fft.rfft(samples[:, :m], axis=0)[: H + 1]
         waves[0] *= 0.5
         layout, X = Layout(d, m), real_coefficients(waves)
-        return {**{name: found[name] for name in ("mesh", "minimum", "maximum")},
-                **(known_stability(found, 1) if self.conservative else {}), "period": T,
+        kept = {} if not self.conservative else known_stability(found, 1) | {"energy": energy_at(
+            self.field, self.parameters(u), samples[nearest(samples, self.home)], self.home)}
+        return {**{name: found[name] for name in ("mesh", "minimum", "maximum")}, **kept,
+                "period": T,
                 "mean_square_velocity": mean_square_velocity(layout, X, T),
                 **observed_values(layout, X, T, self.row)}
 
@@ -273,7 +296,8 @@ def leaving_by_shooting(
     problem = ShootingMode(
         known, start.values, start.free, mesh, first[0].copy(), scales, rtol=method.rtol,
         derivative_rtol=method.derivative_rtol, solver=method.solver,
-        limits=np.full(known.dimension, np.inf), row=row, conservative=start.lossless)
+        limits=np.full(known.dimension, np.inf), row=row, conservative=start.lossless,
+        home=start.state[: start.displacements])
     u = np.concatenate([first.reshape(-1), [2.0 * np.pi / start.angular_frequency, start.xi]])
     leaving = np.append(waves.reshape(-1), [0.0, 0.0])
     return problem, u, leaving / np.sqrt(problem.weights() @ leaving**2)
@@ -297,6 +321,28 @@ def mean_square_velocity(layout: Layout, X: Array, period: float) -> float:
     """
     m = layout.displacements
     return 0.5 * float((differentiated(X[:, :m] / period) ** 2).sum()) if m else np.nan
+
+
+def nearest(states: Array, home: Array) -> int:
+    """Index of the state (N, d) whose displacements are nearest to those (m,) of rest."""
+    return int(((states[:, : len(home)] - home) ** 2).sum(axis=1).argmin())
+
+
+def energy_at(field: VectorField, values: Array, state: Array, home: Array) -> float:
+    """Kinetic energy of a state (d,), and the work against the forces on the way there from rest.
+
+    Of mass-normalised modes without losses, by Gauss points on a straight line from the
+    displacements ``home`` (m,).
+    """
+    m = len(home)
+    way = state[:m] - home
+    nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
+    parts = (np.arange(_PIECES)[:, None] + 0.5 * (1.0 + nodes)).ravel() / _PIECES
+    states = np.zeros((len(parts), len(state)))
+    states[:, :m] = home + parts[:, None] * way
+    forces = field.rates(np.zeros(len(parts)), states, values)[:, m : 2 * m]
+    work = np.tile(0.5 * weights / _PIECES, _PIECES) @ forces @ way
+    return float(0.5 * state[m : 2 * m] @ state[m : 2 * m] - work)
 
 
 def known_stability(stored: Mapping[str, Any], pairs: int) -> dict[str, Any]:

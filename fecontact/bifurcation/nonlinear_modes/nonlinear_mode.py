@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, options_of
+from fecontact.bifurcation.continuation.pseudo_arclength import start_of
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches, starts
@@ -60,6 +61,8 @@ _BELOW = 0.99
 # Relative distance of frequencies that are the same, and of amplitudes; most points between two of
 # the mode.
 _SAME, _MET, _MOST_BETWEEN = 1e-12, 1e-6, 200
+# Corrections of the motion with which a mode begins, at most.
+_STARTS = 20
 _ENDS = ("largest amplitude", "smallest amplitude")
 
 
@@ -133,10 +136,14 @@ class NonlinearMode(Summarised):
     def energy(self) -> Array | None:
         """Energy (N,) of the motion above that of rest [J]; None with losses, and of fields.
 
-        The integral of Omega dJ along the mode over its action ``J = int q'^T q' dt / (2 pi)``.
+        Kinetic and potential energy of the motion, by harmonic balance their mean over a period. Of
+        travelling waves the integral of Omega dJ along the mode over its action
+        ``J = int q'^T q' dt / (2 pi)``; their mode is to begin where it is linear.
         """
         if not self.conservative or np.isnan(self._square).any():
             return None
+        if "energy" in self.branch.points[0].values:
+            return np.asarray(self.branch.column("energy"))
         w = self.angular_frequency
         return _integral(w, np.asarray(self._square / w))
 
@@ -320,14 +327,39 @@ def nonlinear_mode(
         : start.displacements]}
     shape, scales = _first_motion(start, row, observed, low)
     leave, follow = _WAYS[type(chosen)]
-    begin = leave(start, shape, scales, row, chosen)
+
+    def leaving(factor: float) -> tuple[Any, Array, Array]:
+        return leave(start, factor * shape, scales, row, chosen)
+
+    begin = leaving(1.0)
     try:
-        branch = follow(start, begin, chosen, ends)
+        branch = follow(start, _of_amplitude(begin, leaving, low, ends), chosen, ends)
     except FecontactError as error:
         raise AnalysisError(f"No nonlinear mode was followed from the linear one at "
                             f"{start.angular_frequency / (2.0 * np.pi):.5g} Hz and the amplitude "
                             f"{low:g}; {_remedy(preload)} ({error})") from None
     return returned_noted(NonlinearMode(_ended(branch, further), mode, observed))
+
+
+def _of_amplitude(
+    begin: tuple[Any, Array, Array], leaving: Callable[[float], tuple[Any, Array, Array]],
+    amplitude: float, options: ContinuationOptions,
+) -> tuple[Any, Array, Array]:
+    """Problem, unknowns and direction of the motion of an amplitude.
+
+    ``begin`` are those of the linear mode at the amplitude, ``leaving(factor)`` at so many times
+    it. Where motions are not linear, that next to it has another amplitude.
+    """
+    factor = 1.0
+    for _ in range(_STARTS):
+        problem, guess, heading = begin
+        found = start_of(problem, guess, options, heading, 1.0)
+        ratio = float(found.values["observed_amplitude"]) / amplitude
+        if abs(ratio - 1.0) <= 0.1 * _MET:
+            break
+        factor /= ratio
+        begin = leaving(factor)
+    return problem, found.u, heading
 
 
 def returned_noted(mode: NonlinearMode) -> NonlinearMode:
