@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from oscillators import one_mode
 from systems import (
     TURN,
     belt,
@@ -28,7 +29,14 @@ from fecontact import (
     simulate,
 )
 from fecontact.bifurcation import contact_field, find_equilibrium, stability_map, vector_field
-from fecontact.laws import Constant, ConstantFriction, LinearContact, RoughSurface
+from fecontact.laws import (
+    Constant,
+    ConstantFriction,
+    DahlFriction,
+    LinearContact,
+    PrescribedForce,
+    RoughSurface,
+)
 
 MU = "friction.friction_coefficient"
 
@@ -232,6 +240,18 @@ def test_map_follows_the_equilibrium_along_both_parameters():
     a, b = np.linspace(0.0, 12.0, 25), np.linspace(0.0, 9.0, 19)
     found = stability_map(field, {"a": a, "b": b})
     assert found.states[..., 0] == pytest.approx(np.add.outer(a, b), abs=1e-9)
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])
+def test_bristles_that_come_to_their_limit_ever_more_slowly_have_an_equilibrium(exponent):
+    """Where the exponent is not one, nothing in the linear motion holds the deflection there."""
+    mu, sigma, force, stiffness = 0.5, 1e4, 10.0, 700.0
+    system = ContactSystem(
+        one_mode(), normal=PrescribedForce(force), friction=DahlFriction(mu, sigma, exponent),
+        ground=Ground(speed=0.05), drive=Drive(stiffness_x=stiffness, damping_x=1.0))
+    found = find_equilibrium(contact_field(system, ["ground.speed"]))
+    assert found.state == pytest.approx([mu * force / stiffness, 0.0, -mu / sigma], rel=1e-9)
+    assert found.eigenvalues.real.max() == pytest.approx(0.0 if exponent > 1.0 else -0.5, abs=1e-9)
 
 
 def test_kind_errors():

@@ -68,6 +68,8 @@ class DenseEquations:
 
 
 _ITERATIONS = 60
+# Rates, in the sizes of the terms of which they are the sum, that are rounding.
+_AT_REST = 1e-13
 # Differences for the slopes of eigenvalues: step relative to the parameter, weights by place.
 _SLOPE_STEP = 1e-4
 _DIFFERENCES = (
@@ -225,7 +227,9 @@ def newton(
         try:
             step = solution(J[0], -f[0])
         except AnalysisError:
-            return None
+            # As where a bristle comes to its limit ever more slowly.
+            rests = (np.abs(f[0]) <= _AT_REST * np.abs(J[0]) @ np.abs(x)).all()
+            return (x, J[0]) if rests else None
         size = float(np.linalg.norm(step))
         if not np.isfinite(size):
             return None
