@@ -7,7 +7,15 @@ import pytest
 from synthetic import basis, run
 
 import fecontact as fc
-from fecontact.bifurcation import Branch, BranchPoint, BranchTree, PeriodicMotion, StabilityMap
+from fecontact.bifurcation import (
+    Branch,
+    BranchPoint,
+    BranchTree,
+    PeriodicMotion,
+    StabilityMap,
+    find_equilibrium,
+    vector_field,
+)
 from fecontact.core.units import html_table, listed, span
 from fecontact.integrate import Ensemble
 from fecontact.laws import LinearContact
@@ -93,6 +101,14 @@ def stability_map():
                         np.array([[2, 0], [0, -1]]))
 
 
+def spiral():
+    def rates(t, x, p, out):
+        out[0] = p[0] * x[0] + 2.0 * np.pi * x[1]
+        out[1] = p[0] * x[1] - 2.0 * np.pi * x[0]
+
+    return vector_field(rates, {"a": 0.5}, ("x", "v"))
+
+
 SHOWN = {
     "Trajectory": (lambda: run(times=41), ("finished", "20 ms", "41", "RoughSurface", "9000 Hz")),
     "Energies": (lambda: run(times=41).energies, ("stored: ", " at last; work: ", "lost: ",
@@ -123,6 +139,9 @@ SHOWN = {
                                      (fc.Status.FINISHED, fc.Status.FAILED, fc.Status.FINISHED),
                                      np.array([7, 9, 8])),
                  ("runs: 3", "2 finished, 1 failed", "0 ... 0.2 s", "7 ... 9")),
+    "FunctionField": (spiral, ("states: x, v", "parameters: a = 0.5")),
+    "Equilibrium": (lambda: find_equilibrium(spiral()), (
+        "parameters: a = 0.5", "stable: no", "growth rate: 0.5 1/s at 1 Hz")),
     "StabilityMap": (stability_map, ("load.normal: 2 ... 30", "unstable: 25 %", "50 Hz",
                                      "no equilibrium: 25 %")),
 }

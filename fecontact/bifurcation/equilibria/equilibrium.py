@@ -14,8 +14,9 @@ from fecontact.core.errors import AnalysisError, InputError, require_positive
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
+from fecontact.core.units import Summarised
 from fecontact.system.complex_modes import ComplexModes, sorted_eigenvalues, unstable_count
-from fecontact.system.fields.vector_field import VectorField, require_field
+from fecontact.system.fields.vector_field import VectorField, parameters_listed, require_field
 
 _RESIDUAL = 1e-8
 
@@ -80,8 +81,8 @@ _DIFFERENCES = (
 
 
 @read_only_arrays
-@dataclass(frozen=True, eq=False)
-class Equilibrium:
+@dataclass(frozen=True, eq=False, repr=False)
+class Equilibrium(Summarised):
     """An equilibrium, and the linear motion about it.
 
     Attributes
@@ -121,6 +122,14 @@ class Equilibrium:
     def modes(self) -> ComplexModes:
         """Frequencies, damping ratios and eigenvectors of the linear motion."""
         return ComplexModes.of(self.jacobian)
+
+    def summary(self) -> list[tuple[str, str]]:
+        """Parameters, stability, and the eigenvalue of the largest real part."""
+        largest = self.eigenvalues[0]
+        turning = f" at {abs(largest.imag) / (2.0 * np.pi):.4g} Hz" if largest.imag else ""
+        return [("parameters", parameters_listed(self.field, self.values)),
+                ("stable", "yes" if self.stable else "no"),
+                ("largest growth rate", f"{largest.real:.4g} 1/s{turning}")]
 
     def eigenvalue_slopes(self, parameter: str) -> ComplexArray:
         """Derivatives (r,) of the eigenvalues of :attr:`modes` to a parameter.
@@ -204,12 +213,10 @@ def find_equilibrium(
     found = newton(field, x, values, tolerance)
     if found is None:
         rate = np.abs(field.rates(np.zeros(1), x[None], values)).max()
-        listed = ", ".join(f"{name} = {value:g}" for name, value in
-                           zip(field.parameters, values.tolist(), strict=True))
-        raise AnalysisError(f"No equilibrium was found for {listed} from the given start, where "
-                            f"the largest rate is {rate:.3g}; give a start that is nearer, for "
-                            f"example from a run that comes to rest, or follow one from other "
-                            f"parameters.")
+        raise AnalysisError(f"No equilibrium was found for {parameters_listed(field, values)} from "
+                            f"the given start, where the largest rate is {rate:.3g}; give a start "
+                            f"that is nearer, for example from a run that comes to rest, or follow "
+                            f"one from other parameters.")
     return Equilibrium(field, values, found[0])
 
 

@@ -11,12 +11,13 @@ import numpy as np
 from fecontact.core.checks import merged, require_kind
 from fecontact.core.errors import InputError, choices, nearest, require_finite
 from fecontact.core.types import Array, Integers
+from fecontact.core.units import Summarised, listed
 
 if TYPE_CHECKING:
     from fecontact.system.contact_system import ContactSystem
 
 
-class VectorField(ABC):
+class VectorField(Summarised, ABC):
     """Rates x' = f(t, x, p) of d states with k parameters, for N places at once.
 
     Parameters are named; where an array of values (k,) is asked for, they stand in the order of
@@ -56,6 +57,11 @@ class VectorField(ABC):
         ``step`` is None.
         """
         return None
+
+    def summary(self) -> list[tuple[str, str]]:
+        """States, and parameters with their base values."""
+        return [("states", listed(self.state_names)),
+                ("parameters", parameters_listed(self, self.values))]
 
     def as_new(self) -> Self:
         """Field without results of earlier calls; the field itself if it keeps none."""
@@ -187,3 +193,9 @@ def require_field(given: object) -> None:
         raise InputError(f"A vector field is needed, not a {type(given).__name__}; make one with "
                          f"contact_field(system, names of parameters), or with "
                          f"vector_field(function, ...).")
+
+
+def parameters_listed(field: VectorField, values: Array) -> str:
+    """Names and values (k,) of the parameters of a field: ``rho = 28, sigma = 10``."""
+    return listed([f"{name} = {value:g}" for name, value in
+                   zip(field.parameters, values.tolist(), strict=True)], 8)
