@@ -91,12 +91,15 @@ def changes_of_sign(look, data, b, sign, places, stack):
     """Fill ``places`` with the s at which a quantity changes its sign, ascending; their number.
 
     The step is halved, the left half first, until a look at each part tells the sign of the
-    quantity there. ``look(part, begin, width, row, data)`` is a compiled function that returns the
+    quantity there. ``look(part, begin, width, rows, data)`` is a compiled function that returns the
     signs at the begin and at the end of a part, zero for none, and the place at which they change
     between these; or UNDECIDED as the place, for a part that is to be halved. ``part`` (n + 1,) are
-    the coefficients of p over the part. ``row`` (n + 1,) and ``stack`` (DEPTH, n + 2) are
-    workspace; b is kept. ``sign`` is the sign before the step, zero for none. Changes beyond the
-    length of ``places`` are left out.
+    the coefficients of p over the part. ``rows`` (2, ...) are its row of the stack and the next
+    one, which is workspace. Columns beyond n + 2 belong to the look: where it is undecided, it may
+    keep numbers about the right half in the first row, and about the left half in the second.
+
+    ``stack`` (DEPTH, n + 2 or more) is workspace; b is kept. ``sign`` is the sign before the step,
+    zero for none. Changes beyond the length of ``places`` are left out.
     """
     n = len(b)
     # Parts that are left, the earliest on top, with their widths in the last column.
@@ -105,10 +108,10 @@ def changes_of_sign(look, data, b, sign, places, stack):
     stack[0, n] = 1.0
     waiting, begin, found = 1, 0.0, 0
     while waiting > 0 and found < len(places):
-        part, row, width = stack[waiting - 1, :n], stack[waiting, :n], stack[waiting - 1, n]
-        first, last, place = look(part, begin, width, row, data)
+        part, width = stack[waiting - 1, :n], stack[waiting - 1, n]
+        first, last, place = look(part, begin, width, stack[waiting - 1 : waiting + 1], data)
         if place == UNDECIDED:
-            split(part, row)
+            split(part, stack[waiting, :n])
             stack[waiting - 1, n] = stack[waiting, n] = 0.5 * width
             waiting += 1
             continue
@@ -176,7 +179,7 @@ def signs_by(zero: Callable[..., Any]) -> Any:
     """
 
     @helper
-    def signs(part, begin, width, row, data):
+    def signs(part, begin, width, rows, data):
         """Signs of p at the begin and at the end of a part, and the place of a change."""
         dip, given = data
         first, last, changes = 0.0, 0.0, 0
@@ -187,7 +190,7 @@ def signs_by(zero: Callable[..., Any]) -> Any:
                 first = part[i] if first == 0.0 else first
                 last = part[i]
         if changes == 1:
-            return first, last, zero(part, begin, width, row, given)
+            return first, last, zero(part, begin, width, rows[1, : len(part)], given)
         if changes > 1 and width > FINEST:
             return first, last, UNDECIDED
         if changes > 1 and smallest(part) < -dip:

@@ -25,6 +25,9 @@ from fecontact.system.nodes import ground_motion, ground_speed, ground_under, no
 LOWEST, HIGHEST, STEEPEST, FASTEST, QUICKEST = range(5)
 # Rows of coefficients: five coefficients, then a mark of doubt.
 COEFFICIENTS, SEARCH = 5, 5
+# Columns of the workspace for changes of sign: coefficients, a width, and the ground at both ends.
+COLUMNS = COEFFICIENTS + 3
+_BEGIN, _END = COEFFICIENTS + 1, COEFFICIENTS + 2
 # Quantities of a node.
 SLIP, GAP = range(2)
 
@@ -223,22 +226,24 @@ def _ground_bound(polynomial):
 
 
 @helper
-def _signs_on_moving_ground(part, begin, width, row, data):
+def _signs_on_moving_ground(part, begin, width, rows, data):
     """Signs of a step polynomial, for :func:`fecontact.integrate.bernstein.changes_of_sign`.
 
-    ``data`` are a bound on the rate of change of the ground over the step, and the polynomial.
+    ``data`` are a bound on the rate of change of the ground over the step, and the polynomial. The
+    last two columns of ``rows`` have what the ground adds at the begin and at the end of a part.
     """
     bound, polynomial = data
-    shift = polynomial.shift
-    ground = ground_part(begin + 0.5 * width, polynomial) - shift
-    low = bernstein.smallest(part) - ground - 0.5 * bound * width
-    high = bernstein.largest(part) - ground + 0.5 * bound * width
-    if low > 0.0 or high < 0.0:
+    at_begin, at_end, reach = rows[0, _BEGIN], rows[0, _END], 0.5 * bound * width
+    ground = 0.5 * (at_begin + at_end) - polynomial.shift
+    low, high = bernstein.smallest(part) - ground, bernstein.largest(part) - ground
+    if low > reach or high < -reach:
         return low, low, begin
     if width > _FINEST:
+        middle = ground_part(begin + 0.5 * width, polynomial)
+        rows[0, _BEGIN], rows[1, _BEGIN], rows[1, _END] = middle, at_begin, middle
         return 0.0, 0.0, bernstein.UNDECIDED
-    first = part[0] + shift - ground_part(begin, polynomial)
-    last = part[COEFFICIENTS - 1] + shift - ground_part(begin + width, polynomial)
+    first = part[0] + polynomial.shift - at_begin
+    last = part[COEFFICIENTS - 1] + polynomial.shift - at_end
     share = first / (first - last) if first * last < 0.0 else 0.0
     return first, last, begin + share * width
 
@@ -248,11 +253,13 @@ def changes(b, polynomial, halves, places):
     """Fill ``places`` with the parts of the step at which a step polynomial changes its sign.
 
     Returns how many there are. Sets b (5,) to the coefficients of the node's own motion;
-    ``halves`` (bernstein.DEPTH, 6) is workspace.
+    ``halves`` (bernstein.DEPTH, COLUMNS) is workspace.
     """
     _set_own(polynomial, b)
     bound = _ground_bound(polynomial)
     if bound > 0.0:
+        halves[0, _BEGIN] = ground_part(0.0, polynomial)
+        halves[0, _END] = ground_part(1.0, polynomial)
         return bernstein.changes_of_sign(_signs_on_moving_ground, (bound, polynomial), b, 0.0,
                                          places, halves)
     constant = polynomial.shift - ground_part(0.0, polynomial)

@@ -211,7 +211,7 @@ def pressed(u, j, s):
 
 
 @helper
-def _pressed_signs(part, begin, width, row, data):
+def _pressed_signs(part, begin, width, rows, data):
     """Signs of a bound less the force of a penetration polynomial.
 
     For :func:`fecontact.integrate.bernstein.changes_of_sign`.

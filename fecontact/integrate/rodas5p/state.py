@@ -218,7 +218,7 @@ class Workspace(NamedTuple):
     inner: Annotated[Array, 3, SIZE]
     polynomials: Annotated[Array, step_polynomials.SEARCH + 1, (2 * AXES - 1) * NODES]
     bound: Annotated[Array, 3, step_polynomials.COEFFICIENTS]
-    halves: Annotated[Array, bernstein.DEPTH, step_polynomials.COEFFICIENTS + 1]
+    halves: Annotated[Array, bernstein.DEPTH, step_polynomials.COLUMNS]
     places: Annotated[Array, step_polynomials.MOST]
     sums: Annotated[Array, 2, SIZE, tableau.STAGES]
 
