@@ -27,7 +27,7 @@ from fecontact.bifurcation import (
 )
 from fecontact.bifurcation.continuation.follow import regular
 from fecontact.integrate import SetValued, TimeStepping
-from fecontact.laws import ConstantFriction, LinearContact
+from fecontact.laws import ConstantFriction, LinearContact, PrescribedForce
 
 GRAZING = 4.0 / gain(0.8)
 
@@ -67,6 +67,25 @@ def test_orbits_of_either_impact_law_are_those_of_runs(law):
                                         for away in 1e-6 * np.eye(4)]).T)
     assert np.sort(np.abs(point.values["multipliers"])) == pytest.approx(np.sort(np.abs(known)),
                                                                          abs=1e-5)
+
+
+def test_points_between_those_of_a_branch_go_from_event_to_event():
+    """Den Hartog's (1931) amplitude of an undamped oscillator with Coulomb friction."""
+    along, share = np.array([[1.0], [0.0], [0.0]]), 0.3
+    system = fc.ContactSystem(
+        fc.basis_from_matrices([[1.0]], [[0.0]], {"contact": along[None], "B": along}),
+        normal=PrescribedForce(1.0), friction=ConstantFriction(share),
+        drive=fc.Drive(stiffness_x=1.0, amplitude_x=1.0, frequency_hz=0.7 / TURN))
+    field = contact_field(system, "drive.frequency_hz")
+    motion = periodic_motion(system, initial=[0.0, 0.0], solver=SetValued(), transient=400.0)
+    branch = orbit_branch(field, motion, method=Shooting(1, solver=SetValued()),
+                          bounds=(0.7 / TURN, 0.9 / TURN))
+    for ratio in (0.75, 0.85):
+        static = 1.0 / (1.0 - ratio**2)
+        lag = np.sin(np.pi / ratio) / (ratio * (1.0 + np.cos(np.pi / ratio)))
+        at = branch.at(field, ratio / TURN)
+        assert at.values["maximum"][0] == pytest.approx(
+            np.sqrt(static**2 - (share * lag) ** 2), rel=1e-10)
 
 
 def test_time_stepping_is_differenced():

@@ -17,6 +17,7 @@ from systems import (
 from fecontact import (
     AnalysisError,
     ContactSystem,
+    Drive,
     InputError,
     Load,
     PointLoad,
@@ -38,7 +39,7 @@ from fecontact.bifurcation import (
 )
 from fecontact.bifurcation.orbits.restored import restored_shooting
 from fecontact.integrate import strobe
-from fecontact.laws import Harmonic, LinearContact
+from fecontact.laws import Frictionless, Harmonic, LinearContact, PrescribedForce
 
 FEW = ContinuationOptions(step=5e-3, largest_step=0.05, points=60)
 
@@ -50,6 +51,23 @@ def two_masses():
     orbits = orbit_branch(field, sliding.of_kind("Hopf")[0], method=Collocation(intervals=100),
                           bounds=(0.3, 8.3))
     return field, sliding, orbits
+
+
+@pytest.mark.parametrize("segments", [1, 4])
+def test_extremes_of_a_linear_response_are_those_of_the_closed_form(segments):
+    along = np.array([[1.0], [0.0], [0.0]])
+    system = ContactSystem(
+        basis_from_matrices([[1.0]], [[0.0]], {"contact": along[None], "B": along}),
+        normal=PrescribedForce(1.0), friction=Frictionless(),
+        drive=Drive(stiffness_x=1.0, damping_x=0.1, amplitude_x=1.0, frequency_hz=0.1))
+    branch = orbit_branch(contact_field(system, "drive.frequency_hz"),
+                          periodic_motion(system, initial=[0.0, 0.0]), method=Shooting(segments),
+                          bounds=(0.1, 0.2))
+    for point in branch.points:
+        w = TURN * point.parameter
+        size = 1.0 / abs(1.0 - w**2 + 0.1j * w)
+        assert point.values["maximum"] == pytest.approx([size, w * size], rel=5e-6)
+        assert point.values["minimum"] == pytest.approx([-size, -w * size], rel=5e-6)
 
 
 def test_doubled_orbits_agree_with_collocation(two_masses):

@@ -1,6 +1,6 @@
 """Branches: solutions in their order over a parameter."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Literal, overload
@@ -24,7 +24,6 @@ from fecontact.bifurcation.continuation.problem import (
     KINDS,
     BranchStatus,
     ContinuationOptions,
-    Problem,
 )
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.core.checks import as_floats, require_kind
@@ -242,10 +241,9 @@ class Branch(Summarised):
         start = self.points[place]
         if start.parameter == value:
             return start
-        problem, u, tangent = self._restored(field, start)
         bounds = (-np.inf, float(value)) if start.parameter < value else (float(value), np.inf)
-        *_, found = continuation(problem, u, ContinuationOptions(bounds=bounds, locate=False),
-                                 tangent=sign * tangent)
+        *_, found = self._continued(field, start, sign, ContinuationOptions(bounds=bounds,
+                                                                            locate=False))
         if abs(found.parameter - value) > _REACHED * max(abs(value), abs(value - start.parameter)):
             raise AnalysisError(f"The solution at {self.parameter_name} = {value:.6g} was not "
                                 f"found from that at {start.parameter:.6g}; follow the branch in "
@@ -278,15 +276,20 @@ class Branch(Summarised):
                 found.append((index + 1, -1.0) if here.kind and not there.kind else (index, 1.0))
         return found
 
-    def _restored(self, field: VectorField, point: BranchPoint) -> tuple[Problem, Array, Array]:
-        """Problem, unknowns and tangent of a point."""
+    def _continued(
+        self, field: VectorField, point: BranchPoint, sign: float, options: ContinuationOptions
+    ) -> Iterable[BranchPoint]:
+        """Points from one of the branch on, forwards or backwards along it."""
         from fecontact.bifurcation.equilibria.problem import restored_equilibrium
-        from fecontact.bifurcation.orbits.restored import restored_orbit
+        from fecontact.bifurcation.orbits.discretisation import Request
+        from fecontact.bifurcation.orbits.discretisations import discretisation_of
 
-        if not point.is_orbit:
-            width = float(np.ptp(self.parameter)) or abs(point.parameter) or 1.0
-            return restored_equilibrium(field, point, width)
-        return restored_orbit(field, point)
+        if point.is_orbit:
+            request = Request(field, None, options, direction=sign)
+            return discretisation_of(point).ahead(point, request)
+        width = float(np.ptp(self.parameter)) or abs(point.parameter) or 1.0
+        problem, u, tangent = restored_equilibrium(field, point, width)
+        return continuation(problem, u, options, tangent=sign * tangent)
 
     def reversed(self) -> "Branch":
         """The branch in the other direction."""

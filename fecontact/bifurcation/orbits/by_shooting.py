@@ -1,5 +1,6 @@
 """Branches of orbits by shooting, from motions, Hopf points and period doublings."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -114,6 +115,10 @@ class ByShooting(ShotPoints, Discretisation):
             return branch
         return _noted(why, follow_orbits(problem, u, request.options, both=request.both,
                                          tangent=request.sign * tangent))
+
+    def ahead(self, point: BranchPoint, request: Request) -> Iterable[BranchPoint]:
+        """Points from one of a branch on; those of set-valued orbits go from event to event."""
+        return self.goes_on(point, request)
 
     def beyond(self, point: BranchPoint, request: Request) -> Branch:
         """The orbits of twice the period that begin at a period doubling found by shooting.

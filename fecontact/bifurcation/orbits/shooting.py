@@ -15,6 +15,7 @@ from fecontact.bifurcation.continuation.predictor import BENT, Predictor
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
 from fecontact.bifurcation.continuation.rounding import Rounding
 from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.harmonic.estimates import OBSERVED_SAMPLES, peaks
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
 from fecontact.bifurcation.orbit_methods import Shooting
@@ -40,7 +41,6 @@ from fecontact.integrate.solvers import AUTO, Solver
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
 
-_SAMPLES = 33  # of a segment, for the extremes of the states
 # Phase after the start of a segment below which the start itself is used.
 _AT_START = 1e-10
 # Part of a period over which rates of set-valued motions are taken.
@@ -61,7 +61,7 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
     the period of the forcing.
 
     The unknowns are ``u = [x_0 .. x_(K-1) (K d), T if it is unknown, parameter]``. Stored values
-    are those of collocation; minimum and maximum are taken from samples.
+    are those of collocation; minimum and maximum lie on parabolas through 512 samples a period.
 
     Attributes
     ----------
@@ -176,8 +176,7 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
         if not self.solver.smooth:
             self._require_return(u)
             linearisation.require_certain()
-        states = linearisation.paths.reshape(-1, self.field.dimension)
-        low, high = states.min(axis=0), states.max(axis=0)
+        low, high = linearisation.extremes
         self.noted[:] = [(u, (high - low) / 2.0)]
         return {"period": self.period(u), **linearisation.floquet.stored, "mesh": self.mesh,
                 "minimum": low, "maximum": high}
@@ -196,7 +195,8 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
         """At orbits that are homoclinic to a saddle, as far as numbers tell."""
         states = linearisation.paths.reshape(-1, self.field.dimension)
-        shares = np.repeat(np.diff(self.mesh) / _SAMPLES, _SAMPLES)
+        samples = linearisation.paths.shape[1]
+        shares = np.repeat(np.diff(self.mesh) / samples, samples)
         near = self.autonomous and near_saddle(self, self.parameters(u), states, shares, tangent)
         return BranchStatus.HOMOCLINIC if near else None
 
@@ -381,9 +381,20 @@ class ShootingLinearisation:
     @cached_property
     def paths(self) -> Array:
         """States (K, samples, d) of the segments, from start to end."""
-        times = np.linspace(self._times[:-1], self._times[1:], _SAMPLES, axis=1)
-        return run_from(self._system, times, self.problem.starts(self.u), self.problem.rtol,
-                        self.problem.solver)
+        problem = self.problem
+        steps = -(-OBSERVED_SAMPLES * problem.periods // (len(problem.mesh) - 1))
+        times = np.linspace(self._times[:-1], self._times[1:], steps + 1, axis=1)
+        return run_from(self._system, times, problem.starts(self.u), problem.rtol, problem.solver)
+
+    @property
+    def extremes(self) -> tuple[Array, Array]:
+        """Smallest and largest value (d,) of each state; of set-valued motions, which jump, those
+        of the samples themselves.
+        """
+        around = self.paths[:, :-1].reshape(-1, self.paths.shape[2])
+        if self.problem.solver.smooth:
+            return peaks(around.T)
+        return around.min(axis=0), around.max(axis=0)
 
     @cached_property
     def _ends(self) -> Array:
