@@ -234,7 +234,7 @@ def newton(
         try:
             step = solution(J[0], -f[0])
         except AnalysisError:
-            # As where a bristle comes to its limit ever more slowly.
+            # Bristles may approach their limit algebraically, with no linear rate.
             rests = (np.abs(f[0]) <= _AT_REST * np.abs(J[0]) @ np.abs(x)).all()
             return (x, J[0]) if rests else None
         size = float(np.linalg.norm(step))

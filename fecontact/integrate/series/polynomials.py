@@ -19,8 +19,7 @@ DEGREE = 23
 COEFFICIENTS = DEGREE + 1
 # Rows and columns of the workspace.
 WORKSPACE = (DEPTH + 2, COEFFICIENTS + 1)
-# What touches zero counts as positive, or as zero if it is below by more, relative to the largest
-# coefficient.
+# Part of the largest coefficient up to which a minimum below zero is rounding, and no zero.
 _ROUNDING = 1e-15
 
 # Matrix that makes Bernstein coefficients of coefficients of powers.
