@@ -108,11 +108,12 @@ def ensemble(
 ) -> Ensemble:
     """Run many systems or fields, or one from many initial states; keep states at a few times.
 
-    The results are those of :func:`fecontact.simulate`, but compiled solvers integrate no powers,
-    which limit no steps. Threads share the cores. On each, eight runs of plane systems of one node
-    and up to three modes, or two of each, go side by side: on level and even ground, with at most
-    160 internal variables per node, constant or harmonic excitation, no events, by Rodas5P, or
-    Auto at any tolerance. They differ by rounding from single runs without it.
+    The results agree with those of :func:`fecontact.simulate` within the tolerance: compiled
+    solvers do not integrate the powers here, whose errors limit the steps of ``simulate`` too.
+    Threads share the cores. On each, eight runs of plane systems of one node and up to three modes,
+    or two of each, go side by side: on level and even ground, with at most 160 internal variables
+    per node, constant or harmonic excitation, no events, by Rodas5P, or Auto at any tolerance. They
+    differ by rounding from runs of an ensemble that go one by one.
 
     Parameters
     ----------

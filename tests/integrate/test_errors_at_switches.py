@@ -6,11 +6,17 @@ import numpy as np
 import pytest
 from systems import mass_in_y
 
-from fecontact import Load, ensemble, simulate
+from fecontact import ContactSystem, Drive, Ground, Load, basis_from_matrices, ensemble, simulate
 from fecontact.integrate import Rodas5P
 from fecontact.integrate.rodas5p import driver
 from fecontact.integrate.trajectory import Status
-from fecontact.laws import Frictionless, LinearContact
+from fecontact.laws import (
+    ExponentialFriction,
+    Frictionless,
+    JenkinsFriction,
+    LinearContact,
+    RoughSurface,
+)
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 STEPS = Rodas5P()
@@ -70,6 +76,32 @@ def test_bounces_side_by_side():
         for states, steps in zip(runs.states, runs.steps, strict=True):
             assert states[:, 0] == pytest.approx(height(times, w, drop), abs=BOUNCES * drop)
             assert steps == pytest.approx(alone.statistics["steps"], rel=0.02)
+
+
+@pytest.mark.parametrize(("friction", "count", "rtol"), [
+    (ExponentialFriction(0.8, 0.5, decay=20.0, smoothing_slope=2e3), 1024, 1e-7),
+    (JenkinsFriction(2e4, 0.4), 1, 1e-6)])
+def test_corner_of_a_rough_surface(friction, count, rtol):
+    """Damping of a rough surface ceases to grow at the roughness height, within a step."""
+    rows = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+    basis = basis_from_matrices(2.0 * np.eye(2), np.zeros((2, 2)),
+                                {"contact": rows[None], "B": rows, "C": rows})
+    system = ContactSystem(
+        basis, RoughSurface(2e5, 1e-4, 50.0), friction, ground=Ground(speed=0.05), load=Load(20.0),
+        drive=Drive(stiffness_x=2e3, damping_x=1.0, amplitude_x=5e-3, stiffness_y=5e3,
+                    damping_y=3.0, amplitude_y=3e-3, frequency_hz=4.0))
+    generator = np.random.default_rng(5)
+    parts = np.column_stack([generator.uniform(0.5, 2.5, count), generator.uniform(-1, 1, count)])
+    if count == 1:
+        parts = np.array([[1.8, 1.8]])
+    starts = np.zeros((count, system.size))
+    starts[:, :2] = np.sqrt(2.0) * parts[:, :1] * [1e-3, 2e-3]
+    starts[:, 2] = np.sqrt(2.0) * parts[:, 1] * 0.02
+    times = np.linspace(0.0, 0.06, 4)
+    found, exact = (ensemble(system, times, initial=starts, rtol=tolerance, solver=STEPS).states
+                    for tolerance in (rtol, 1e-10))
+    sizes = np.ptp(exact, axis=(0, 1))[:4]
+    assert (np.abs(found - exact)[..., :4] / sizes).max() < 5.0 * rtol
 
 
 @pytest.mark.parametrize("number", [54, 55, 83])

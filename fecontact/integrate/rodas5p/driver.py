@@ -51,6 +51,7 @@ from fecontact.integrate.series.branches import chosen_series, from_state
 from fecontact.integrate.step_runs import complete, until_end
 from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Solution, Status
+from fecontact.laws.base import NormalLaw
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import (
     booked,
@@ -234,8 +235,10 @@ def control_for(
         slip_scale[nodes] = velocity_scale(law, system.force_scale)
         if work and not law.memory:
             stick_speed[nodes] = law.stick_velocity(nodes.stop - nodes.start)
-    for nodes, _, law in system.law_groups("normal"):
+    corner = np.full(system.basis.contact_nodes, np.inf)
+    for nodes, share, law in system.law_groups("normal"):
         depth[nodes] = law.penetration_scale
+        corner[nodes] = _corner(law, share)
         untouched[nodes] = law.untouched(nodes.stop - nodes.start)
     # Internal variables of friction decay without force: their nodes are always evaluated.
     untouched[system.arrays.memory[: len(untouched)] > 0] = -np.inf
@@ -246,7 +249,7 @@ def control_for(
     return Control(
         displacement_scale=system.penetration_scale / largest, memory_scale=system.memory_scales,
         slip_scale=slip_scale, slow=_SLOW * slip_scale, stick_speed=stick_speed, depth=depth,
-        largest=largest, untouched=untouched,
+        corner=corner, largest=largest, untouched=untouched,
         breaks=breaks(system, times)[1],
         levels=_levels(system), ground=bounds,
         rtol=float(rtol), slip_part=SLIP_PART, switch_part=SWITCH_PART,
@@ -265,6 +268,15 @@ def _levels(system: ContactSystem) -> Array:
     most = max(len(part) for part in parts)
     # Laws with fewer onsets repeat their first one.
     return np.hstack([np.vstack([part, *[part[:1]] * (most - len(part))]) for part in parts])
+
+
+def _corner(law: NormalLaw, share: Array) -> Array:
+    """Penetrations (n,) at which the last piece of a law begins, inf if its force begins there."""
+    pieces, onsets = law.pieces(share), law.onsets(len(share))
+    if pieces is None:
+        return np.full(len(share), np.inf)
+    last = pieces[:, -1, 0]
+    return np.where((last == onsets).any(axis=0), np.inf, last)
 
 
 def _ground_bounds(system: ContactSystem, times: Array) -> Array:

@@ -92,6 +92,18 @@ def switches(places, nodes, forces, signs):
     return some
 
 
+@routine
+def passes_corner(control, s, workspace):
+    """True if a penetration passes the corner of its normal law between the ends of a step."""
+    n, ends, some = len(s.gap), workspace.ends, False
+    for j in range(n):
+        level = s.gap[j] + control.corner[j]
+        before = ends[2, j] - ends[0, n + j] - level
+        after = ends[2, n + j] - workspace.nodes[0, n + j] - level
+        some = some | (before * after < 0.0)
+    return some
+
+
 @helper
 def set_stage_rate(problem, progress, workspace):
     """Fill ``workspace.base`` with the rates of ``stage``, by ``given`` and ``load``."""
@@ -107,7 +119,7 @@ def defect_error(step, G, problem, progress, workspace):
     The defect is v_1 - v_0 less the integral of the accelerations v' along the interpolant. A
     filter (I - h gamma J)^-1 damps its stiff part, as in error estimates of implicit Runge-Kutta
     methods. Unlike the difference of the embedded solutions, the defect holds for steps in which a
-    normal force begins or ends.
+    normal force begins, ends or has a corner.
 
     ``workspace.nodes``, ``workspace.given`` and ``workspace.load`` are overwritten.
     """

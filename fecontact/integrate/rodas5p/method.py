@@ -13,6 +13,7 @@ from fecontact.integrate.rodas5p import dynamics, stage_solver, state, tableau
 from fecontact.integrate.rodas5p.error_control import (
     defect_error,
     memory_error,
+    passes_corner,
     set_creeps,
     set_scale,
     set_signs,
@@ -254,7 +255,7 @@ def error_at_end(step, end, problem, progress, workspace):
 
 @routine
 def switch_error(step, G, end, problem, progress, workspace):
-    """Error of a step in which a normal force begins or ends; what is known of the end stays."""
+    """Error of a step in which a normal force switches; what is known of the end stays."""
     error = defect_error(step, G, problem, progress, workspace)
     if somewhere(error <= 1.0):
         last = min(step.target, step.latest)
@@ -319,8 +320,9 @@ def _attempt(step, last, smallest, data):
         if part < 1.0:
             numbers[MISSED] += 1.0
             return CUT, step.h * part
-        if switched or switches(len(problem.system.gap), problem.blocks.nodes, workspace.nodes[2],
-                                progress.signs):
+        switched |= switches(len(problem.system.gap), problem.blocks.nodes, workspace.nodes[2],
+                             progress.signs)
+        if switched or passes_corner(control, problem.system, workspace):
             error = max(error, switch_error(step, G, end, problem, progress, workspace))
         if error <= 1.0 and control.work:
             error = max(error, work_error(step, problem, progress, workspace))

@@ -49,6 +49,9 @@ class Control(NamedTuple):
         Width of the smoothing of friction, slip velocity at which slip is about to become stick,
         slip velocity below which the loss in friction counts as creep, penetration at which the
         normal law changes its character.
+    corner : (n,) array
+        Penetration at which the slope of the normal force jumps while the node touches; inf if
+        there is none.
     largest : (m,) array
         Largest motion of each mode at any point.
     untouched : (n,) array
@@ -86,6 +89,7 @@ class Control(NamedTuple):
     slow: Annotated[Array, NODES]
     stick_speed: Annotated[Array, NODES]
     depth: Annotated[Array, NODES]
+    corner: Annotated[Array, NODES]
     largest: Annotated[Array, MODES]
     untouched: Annotated[Array, NODES]
     breaks: Annotated[Array, ANY, 2]

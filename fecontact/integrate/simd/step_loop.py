@@ -22,7 +22,7 @@ from fecontact.integrate.polynomial_bounds import may_switch, needs_search
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import tableau
 from fecontact.integrate.rodas5p.dynamics import motion_given, next_kink, set_given
-from fecontact.integrate.rodas5p.error_control import sign_of, switches
+from fecontact.integrate.rodas5p.error_control import passes_corner, sign_of, switches
 from fecontact.integrate.rodas5p.method import error_at_end, solve, switch_error
 from fecontact.integrate.rodas5p.missed_contacts import first_missed_at
 from fecontact.integrate.rodas5p.sliders import (
@@ -389,8 +389,8 @@ def _attempt(active, b, runs, spare, begin, switch):
             if (doubt >> lane) & 1:
                 part = with_lane(part, lane, _missed_part(lane, step, b, spare))
         missed = part < 1.0
-    switched = (switched | switches(len(b.problem.system.gap), w.near.nodes, w.nodes[2],
-                                    mine.signs)) & passed & opposite(missed)
+    switched = (switched | switches(len(b.problem.system.gap), w.near.nodes, w.nodes[2], mine.signs)
+                | passes_corner(b.problem.control, b.problem.system, w)) & passed & opposite(missed)
     if somewhere(switched):
         found = switch_error(step, G, end, b.problem, mine, w)
         error = select(switched, max(found, error), error)
