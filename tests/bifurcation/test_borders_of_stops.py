@@ -24,9 +24,9 @@ from fecontact.bifurcation import (
     periodic_motion,
 )
 from fecontact.bifurcation.events.borders import border_of, nodes_of
-from fecontact.bifurcation.events.branches import orbit_from
 from fecontact.bifurcation.events.conditions import CROSSING, Condition
 from fecontact.bifurcation.events.phases import Strike
+from fecontact.bifurcation.events.starts import orbit_from
 from fecontact.integrate import SetValued
 from fecontact.integrate.nonsmooth.problem import STICK
 from fecontact.laws import ConstantFriction, LinearContact

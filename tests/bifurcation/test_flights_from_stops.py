@@ -33,9 +33,9 @@ from fecontact.bifurcation import (
     orbit_branch,
     periodic_motion,
 )
-from fecontact.bifurcation.events.branches import orbit_from
 from fecontact.bifurcation.events.conditions import DURATION, RATE, PhaseSequence, of_phase
 from fecontact.bifurcation.events.phases import Phase
+from fecontact.bifurcation.events.starts import orbit_from
 from fecontact.integrate import ContactEvents, SetValued
 from fecontact.laws import ConstantFriction, LinearContact
 

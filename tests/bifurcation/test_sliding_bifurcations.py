@@ -24,7 +24,7 @@ from fecontact.bifurcation import (
     orbit_branch,
     periodic_motion,
 )
-from fecontact.bifurcation.events.branches import orbit_from
+from fecontact.bifurcation.events.starts import orbit_from
 from fecontact.integrate import ContactEvents, SetValued
 from fecontact.io import read_branch, write_branch
 from fecontact.laws import ConstantFriction, ExponentialFriction, LinearContact, PrescribedForce

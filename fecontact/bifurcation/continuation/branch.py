@@ -1,6 +1,6 @@
 """Branches: solutions in their order over a parameter."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, Literal, overload
@@ -278,15 +278,13 @@ class Branch(Summarised):
 
     def _continued(
         self, field: VectorField, point: BranchPoint, sign: float, options: ContinuationOptions
-    ) -> Iterable[BranchPoint]:
+    ) -> Iterator[BranchPoint]:
         """Points from one of the branch on, forwards or backwards along it."""
         from fecontact.bifurcation.equilibria.problem import restored_equilibrium
-        from fecontact.bifurcation.orbits.discretisation import Request
-        from fecontact.bifurcation.orbits.discretisations import discretisation_of
+        from fecontact.bifurcation.orbits.restored import continued
 
         if point.is_orbit:
-            request = Request(field, None, options, direction=sign)
-            return discretisation_of(point).ahead(point, request)
+            return continued(field, point, sign, options)
         width = float(np.ptp(self.parameter)) or abs(point.parameter) or 1.0
         problem, u, tangent = restored_equilibrium(field, point, width)
         return continuation(problem, u, options, tangent=sign * tangent)

@@ -23,56 +23,20 @@ from fecontact.bifurcation.continuation.problem import BranchStatus, Continuatio
 from fecontact.bifurcation.continuation.pseudo_arclength import End
 from fecontact.bifurcation.events.borders import beyond, border_of, nodes_of
 from fecontact.bifurcation.events.conditions import DURATION, STRIKE, Condition
-from fecontact.bifurcation.events.orbit import EventOrbit, anchor
-from fecontact.bifurcation.events.phases import Motion
-from fecontact.bifurcation.events.tracing import sizes_without_contact, traced
-from fecontact.bifurcation.fields.contact_field import ContactField
+from fecontact.bifurcation.events.orbit import EventOrbit
+from fecontact.bifurcation.events.starts import as_shot
 from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
-from fecontact.integrate.solvers import SetValued
 
 # First steps beyond a border, in those of the branch, and the largest residual there.
 _BEYOND, FITS = (0.1, 0.01, 1e-3), 1e-5
 # Margin of a condition that counts as zero at a border, margin that is rounding, and largest number
 # of borders that are met at once.
 _NOTHING, _EQUAL, _DEPTH = 1e-5, 1e-8, 4
-# Ranges of the states below this part of the largest one are those of a system at rest.
-_STILL, _NONE = 1e-10, 1e-200
 # Most borders on one branch.
 _MOST = 40
 # Distance from a border within which turns of the branch belong to it.
 _BESIDE = 1e-3
-
-
-def orbit_from(
-    field: ContactField, values: Array, free: int, begin: float, start: Array, period: float,
-    periods: int, *, widths: Array, rtol: float, solver: SetValued,
-) -> tuple[EventOrbit, Array]:
-    """Problem and first guess from a state of a motion of this period.
-
-    ``widths`` (d + 1,) are the scales of states and parameter.
-
-    Raises
-    ------
-    AnalysisError
-        If the motion cannot be taken apart into phases; see
-        :func:`fecontact.bifurcation.events.tracing.traced`.
-    """
-    tolerance = max(1e-13, 1e-2 * rtol)
-
-    def moving(sizes: Array) -> Motion:
-        return Motion(field, values, free, solver, sizes, float(widths[-1]), period, tolerance)
-
-    sizes = widths[:-1]
-    if not sizes.max() > max(_STILL * np.abs(start).max(), _NONE):
-        sizes = sizes_without_contact(moving(np.ones(len(start))), begin, start, period)
-    scales, motion = np.concatenate([sizes, [period, widths[-1]]]), moving(sizes)
-    forced = field.forcing_period(values) is not None
-    found = traced(motion, begin, start, period, forced)
-    problem = EventOrbit(field, values.copy(), free, found.phases, solver, scales,
-                         found.margins, periods, rtol)
-    return problem, np.concatenate([found.starts.reshape(-1), found.durations,
-                                    found.begins[:1] if forced else [], [values[free]]])
 
 
 def followed(
@@ -134,7 +98,7 @@ def _side(
         found = [point for point in found if point is last or not _is_turn(problem, point, ends)]
         if not options.locate:
             found = [point for point in found if point.kind is None]
-        stored = [_reduced(problem, point) for point in found]
+        stored = [as_shot(problem, point) for point in found]
         if not ended:
             return [*points, *stored], End(piece.status if whole else BranchStatus.POINTS,
                                            piece.message)
@@ -257,25 +221,3 @@ def _starts(
             if np.isfinite(ahead).all():
                 yield problem, found[0], ahead / norm(problem, ahead)
                 return
-
-
-def _reduced(problem: EventOrbit, point: BranchPoint) -> BranchPoint:
-    """A point of a branch with unknowns and tangent as by shooting with one segment."""
-    u, along, d, K = point.u, point.tangent, problem.dimension, problem.count
-    i, after = anchor(problem, u)
-    begin, start, phase = float(problem.begins(u)[i]), problem.starts(u)[i], problem.phases[i]
-    states, moved = problem.motion(u).run(begin, np.array([after]), start, phase, True)
-    rates = problem.motion(u).observed_at(begin + after, states[-1], phase)[1]
-    taus = along[K * d : K * d + K]
-    if problem.forced:
-        begun = float(along[K * d + K] + taus[:i].sum())
-        whole = np.ceil(problem.begins(u)[0] / problem.period(u))
-        later = whole * taus.sum() - begun if after > 0.0 else 0.0
-    else:
-        begun, later = 0.0, 0.5 * taus[i]
-    ahead = (moved[:, :d] @ along[i * d : (i + 1) * d] + moved[:, d] * begun
-             + moved[:, d + 1] * along[-1] + rates * later)
-    period = [] if problem.forced else [problem.period(u)]
-    change = [] if problem.forced else [taus.sum()]
-    return replace(point, u=np.concatenate([states[-1], period, u[-1:]]),
-                   tangent=np.concatenate([ahead, change, along[-1:]]))

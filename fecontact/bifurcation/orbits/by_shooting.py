@@ -1,6 +1,5 @@
 """Branches of orbits by shooting, from motions, Hopf points and period doublings."""
 
-from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -116,10 +115,6 @@ class ByShooting(ShotPoints, Discretisation):
         return _noted(why, follow_orbits(problem, u, request.options, both=request.both,
                                          tangent=request.sign * tangent))
 
-    def ahead(self, point: BranchPoint, request: Request) -> Iterable[BranchPoint]:
-        """Points from one of a branch on; those of set-valued orbits go from event to event."""
-        return self.goes_on(point, request)
-
     def beyond(self, point: BranchPoint, request: Request) -> Branch:
         """The orbits of twice the period that begin at a period doubling found by shooting.
 
@@ -178,9 +173,6 @@ def _from_event_to_event(
 ) -> tuple[Branch | None, str]:
     """The branch of a set-valued orbit whose events are known; None for others, and why.
 
-    The others are orbits of time-stepping and of Poisson's impacts, without events though nothing
-    excites them, with chatter, or with compliant contacts that open.
-
     Raises
     ------
     AnalysisError
@@ -188,20 +180,12 @@ def _from_event_to_event(
     """
     if not isinstance(problem.solver, SetValued):
         return None, ""
-    from fecontact.bifurcation.events.branches import followed, orbit_from
-    from fecontact.integrate.nonsmooth.driver import by_events
+    from fecontact.bifurcation.events.branches import followed
+    from fecontact.bifurcation.events.starts import orbit_of
 
-    values, d, solver = problem.parameters(u), problem.field.dimension, problem.solver
-    if not by_events(problem.field.system(values), solver.method, solver.restitution,
-                     solver.impact_law, solver.static_coefficient):
-        return None, ""
-    try:
-        found = orbit_from(problem.field, values, problem.free, 0.0, problem.starts(u)[0].copy(),
-                           problem.period(u), problem.periods,
-                           widths=np.append(problem.scales[:d], problem.scales[-1]),
-                           rtol=problem.rtol, solver=problem.solver)
-    except AnalysisError as error:
-        return None, f"The runs of the orbit were differenced: {error}"
+    found, why = orbit_of(problem, u)
+    if found is None:
+        return None, why
     whole = replace(problem, limits=None).attributes()
     whole |= {"scales": found[0].scales, "method": replace(whole["method"], segments=1)}
     try:

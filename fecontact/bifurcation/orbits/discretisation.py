@@ -6,7 +6,7 @@ of them; :mod:`fecontact.bifurcation.orbits.discretisations` lists the methods.
 """
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -18,7 +18,6 @@ from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.heading import heading
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions
-from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.orbits import starts
 from fecontact.bifurcation.orbits.orbit_points import OrbitPoints
 from fecontact.bifurcation.orbits.restored import rescaled, restored_orbit
@@ -104,11 +103,6 @@ class Discretisation(OrbitPoints):
     @abstractmethod
     def goes_on(self, point: BranchPoint, request: Request) -> Branch:
         """Branch that continues from one of its own points."""
-
-    def ahead(self, point: BranchPoint, request: Request) -> Iterable[BranchPoint]:
-        """Points from one of a branch on, by its own equations as they are there."""
-        problem, u, tangent = restored_orbit(request.field, point)
-        return continuation(problem, u, request.options, tangent=request.sign * tangent)
 
     def require(self, field: VectorField) -> None:
         """Raise InputError for a field whose orbits the method cannot compute."""

@@ -1,6 +1,6 @@
 """Continuation problems of orbits, restored from points of branches."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -8,7 +8,8 @@ import numpy as np
 
 from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
 from fecontact.bifurcation.continuation.points import special_point
-from fecontact.bifurcation.continuation.problem import sizes_of
+from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of
+from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.problem import HarmonicProblem
 from fecontact.bifurcation.harmonic.starts import restored as restored_balance
@@ -81,6 +82,26 @@ def restored_orbit(
 ) -> tuple[Any, Array, Array]:
     """Problem, unknowns and tangent of an orbit, by its own method."""
     return _RESTORED[orbit_points_of(point)](field, point)
+
+
+def continued(
+    field: VectorField, point: BranchPoint, sign: float, options: ContinuationOptions
+) -> Iterator[BranchPoint]:
+    """Points from an orbit on, forward along its branch for sign 1 and back for -1.
+
+    Set-valued orbits go from event to event where that is possible, as their branches do.
+    """
+    problem, u, tangent = restored_orbit(field, point)
+    if isinstance(problem, ShootingProblem) and not problem.solver.smooth:
+        from fecontact.bifurcation.events.starts import as_shot, orbit_of
+
+        found, _ = orbit_of(problem, u)
+        if found is not None:
+            ahead = float(np.copysign(1.0, sign * tangent[-1]))
+            yield from (as_shot(found[0], each) for each in continuation(
+                *found, options, direction=ahead))
+            return
+    yield from continuation(problem, u, options, tangent=sign * tangent)
 
 
 def rescaled(problem: P, scales: ArrayLike | None, width: float | None) -> P:
