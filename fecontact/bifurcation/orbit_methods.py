@@ -7,6 +7,7 @@ import numpy as np
 
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.orbits.mesh import require_mesh, require_segments
+from fecontact.core.checks import require_rtol
 from fecontact.core.errors import InputError, require_positive
 from fecontact.integrate.solvers import AUTO, Solver, require_solver
 
@@ -98,7 +99,7 @@ class Shooting:
     def __post_init__(self) -> None:
         require_segments(self.segments)
         require_solver(self.solver, "derivatives")
-        require_positive("Shooting", rtol=self.rtol)
+        require_rtol(self.rtol, "Shooting: rtol")
         if self.derivative_rtol is not None:
             require_positive("Shooting", derivative_rtol=self.derivative_rtol)
 

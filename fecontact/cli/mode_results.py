@@ -1,5 +1,6 @@
 """Nonlinear modes of ``fecontact modes --nonlinear``: files, table and plots."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +35,9 @@ def follow_mode(
     if amplitudes is None:
         raise InputError("--nonlinear needs the smallest and largest amplitude of the mode in m; "
                          "give --amplitudes LOW HIGH.")
+    if not 0.0 < amplitudes[0] < amplitudes[1] < math.inf:
+        raise InputError(f"--amplitudes {amplitudes[0]:g} {amplitudes[1]:g} must be two amplitudes "
+                         f"above zero in m, the smaller one first.")
     from fecontact.bifurcation.modes_of_study import follow_mode as followed
     from fecontact.bifurcation.modes_of_study import unfinished
     from fecontact.bifurcation.responses import observed_point

@@ -9,7 +9,7 @@ import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import contact_field
 from fecontact.bifurcation.harmonic.engine_order import EngineOrder, WaveField
-from fecontact.bifurcation.harmonic.response import FrequencyResponse
+from fecontact.bifurcation.harmonic.response import FrequencyResponse, highest_harmonic
 from fecontact.core.files.atomic_write import write_text
 from fecontact.core.files.csv_text import csv_text
 from fecontact.output.files.branches import write_response
@@ -124,8 +124,7 @@ def _stability(point: "BranchPoint") -> str:
 
 
 def _third(response: FrequencyResponse, level: int) -> list[str]:
-    stored = response.branches[level].column("observed_harmonics").shape[1]
-    if 3 * int(response.branches[level].attributes["periods"]) >= stored:
+    if highest_harmonic(response.branches[level]) < 3:
         return [""] * len(response.branches[level])
     return [repr(float(one)) for one in np.abs(response.harmonic(3, level))]
 

@@ -250,3 +250,21 @@ def merged(given: object, by_name: Mapping[str, Any]) -> dict[str, Any]:
     """
     require_kind("with_", (Mapping, type(None)), changes=given)
     return {**(given or {}), **by_name}  # type: ignore[dict-item]
+
+
+def require_within(
+    owner: str, function: Callable[..., Any], arrays: str, *arguments: Any
+) -> None:
+    """Raise InputError if a function of the user, called in Python, reaches beyond its arrays.
+
+    Compiled code does not check indices. Whatever else is wrong with these arguments, such as a
+    division by zero, is no matter. ``arrays`` says what the arrays hold.
+    """
+    try:
+        with np.errstate(all="ignore"):
+            getattr(function, "py_func", function)(*arguments)
+    except IndexError as error:
+        raise InputError(f"{owner} {function.__name__} uses an entry beyond its arrays ({error}), "
+                         f"which hold {arrays}; give as many as it uses.") from None
+    except Exception:
+        return

@@ -1,16 +1,19 @@
-"""Python files of the user: laws, and functions of runs."""
+"""Python code of the user: files with laws and functions of runs, functions that make systems."""
 
 import importlib.util
+import inspect
 import re
 import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 from fecontact.core.checks import require_regular_file
 from fecontact.core.errors import InputError, nearest
+
+_System = TypeVar("_System")
 
 
 def user_module(file: str | Path, where: str = "") -> ModuleType:
@@ -61,6 +64,32 @@ def user_function(file: Path, name: str) -> Callable[[Any], float]:
     if not callable(function):
         raise InputError(f"{file} has no function '{name}'{nearest(name, vars(module))}.")
     return function
+
+
+def made_by(function: Callable[[_System, float], _System], system: _System,
+            value: float) -> _System:
+    """System that a function of the user makes from a system and a value.
+
+    Raises
+    ------
+    InputError
+        If the function takes other arguments, or returns something else.
+    """
+    name = getattr(function, "__name__", type(function).__name__)
+    try:
+        inspect.signature(function).bind(system, value)
+    except TypeError as error:
+        raise InputError(f"The function {name} must take two arguments, a system and a value "
+                         f"({error}).") from None
+    except ValueError:
+        # Some functions of C have no signature.
+        pass
+    made = function(system, value)
+    if not isinstance(made, type(system)):
+        raise InputError(f"The function {name} of a system and a value must return a "
+                         f"{type(system).__name__}, such as that of system.with_, not "
+                         f"{type(made).__name__}.")
+    return made
 
 
 def module_name(file: str | Path) -> str:

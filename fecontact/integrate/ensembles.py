@@ -109,11 +109,10 @@ def ensemble(
     """Run many systems or fields, or one from many initial states; keep states at a few times.
 
     The results agree with those of :func:`fecontact.simulate` within the tolerance: compiled
-    solvers do not integrate the powers here, whose errors limit the steps of ``simulate`` too.
-    Threads share the cores. On each, eight runs of plane systems of one node and up to three modes,
-    or two of each, go side by side: on level and even ground, with at most 160 internal variables
-    per node, constant or harmonic excitation, no events, by Rodas5P, or Auto at any tolerance. They
-    differ by rounding from runs of an ensemble that go one by one.
+    solvers integrate no powers here, whose errors limit its steps too. Threads share the cores. On
+    each, eight runs of plane systems of one node and up to three modes, or two of each, go side by
+    side, with the results of single ones up to rounding: on level and even ground, with at most 160
+    internal variables per node, constant or harmonic excitation, no events, by Rodas5P or Auto.
 
     Parameters
     ----------
@@ -351,6 +350,8 @@ def _members(
     sizes = {state_size(system) for system in members}
     if len(sizes) > 1:
         raise InputError(f"The states of all systems must have the same size, not {sorted(sizes)}.")
+    if not count:
+        raise InputError(f"initial = {text_of(initial)} holds no states; give one for each run.")
     if many is not None and len(many) != count:
         raise InputError(f"There are {len(many)} initial states for {count} systems.")
     # Times, states and the largest of what is derived from them.

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from fecontact.core.checks import require_flags
+from fecontact.core.checks import require_flags, require_within
 from fecontact.core.compiled import CompiledLaw, compile_law
 from fecontact.core.errors import InputError, choices, require_choice, require_finite
 from fecontact.core.types import Array
@@ -107,8 +107,18 @@ class Event:
                              f"numbers.")
 
     def row(self, system: ContactSystem | VectorField) -> Array:
-        """Parameters of the function for a system."""
-        return np.atleast_1d(np.array(self.parameters, dtype=float))
+        """Parameters of the function for a system.
+
+        Raises
+        ------
+        InputError
+            If the function uses states or parameters that there are not.
+        """
+        parameters, size = np.atleast_1d(np.array(self.parameters, dtype=float)), state_size(system)
+        require_within("Event: the function", self.kernel.python,
+                       f"states: {size}, parameters: {len(parameters)}", 1.0, np.ones(size),
+                       parameters)
+        return parameters
 
 
 @event

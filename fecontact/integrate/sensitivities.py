@@ -14,6 +14,7 @@ from fecontact.core.errors import AnalysisError, InputError, ModelWarning
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
+from fecontact.core.user_code import made_by
 from fecontact.integrate import step_loop
 from fecontact.integrate.derivative_check import doubts, perturbed_systems
 from fecontact.integrate.ensembles import Ensemble, ensemble
@@ -26,7 +27,7 @@ from fecontact.integrate.solvers import AUTO, CompiledSolver, Solver, require_so
 from fecontact.integrate.step_runs import ENDS, finish
 from fecontact.integrate.trajectory import Status
 from fecontact.system import columns
-from fecontact.system.contact_system import ContactSystem
+from fecontact.system.contact_system import PARTS, ContactSystem
 from fecontact.system.elastic_sliders import slider_counts
 
 EndsAt = Callable[[Array], Array]
@@ -362,11 +363,13 @@ def _function_of(
 ) -> tuple[Callable[[float], ContactSystem], float]:
     """The system as a function of the parameter, and its value."""
     if isinstance(parameter, str):
-        name, value = parameter, system.parameter(parameter)
+        name = parameter
+        value = getattr(system, name) if name in PARTS else system.parameter(name)
+        # A name that does not exist is an error of the system with another value.
         value = 0.0 if value is None else value
         if not isinstance(value, Real) or isinstance(value, bool):
-            raise InputError(f"parameter = {name!r} is {value!r}, not one number; give a function "
-                             f"and a value.")
+            raise InputError(f"parameter = {name!r} is {value!r}, not one number; give the dotted "
+                             f"name of a number, or a function and a value.")
         value = float(value)
 
         return (lambda at: system.with_(**{name: at})), value
@@ -375,7 +378,7 @@ def _function_of(
         raise InputError(f"parameter = {parameter!r} must be the dotted name of a number, or a "
                          f"function of a system and a value, and the value: (function, 0.5).")
     function, number = parameter
-    return (lambda at: function(system, at)), number
+    return (lambda at: made_by(function, system, at)), number
 
 
 def _deeper(above: ContactSystem, below: ContactSystem, times: Array, state: Array) -> float:

@@ -103,10 +103,14 @@ def smoothing_cost(
     before, after = _break_away(system, solver)
     what = ("a rigid stop in place of the compliant contact" if solver.restitution is not None
             else "friction without smoothing")
-    sentence = (f"Over {t_end:.4g} s {what} moves {places[row]} by {100.0 * difference:.2g} % of "
-                f"its amplitude {amplitudes[row]:.3g} m")
-    sentence += "." if solver.restitution is not None else (
-        f"; the smoothed contact breaks away at {before:.4g} F_N, not at {after:.4g} F_N.")
+    sentence = (f"In the second half of {t_end:.4g} s {what} moves {places[row]} by "
+                f"{100.0 * difference:.2g} % of its amplitude {amplitudes[row]:.3g} m")
+    if solver.restitution is None and f"{before:.4g}" == f"{after:.4g}":
+        sentence += f"; both break away at {after:.4g} F_N"
+    elif solver.restitution is None:
+        sentence += (f"; the smoothed contact breaks away at {before:.4g} F_N, not at "
+                     f"{after:.4g} F_N")
+    sentence += "."
     return SmoothingCost(difference, places[row], float(amplitudes[row]), before, after, sentence)
 
 

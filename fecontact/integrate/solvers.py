@@ -200,7 +200,8 @@ class SetValued(SetValuedOptions, Solver):
         all contact nodes, for each, or by the names of interfaces, ``{"stop": 0.5}``. Interfaces
         that are not named have 0.
     static_coefficient : float, (n,) sequence or mapping, optional
-        Limit of \|R\|/F in stick [-], given in the same ways; default that of the law.
+        Limit of \|R\|/F in stick [-], given in the same ways, at least that of the law, which is
+        the default.
     impact_law : 'newton' or 'poisson'
         Whether restitution is a ratio of velocities or of impulses. With friction, Newton's law
         gains energy in some impacts unless both coefficients are equal; the status of a run

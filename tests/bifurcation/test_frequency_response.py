@@ -24,13 +24,21 @@ from fecontact.bifurcation import (
     Collocation,
     ContinuationOptions,
     HarmonicBalance,
+    Shooting,
+    codim2_curve,
     contact_field,
     controlled_response,
     frequency_response,
     orbit_branch,
 )
 from fecontact.core.errors import AnalysisError, InputError
-from fecontact.laws import Harmonic, JenkinsFriction, LinearContact, PrescribedForce
+from fecontact.laws import (
+    ConstantFriction,
+    Harmonic,
+    JenkinsFriction,
+    LinearContact,
+    PrescribedForce,
+)
 from fecontact.system.model_limits import unresisted_motion
 
 
@@ -157,6 +165,8 @@ def test_picture_of_a_phase_that_changes_little_has_ticks(response):
     ({"levels": {"Q": [1.0]}}, "Q"),
     ({"observe": [1.0]}, "observe must hold 2 numbers"),
     ({"parameter": "X"}, "X"),
+    ({"levels": {"W": [1.0]}}, "levels are those of 'W', over which the response runs"),
+    ({"method": HarmonicBalance([0, 2])}, r"\[0, 2\] leave out all harmonics .*, \[1\]; add"),
     ({"start": 5.0}, "outside the bounds")])
 def test_bad_arguments(changes, told):
     given = {"parameter": "W", **changes}
@@ -164,10 +174,44 @@ def test_bad_arguments(changes, told):
         frequency_response(duffing(), (0.6, 1.8), **given)
 
 
+def test_a_fold_by_harmonic_balance_starts_no_curve_by_itself(response):
+    fold = response.branches[2].of_kind("fold")[0]
+    with pytest.raises(InputError, match=r"follow a branch from it by orbit_branch\(field, point"):
+        codim2_curve(duffing(), fold, "P", bounds={"W": (0.6, 1.8), "P": (0.1, 0.3)})
+
+
+@pytest.mark.parametrize(("bounds", "told"), [
+    (None, "bounds = None must be two finite values of 'drive.frequency_hz'"),
+    ((-0.1, 0.2), "bounds: drive.frequency_hz = -0.1 must be a finite number, zero or above")])
+def test_bad_bounds(bounds, told):
+    with pytest.raises(InputError, match=told):
+        frequency_response(jenkins_system(), bounds)
+
+
+@pytest.mark.parametrize("method", [HarmonicBalance(3), Collocation(12), Shooting()])
+def test_a_load_of_another_frequency_has_no_common_period(method):
+    """At 0.17 Hz the load of 0.11 Hz has one with the drive, but nowhere beside it."""
+    load = Load(forces=(PointLoad("B", "x", signal=Harmonic(0.1, 0.11)),))
+    system = jenkins_system().with_(friction=ConstantFriction(0.1, 10.0), load=load)
+    with pytest.raises(AnalysisError, match=r"9\.09091 s.* have no common multiple; choose"):
+        frequency_response(system, (0.17, 0.2), method=method)
+
+
+def test_levels_and_harmonics_that_a_response_lacks(response):
+    """Levels are those of three branches, of nine harmonics."""
+    for call in (response.peak, response.amplitude, response.peak_reached, response.phase):
+        with pytest.raises(InputError, match="level = 3 must be the number of one of its 3 levels"):
+            call(3)
+    for k in (10, -1):
+        with pytest.raises(InputError, match=f"k = {k} must be a whole number from 0 to 9"):
+            response.harmonic(k)
+
+
 def test_system_without_excitation_is_refused():
     system = impact_oscillator().with_(**{"drive.amplitude_y": 0.0})
-    with pytest.raises((InputError, AnalysisError), match=r"excite|period"):
-        frequency_response(system, (10.0, 11.0), observe=("B", "y"))
+    for method in (HarmonicBalance(), Shooting()):
+        with pytest.raises(InputError, match="frequency response needs a harmonic drive or load"):
+            frequency_response(system, (10.0, 11.0), observe=("B", "y"), method=method)
     assert contact_field(impact_oscillator(), ["drive.frequency_hz"]).dimension == 4
 
 

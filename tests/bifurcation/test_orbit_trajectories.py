@@ -167,7 +167,7 @@ def test_nonlinear_mode_by_the_command(cli, tmp_path, monkeypatch):
     for arguments, message in ((["--nonlinear", 1], "give --amplitudes LOW HIGH"),
                                (["--amplitudes", 1, 2], "add --nonlinear"),
                                (["--nonlinear", 7, "--amplitudes", 1e-5, 1e-3], "7"),
-                               (["--nonlinear", 1, "--amplitudes", 2, 1], "two amplitudes")):
+                               (["--nonlinear", 1, "--amplitudes", 2, 1], "2 1 must be two amp")):
         code, _, said = cli("modes", "block.toml", *arguments)
         assert code == 1
         assert message in said

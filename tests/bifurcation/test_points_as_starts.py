@@ -18,6 +18,7 @@ from fecontact.bifurcation import (
     PeriodicMotion,
     Shooting,
     equilibrium_branch,
+    observe,
     orbit_branch,
     vector_field,
 )
@@ -225,3 +226,8 @@ def test_motions_are_checked():
     with pytest.raises(InputError, match="parameter_values of the motion must be 2 numbers"):
         orbit_branch(vector_field(landau, {"r": 0.5, "w": 2.0}, 2),
                      PeriodicMotion([0.0, 1.0], np.eye(2), parameter_values=[1.0]), "r")
+
+
+def test_a_branch_of_another_field_is_not_observed(rest):
+    with pytest.raises(InputError, match="that of another field, of 2 states and the parameters"):
+        observe(two_mass_field(), rest, 0)

@@ -123,6 +123,26 @@ def test_kind_errors_of_functions():
 
     with pytest.raises(InputError, match=r"not one of the form f\(t, x, p, out\)"):
         vector_field(unusable, {}, 1)
+    with pytest.raises(InputError, match="period = None must be a finite number above zero"):
+        vector_field(forced, {"force": 1.0}, 1, period=lambda parameters: None)
+
+
+@pytest.mark.parametrize(("parameters", "states", "numbers"), [
+    ({"force": 1.0}, 1, "states: 1, parameters: 1"), ({"a": 1.0, "b": 1.0}, 2, "states: 2, par")])
+def test_functions_stay_within_their_arrays(parameters, states, numbers):
+    """Compiled code does not check indices."""
+    def beyond(t, x, p, out):
+        out[0] = p[1] * x[0]
+        out[1] = x[2] if states == 2 else 0.0
+
+    with pytest.raises(InputError, match=f"beyond its arrays .* which hold {numbers}"):
+        vector_field(beyond, parameters, states)
+
+    def rows_beyond(t, x, p, out):
+        out[states, 0] = 1.0
+
+    with pytest.raises(InputError, match=r"the jacobian rows_beyond uses an entry beyond"):
+        vector_field(forced, {"force": 1.0}, 1, jacobian=rows_beyond)
 
 
 # Contact systems -----------------------------------------------------------------------------

@@ -271,6 +271,13 @@ def test_kinds_and_functions_that_are_no_events_are_named():
     with pytest.raises(InputError, match=r"'event 0' is not a finite number before t = "):
         simulate(drop(), 1.0, initial=np.zeros(2), events=Event(root))
 
+    @event
+    def beyond(t, y, p):
+        return y[0] - p[3]
+
+    with pytest.raises(InputError, match=r"beyond .* states: 2, parameters: 1; give as many"):
+        simulate(drop(), 1.0, initial=np.zeros(2), events=Event(beyond, [1.0]))
+
 
 @pytest.mark.long
 def test_more_events_than_steps_of_a_piece(tmp_path, monkeypatch):

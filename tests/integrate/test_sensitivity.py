@@ -161,6 +161,11 @@ def test_bad_input():
     system = friction_oscillator(2)
     with pytest.raises(InputError, match=r"friction\.static_coefficient"):
         sensitivity(system, 0.1, parameter="friction.static_coeficient")
+    with pytest.raises(InputError, match=r"'drive' is Drive\(.*not one number; give the dotted"):
+        sensitivity(system, 0.1, parameter="drive")
+    for function in (lambda system: system, lambda system, value: None):
+        with pytest.raises(InputError, match="The function <lambda>"):
+            sensitivity(system, 0.1, parameter=(function, 1.0))
     with pytest.raises(InputError, match="rtol = 1"):
         sensitivity(system, 0.1, rtol=1.0)
     with pytest.raises(InputError, match="No parameter was named"):

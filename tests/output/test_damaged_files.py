@@ -35,6 +35,7 @@ from fecontact.io import (
     read_table,
     report,
     write_basis,
+    write_branch,
     write_branches,
     write_response,
 )
@@ -273,6 +274,14 @@ def test_a_file_of_branches_is_no_run(tmp_path):
     path = write_branches(tmp_path / "a.h5", {"a": Branch("p", points)}, system=system)
     with pytest.raises(InputError, match="holds branches but no run; read it with read_branches"):
         read_case(path)
+
+
+def test_a_file_of_one_branch_is_no_response(tmp_path):
+    points = tuple(BranchPoint(np.array([0.1 * k, 1.0 + k]), np.array([1.0, 0.0]),
+                               {"state": np.zeros(1)}) for k in range(2))
+    path = write_branch(tmp_path / "a.h5", Branch("p", points))
+    with pytest.raises(InputError, match="holds no 'branches', but 'branch'; read it with read_b"):
+        read_response(path)
 
 
 def test_a_damaged_basis_is_one_sentence(tmp_path):

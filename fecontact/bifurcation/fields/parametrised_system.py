@@ -21,6 +21,7 @@ from fecontact.core.checks import require_kind
 from fecontact.core.dotted_parameters import with_parameters
 from fecontact.core.errors import FecontactError, InputError
 from fecontact.core.types import Array
+from fecontact.core.user_code import made_by
 from fecontact.system.arrays import multilinear
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.nodes import SystemArrays
@@ -326,7 +327,7 @@ def _parameter(system: ContactSystem, name: str, given: Any) -> tuple[float, Set
         value, own = given
         if not isinstance(value, Real) or isinstance(value, bool):
             raise InputError(f"Parameter {name!r}: its value {value!r} must be a number.")
-        return float(value), own
+        return float(value), partial(made_by, own)
     if given is not None and (not isinstance(given, Real) or isinstance(given, bool)):
         raise InputError(f"Parameter {name!r} = {given!r} must be a number, None for the value "
                          f"that the system has, or a pair (value, function) of a function "

@@ -88,6 +88,11 @@ def start_of(
         ways.append(_from_run)
     failure: FecontactError = AnalysisError("No orbit was found to start from.")
     for begin in ends:
+        try:
+            require_period(wanted.at(begin))
+        except FecontactError as error:
+            failure = error
+            continue
         for way in ways:
             try:
                 return begin, *way(wanted.at(begin))
@@ -101,6 +106,13 @@ def start_of(
     raise failure
 
 
+def require_period(wanted: Forced) -> None:
+    """Raise an error unless something excites the system with a period."""
+    if wanted.field.forcing_period(wanted.values) is None:
+        raise InputError("Nothing excites the system with a period; a frequency response needs a "
+                         "harmonic drive or load.")
+
+
 def _problem(wanted: Forced) -> HarmonicProblem:
     """The problem with scales of the states that grow with the response."""
     field, values, free, method = wanted.field, wanted.values, wanted.free, wanted.method
@@ -108,18 +120,31 @@ def _problem(wanted: Forced) -> HarmonicProblem:
     scales[-1] = width_of(None, wanted.options, float(values[free]))
     problem = starts.problem_for(field, values, free, method, scales,
                                  limits=np.full(field.dimension, 1e4))
-    if problem.autonomous:
-        raise InputError("Nothing excites the system with a period; a frequency response needs a "
-                         "harmonic drive or load.")
+    require_period(wanted)
     scales[-2] = problem.period(values[[free]])
     if not np.isfinite(scales[-2]):
         raise InputError(f"At {wanted.name} = {values[free]:g} the excitation has no period.")
+    if method.orders is not None and not isinstance(field, WaveField):
+        _require_excited(problem, rest_state(field, values), method.orders)
     if isinstance(field, ContactField) and method.orders is not None:
         starts.require_mean(method, rest_state(field, values)[: problem.layout.displacements])
     if isinstance(field, ContactField) and problem.layout.memory:
         state = rest_state(field, values) if wanted.held is None else wanted.held
         problem = replace(problem, kept=problem.kept.left_by(state[None]))
     return problem
+
+
+def _require_excited(problem: HarmonicProblem, rest: Array, orders: tuple[int, ...]) -> None:
+    """Raise InputError if a list of harmonics has none of those that force a system at rest."""
+    values, N = problem.values, problem.samples
+    times = problem.period(values[[problem.free]]) * np.arange(N) / N
+    rates = problem.field.rates(times, np.tile(rest, (N, 1)), values)
+    sizes = np.abs(np.fft.rfft(rates, axis=0)).max(axis=1)
+    sizes[0] = 0.0
+    forced = np.flatnonzero(sizes > max(1e-9 * sizes.max(), 1e-12 * N * np.abs(rates).max()))
+    if len(forced) and not set(orders) & set(forced.tolist()):
+        raise InputError(f"HarmonicBalance: harmonics = {list(orders)} leave out all harmonics of "
+                         f"the excitation, {forced.tolist()[:9]}; add these.")
 
 
 def _from_rest(wanted: Forced) -> tuple[HarmonicProblem, Array]:

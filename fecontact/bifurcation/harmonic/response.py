@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from numbers import Real
+from numbers import Integral, Real
 from types import NoneType
 from typing import Any
 
@@ -23,7 +23,7 @@ from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches
 from fecontact.bifurcation.harmonic.engine_order import WaveField
 from fecontact.bifurcation.harmonic.estimates import observed_of_series
-from fecontact.bifurcation.harmonic.forced_starts import Forced, start_of
+from fecontact.bifurcation.harmonic.forced_starts import Forced, require_period, start_of
 from fecontact.bifurcation.harmonic.layout import Layout, layout_from, layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.stalled import stall_reason
@@ -34,7 +34,13 @@ from fecontact.bifurcation.orbits.from_run import periodic_motion
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.orbit_points import orbit_points_of
 from fecontact.core.checks import as_floats, require_kind
-from fecontact.core.errors import AnalysisError, FecontactError, InputError
+from fecontact.core.errors import (
+    AnalysisError,
+    FecontactError,
+    InputError,
+    require_not_negative,
+    shown,
+)
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
@@ -86,13 +92,31 @@ class FrequencyResponse(Summarised):
         """Name of the parameter over which the branches run."""
         return self.branches[0].parameter_name
 
+    def _branch(self, level: int) -> Branch:
+        """Branch of a level."""
+        count = len(self.branches)
+        if not (isinstance(level, Integral) and -count <= level < count):
+            raise InputError(f"FrequencyResponse: level = {shown(level)} must be the number of one "
+                             f"of its {count} levels, from 0 to {count - 1}.")
+        return self.branches[level]
+
     def amplitude(self, level: int = 0) -> Array:
         """Half the range (N,) of the observed quantity at the points of a branch."""
-        return np.asarray(self.branches[level].column("observed_amplitude"))
+        return np.asarray(self._branch(level).column("observed_amplitude"))
 
     def harmonic(self, k: int = 1, level: int = 0) -> ComplexArray:
-        """Complex amplitude (N,) of harmonic k of the excitation, x_k = Re(X_k exp(i k w t))."""
-        branch = self.branches[level]
+        """Complex amplitude (N,) of harmonic k of the excitation, x_k = Re(X_k exp(i k w t)).
+
+        Raises
+        ------
+        InputError
+            If the branch has fewer harmonics.
+        """
+        branch = self._branch(level)
+        most = highest_harmonic(branch)
+        if not (isinstance(k, Integral) and 0 <= k <= most):
+            raise InputError(f"FrequencyResponse.harmonic: k = {shown(k)} must be a whole number "
+                             f"from 0 to {most}, the highest harmonic of the response.")
         return np.asarray(branch.column("observed_harmonics")[
             :, k * int(branch.attributes["periods"])])
 
@@ -121,7 +145,7 @@ class FrequencyResponse(Summarised):
         if self.force_name is None:
             raise InputError("FrequencyResponse.force: amplitudes follow from a given force; those "
                              "of controlled_response are held.")
-        return np.asarray(self.branches[level].column(self.force_name))
+        return np.asarray(self._branch(level).column(self.force_name))
 
     def _gain(self, level: int) -> Array:
         """Amplitude (N,), over the level of the force where the amplitude is held."""
@@ -155,7 +179,7 @@ class FrequencyResponse(Summarised):
 
     def peak(self, level: int = 0) -> BranchPoint:
         """The point of largest amplitude of a branch, or of smallest force at a held one."""
-        return self.branches[level].points[int(np.argmax(self._gain(level)))]
+        return self._branch(level).points[int(np.argmax(self._gain(level)))]
 
     def peak_reached(self, level: int = 0) -> bool:
         """Whether the amplitude falls on both sides of the peak, and the branch is whole.
@@ -163,7 +187,7 @@ class FrequencyResponse(Summarised):
         Or the force rises. A branch that ends before its bound may have a larger peak beyond.
         Closed branches have no ends.
         """
-        branch, place = self.branches[level], int(np.argmax(self._gain(level)))
+        branch, place = self._branch(level), int(np.argmax(self._gain(level)))
         return branch.status is BranchStatus.CLOSED or (
             branch.status is BranchStatus.BOUND and 0 < place < len(branch) - 1)
 
@@ -190,6 +214,14 @@ class FrequencyResponse(Summarised):
                             f"stops before its bound")]
                   if rising else []),
                 ("ends", ", ".join(ends))]
+
+
+def highest_harmonic(branch: Branch) -> int:
+    """Highest harmonic of the excitation that the points of a branch of a response store."""
+    stored = branch.column("observed_harmonics").shape[1] - 1
+    if isinstance(branch.method, HarmonicBalance):
+        stored = min(stored, branch.method.highest)
+    return stored // int(branch.attributes["periods"])
 
 
 @one_blas_thread
@@ -263,6 +295,14 @@ def frequency_response(
         held = field.waves.state(field, held)
     row, observed = observed_row(field, observe)
     low, high = chosen.bounds
+    if level_name == name:
+        raise InputError(f"frequency_response: levels are those of {name!r}, over which the "
+                         f"response runs; give another parameter.")
+    if not np.isfinite(low if start is None else start):
+        raise InputError(f"frequency_response: bounds = {bounds!r} must be two finite values of "
+                         f"{name!r}, the smaller one first; the branch starts at the lower one.")
+    if name.endswith("frequency_hz"):
+        require_not_negative("frequency_response: bounds", **{name: low})
     first = inside(low if start is None else float(start), chosen)
     level = None if level_name is None else field.index(level_name)
     follow = branch_of_response if discretisation_by(how).finds_responses else _by_orbit_method
@@ -380,6 +420,7 @@ def _by_orbit_method(
     except FecontactError:
         if not isinstance(field, ContactField):
             raise
+        require_period(wanted.at(begin))
         there = wanted.at(begin).values
         motion = periodic_motion(field.system(there), longest_period=field.forcing_period(there),
                                  solver=solver)

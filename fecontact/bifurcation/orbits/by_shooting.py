@@ -27,6 +27,7 @@ from fecontact.bifurcation.orbits.shooting import (
     shooting_from,
 )
 from fecontact.bifurcation.orbits.starts import Begun, MotionStart, Start
+from fecontact.bifurcation.orbits.unknowns import by_differences
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.ties import first_largest
 from fecontact.core.types import Array
@@ -80,7 +81,8 @@ class ByShooting(ShotPoints, Discretisation):
         Raises
         ------
         AnalysisError
-            If Newton's method finds no orbit near the motion.
+            If Newton's method finds no orbit near the motion, or the excitation has no period at
+            values of the parameter beside it.
         """
         start = _to_fastest(start)
         found, u = start.on_mesh(*self.mesh(method))
@@ -90,6 +92,9 @@ class ByShooting(ShotPoints, Discretisation):
         if branch is not None:
             return branch
         stepping = _of_stepping(problem, start.values)
+        if not problem.autonomous:
+            # An excitation without a period beside this value is no matter of Newton's method.
+            by_differences(problem.period, u)
         try:
             branch = follow_orbits(problem, u, request.options, **how)
         except (AnalysisError, InputError) as error:

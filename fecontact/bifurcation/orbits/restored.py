@@ -42,7 +42,9 @@ def restored(
     """
     known = point.branch.attributes
     if holder_of(point) is not BY_COLLOCATION:
-        raise InputError(f"{point.place} is no periodic orbit by collocation.")
+        raise InputError(f"{point.place} is no periodic orbit by collocation; follow a branch from "
+                         f"it by orbit_branch(field, point, method=Collocation()), and take a "
+                         f"point of that.")
     values, free = point.parameter_values(field), field.index(point.branch.parameter_name)
     mesh, degree, d = np.asarray(point.values["mesh"]), point.branch.method.degree, field.dimension
     nodes = point.u[: (len(mesh) - 1) * degree * d].reshape(-1, d).copy()

@@ -13,7 +13,7 @@ from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.orbits.orbit_points import orbit_points_of
 from fecontact.bifurcation.tori.motion import torus_motion
 from fecontact.core.checks import as_floats, require_kind
-from fecontact.core.errors import InputError, shown
+from fecontact.core.errors import InputError, choices, shown
 from fecontact.core.types import Array, ArrayLike
 from fecontact.reduction.modal_basis import Component
 from fecontact.system.fields.vector_field import VectorField, require_field
@@ -116,10 +116,11 @@ def observe(
     Raises
     ------
     InputError
-        If there is no such point.
+        If there is no such point, or the branch is that of another field.
     """
     require_kind("observe", ContactField, field=field)
     require_kind("observe", Branch, branch=branch)
+    _require_own(field, branch)
     row = field.displacement_row(point, component)
     points = []
     for one in branch.points:
@@ -131,6 +132,17 @@ def observe(
     unit = "rad" if component.startswith("phi") else "m"
     return replace(branch, points=tuple(points), attributes={
         **branch.attributes, "observed_label": f"displacement {component} of {where} [{unit}]"})
+
+
+def _require_own(field: ContactField, branch: Branch) -> None:
+    """Raise InputError if states or parameters show that a branch is that of another field."""
+    known = branch.attributes
+    states = len(known.get("state_names", field.state_names))
+    names = [str(name) for name in known.get("parameter_names", field.parameters)]
+    if states != field.dimension or not set(names) <= set(field.parameters):
+        raise InputError(f"observe: the branch is that of another field, of {states} states and "
+                         f"the parameters {choices(names)}, not of {field.dimension} and "
+                         f"{choices(field.parameters)}; give the field of the branch.")
 
 
 def _range(

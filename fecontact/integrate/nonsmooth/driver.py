@@ -29,6 +29,7 @@ from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import FrictionLaw
 from fecontact.laws.friction.stribeck import Frictionless
 from fecontact.laws.friction_curve import CREEP, STEEP
+from fecontact.laws.friction_curve import static_coefficient as coefficient_at_rest
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.loads import work_of_loads
 from fecontact.system.powers import POWER_COUNT
@@ -177,9 +178,10 @@ def nonsmooth_problem(
     ground = system.ground
     wave = ground.shortest_wavelength if ground.wavy else None
     plane = system.basis.dimension == 2
+    static = node_values("static_coefficient", static_coefficient, system.basis, -1.0)
+    _require_static(system, static)
     problem = kinds.NonsmoothProblem(
-        arrays, node_values("static_coefficient", static_coefficient, system.basis, -1.0), cluster,
-        rows, sliding, 1e-4 * longest, int(restitution is not None),
+        arrays, static, cluster, rows, sliding, 1e-4 * longest, int(restitution is not None),
         node_values("restitution", restitution, system.basis, 0.0),
         _of_clusters(node_values("tangential_restitution", tangential, system.basis, 0.0), cluster),
         0,
@@ -200,6 +202,22 @@ def nonsmooth_problem(
         if plane:
             _require_independence(arrays.rows[:, 1], rows[rubbing])
     return problem, rubbing
+
+
+def _require_static(system: ContactSystem, static: Array) -> None:
+    """Raise InputError unless static coefficients (n,), if given, are at least those of slip."""
+    given = static >= 0.0
+    if not given.any():
+        return
+    slipping = np.empty(len(static))
+    for nodes, _, law in system.law_groups("friction"):
+        slipping[nodes] = coefficient_at_rest(law, nodes.stop - nodes.start)
+    below = np.flatnonzero(given & (static < (1.0 - 1e-9) * slipping))
+    if len(below):
+        j = below[0]
+        raise InputError(f"SetValued: static_coefficient = {static[j]:g} of contact node {j} must "
+                         f"be at least {slipping[j]:.6g}, the coefficient at which its friction "
+                         f"law begins to slip; give more, or leave it out.")
 
 
 def by_events(

@@ -101,6 +101,11 @@ def new_file(path: str | Path) -> Iterator[Any]:
         check()
 
 
+# Functions that read files with such a group.
+_READERS = {"branches": "read_branches", "branch": "read_branch", "wear": "read_wear",
+            "run": "read_run", "trajectory": "read_case", "basis": "read_basis"}
+
+
 @contextmanager
 def open_file(path: str | Path, group: str) -> Iterator[Any]:
     """Open an HDF5 file for reading; it must contain ``group``.
@@ -119,6 +124,10 @@ def open_file(path: str | Path, group: str) -> Iterator[Any]:
         file = open_hdf5(path)
     with reading(path), file:
         if group not in file:
+            for other, reader in _READERS.items():
+                if other in file:
+                    raise InputError(f"{path} holds no '{group}', but '{other}'; read it with "
+                                     f"{reader}.")
             raise InputError(f"{path} was not written by fecontact: it has no group '{group}'.")
         yield file
 

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from fecontact.core.checks import as_count, as_floats, as_texts, require_kind
+from fecontact.core.checks import as_count, as_floats, as_texts, require_kind, require_within
 from fecontact.core.compiled import CompiledLaw, compile_law
 from fecontact.core.errors import (
     AnalysisError,
@@ -191,7 +191,9 @@ class FunctionField(VectorField):
         """Period as the user gives it [s]; None where f does not depend on t."""
         if self._period is None:
             return None
-        return float(self._period(dict(zip(self.parameters, values.tolist(), strict=True))))
+        period = self._period(dict(zip(self.parameters, values.tolist(), strict=True)))
+        require_positive("The function given as period of a vector field", period=period)
+        return float(period)
 
     def state_scales(self, values: Array) -> Array:
         """Typical sizes (d,) as the user gives them."""
@@ -242,7 +244,8 @@ def vector_field(
     Raises
     ------
     InputError
-        If the function cannot be compiled, or does not allow the differentiation asked for.
+        If the function cannot be compiled, uses states or parameters that there are not, or does
+        not allow the differentiation asked for.
         With 'complex', derivatives raise :class:`AnalysisError` where it turns out wrong.
     """
     require_choice("vector_field", "differentiation", differentiation, _WAYS)
@@ -264,6 +267,13 @@ def vector_field(
     given = None if jacobian is None else compile_law(kernels.JACOBIAN, _FORM, jacobian)
     if given is not None:
         _require_compiled(given, "jacobian")
+    values, d = np.array(list(parameters.values()), dtype=float), len(names)
+    for name, compiled, shape in (("function", rates, (d,)), ("jacobian", given, (d, d))):
+        if compiled is not None:
+            for x in (typical.copy(), -typical):
+                require_within(f"vector_field: the {name}", compiled.python,
+                               f"states: {d}, parameters: {len(values)}", 1.0, x, values,
+                               np.zeros(shape))
     required = differentiation == "complex"
     complex_rates = None
     if differentiation != "differences":

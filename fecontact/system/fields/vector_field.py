@@ -180,10 +180,18 @@ class VectorField(Summarised, ABC):
         return names[self.index(name)]
 
     def values_with(self, **changes: float) -> Array:
-        """Parameter values (k,): the base values with some changed by name."""
+        """Parameter values (k,): the base values with some changed by name.
+
+        Raises
+        ------
+        InputError
+            If there is no parameter of such a name, or a value is no finite number.
+        """
         values = self.values
         for name, value in changes.items():
-            values[self.index(name)] = value
+            place = self.index(name)
+            require_finite("The vector field", **{name: value})
+            values[place] = value
         return values
 
 
