@@ -14,6 +14,7 @@ from fecontact import (
     ElasticBody,
     Load,
     PointLoad,
+    basis_from_matrices,
     generate,
     io,
     modal_basis,
@@ -21,6 +22,7 @@ from fecontact import (
     simulate,
 )
 from fecontact.bifurcation import (
+    BranchStatus,
     Collocation,
     ContinuationOptions,
     HarmonicBalance,
@@ -34,6 +36,7 @@ from fecontact.bifurcation import (
 from fecontact.core.errors import AnalysisError, InputError
 from fecontact.laws import (
     ConstantFriction,
+    Frictionless,
     Harmonic,
     JenkinsFriction,
     LinearContact,
@@ -45,6 +48,29 @@ from fecontact.system.model_limits import unresisted_motion
 @pytest.fixture(scope="module")
 def response():
     return frequency_response(duffing(), (0.6, 1.8), "W", levels={"P": [0.02, 0.1, 0.18]})
+
+
+@pytest.mark.parametrize("method", [Collocation(intervals=10), Shooting(1)])
+def test_a_response_over_an_amplitude_goes_through_zero(method):
+    """A linear oscillator: amplitudes are those at one newton times the force."""
+    system = ContactSystem(
+        basis_from_matrices([[1.0]], [[1.0]], {"contact": [[[1.0], [0.0], [0.0]]],
+                                               "B": [[1.0], [0.0], [0.0]]}, damping=[[0.2]]),
+        normal=PrescribedForce(1.0), friction=Frictionless(),
+        load=Load(forces=(PointLoad("B", "x", signal=Harmonic(1.0, 2.0 / TURN)),)))
+    name = "load.forces.0.signal.amplitude"
+    for low in (0.0, -1.0):
+        response = frequency_response(system, (low, 1.0), name, method=method)
+        branch, = response.branches
+        assert branch.status is BranchStatus.BOUND
+        ends = branch.parameter[[0, -1]]
+        assert sorted(ends) == pytest.approx([low, 1.0], abs=0.0)
+        assert response.amplitude() == pytest.approx(
+            np.abs(branch.parameter) / abs(1.0 - 4.0 + 0.4j), rel=2e-5, abs=1e-12)
+    found = contact_field(system, name)
+    motion = branch.points[-1].orbit(found)
+    zero = orbit_branch(found, motion, method=method, bounds=(0.0, 1.0), direction=-1.0).points[-1]
+    assert orbit_branch(found, zero, bounds=(-1.0, 0.0), direction=1.0).parameter[-1] == -1.0
 
 
 def test_levels_of_the_duffing_oscillator(response):

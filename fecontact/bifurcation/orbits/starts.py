@@ -21,6 +21,7 @@ from fecontact.bifurcation.orbits.mesh import (
     require_mesh,
 )
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
+from fecontact.bifurcation.orbits.unknowns import forcing_period
 from fecontact.core.errors import AnalysisError, InputError, require_positive
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField
@@ -113,7 +114,7 @@ class MotionStart:
         if x.shape[1] != field.dimension or len(t) < 5:
             raise InputError(f"An orbit of this field needs times (k,) and states (k, "
                              f"{field.dimension}), k at least 5, not {t.shape} and {x.shape}.")
-        forcing = field.forcing_period(self.values)
+        forcing = forcing_period(field, self.values, self.free)
         if forcing is not None:
             T = motion.periods * forcing
         else:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
 
@@ -30,6 +31,21 @@ def by_differences(
     """Derivative of a function of the unknowns to one of them, by central differences."""
     more, less = beside(u, place, least)
     return np.asarray((function(more) - function(less)) / (more[place] - less[place]))
+
+
+def forcing_period(field: VectorField, values: Array, free: int) -> float | None:
+    """Period of the forcing [s], None for an autonomous field.
+
+    Where the free parameter is an amplitude of zero, nothing excites the system: the period is that
+    of values beside it, if these have the same one.
+    """
+    found = field.forcing_period(values)
+    if found is not None:
+        return found
+    step = np.zeros_like(values)
+    step[free] = _DIFFERENCE * max(abs(float(values[free])), 1e-3)
+    near, farther = (field.forcing_period(values + part * step) for part in (1.0, 2.0))
+    return near if near == farther else None
 
 
 class FreeParameters:
@@ -74,7 +90,7 @@ class OrbitUnknowns(FreeParameters):
     @cached_property
     def autonomous(self) -> bool:
         """Whether the period is an unknown."""
-        return self.field.forcing_period(self.values) is None
+        return forcing_period(self.field, self.values, self.free) is None
 
     @cached_property
     def common(self) -> int:
@@ -82,9 +98,18 @@ class OrbitUnknowns(FreeParameters):
         return len(self.active) + self.autonomous
 
     def period(self, u: Array) -> float:
-        """Period T [s] of the orbit."""
+        """Period T [s] of the orbit.
+
+        Raises
+        ------
+        AnalysisError
+            If nothing excites the system there with a period.
+        """
         if self.autonomous:
             return float(u[-self.common])
-        given = self.field.forcing_period(self.parameters(u))
-        assert given is not None
+        given = forcing_period(self.field, self.parameters(u), self.free)
+        if given is None:
+            raise AnalysisError(f"Nothing excites the system with a period at "
+                                f"{self.parameter_name} = {u[-1]:.6g}; choose bounds that leave "
+                                f"out this value.")
         return self.periods * given
