@@ -9,7 +9,7 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.points import FoldPoint, special_point
 from fecontact.bifurcation.continuation.problem import ContinuationOptions
-from fecontact.bifurcation.orbits.branches import method_of_several, orbit_branch
+from fecontact.bifurcation.orbits.branches import based, method_of_several, orbit_branch
 from fecontact.bifurcation.orbits.curves.resonant import (
     AWAY,
     StrongResonance,
@@ -139,6 +139,7 @@ def _followed(
     assert motion.parameter_values is not None
     value = float(motion.parameter_values[orbit.field.index(name)])
     return orbit_branch(
-        orbit.field, motion, name, method=method_of_several(at), options=options,
+        based(orbit.field, motion.parameter_values), motion, name,
+        method=method_of_several(at), options=options,
         scales=orbit.scales[: orbit.field.dimension], width=width,
         bounds=(value - _ABOUT * width, value + _ABOUT * width), both=True)

@@ -15,7 +15,7 @@ from fecontact.bifurcation.continuation.problem import ContinuationOptions, opti
 from fecontact.bifurcation.continuation.rounding import Rounding
 from fecontact.bifurcation.orbit_methods import Collocation, Method
 from fecontact.bifurcation.orbits import starts
-from fecontact.bifurcation.orbits.branches import as_motion
+from fecontact.bifurcation.orbits.branches import as_motion, values_of
 from fecontact.bifurcation.orbits.discretisations import DISCRETISATIONS, discretisation_by
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.multiplier_rounding import MultiplierRounding
@@ -183,7 +183,7 @@ def orbit_family(
         return _stays(field, free, first_that_goes(
             begun, lambda found: _followed(found[0], chosen, how, found[1])))
     motion = as_motion(start)
-    values = field.values if motion.parameter_values is None else motion.parameter_values.copy()
+    values = values_of(motion, field, free, chosen)
     sizes, limits = sizes_of(scales, motion.amplitudes + 1e-300)
     given = starts.MotionStart(field, values, free, replace(motion, periods=1),
                                np.append(sizes, 1.0))

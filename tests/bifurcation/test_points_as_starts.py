@@ -14,12 +14,14 @@ from fecontact.bifurcation import (
     BranchStatus,
     Collocation,
     ContinuationOptions,
+    HarmonicBalance,
     HopfPoint,
     PeriodicMotion,
     Shooting,
     equilibrium_branch,
     observe,
     orbit_branch,
+    periodic_motion,
     vector_field,
 )
 from fecontact.io import read_branch, write_branch
@@ -218,6 +220,24 @@ def test_shooting_goes_on_and_is_solved_at_a_value():
     other = orbit_branch(field, found, method=Collocation(intervals=100), options=few,
                          bounds=(5.9, 6.3))
     assert other.points[0].values["period"] == pytest.approx(wanted.values["period"], rel=1e-7)
+
+
+def test_a_motion_gives_the_value_of_the_free_parameter_alone():
+    """x'' + x'/5 + x = a cos(w t), from the motion with another a and w."""
+    def forced(t, x, p, out):
+        out[0] = x[1]
+        out[1] = -0.2 * x[1] - x[0] + p[0] * np.cos(p[1] * t)
+
+    field = vector_field(forced, {"a": 0.5, "w": 3.0}, ["x", "v"],
+                         period=lambda p: 2.0 * np.pi / p["w"])
+    motion = periodic_motion(field.with_(a=0.1, w=2.0), initial=[0.0, 0.0])
+    branch = orbit_branch(field, motion, "w", bounds=(1.5, 2.5), method=HarmonicBalance(3))
+    first = branch.points[0]
+    assert first.parameter_values(field) == pytest.approx([0.5, 2.0])
+    assert first.values["maximum"][0] == pytest.approx(0.5 / abs(1.0 - 4.0 + 0.4j), rel=1e-8)
+    # A point of a branch keeps all its values.
+    over = orbit_branch(field, first, "a", bounds=(0.4, 0.6)).points[0]
+    assert over.parameter_values(field) == pytest.approx([0.5, 2.0])
 
 
 def test_motions_are_checked():

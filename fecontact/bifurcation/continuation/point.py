@@ -238,8 +238,7 @@ class BranchPoint(Summarised):
         ----------
         field : VectorField or ContactSystem, optional
             Field or system of the branch; orbits found by shooting are run again and need it.
-            With it the motion knows its parameter values and the names of its states, and can
-            start a branch over another parameter.
+            With it the motion knows its parameter values and the names of its states.
         samples : int
             Number of times; orbits by shooting may have some more.
 

@@ -28,7 +28,7 @@ from fecontact.bifurcation.harmonic.layout import Layout, layout_from, layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.stalled import stall_reason
 from fecontact.bifurcation.orbit_methods import Method
-from fecontact.bifurcation.orbits.branches import orbit_branch
+from fecontact.bifurcation.orbits.branches import based, orbit_branch
 from fecontact.bifurcation.orbits.discretisations import DISCRETISATIONS, discretisation_by
 from fecontact.bifurcation.orbits.from_run import periodic_motion
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
@@ -421,12 +421,12 @@ def _by_orbit_method(
         if not isinstance(field, ContactField):
             raise
         require_period(wanted.at(begin))
-        there = wanted.at(begin).values
-        motion = periodic_motion(field.system(there), longest_period=field.forcing_period(there),
+        values = wanted.at(begin).values
+        motion = periodic_motion(field.system(values), longest_period=field.forcing_period(values),
                                  solver=solver)
-    motion = replace(motion, parameter_values=wanted.at(begin).values)
+    there = based(field, wanted.at(begin).values)
     try:
-        branch = orbit_branch(field, motion, wanted.name, method=wanted.method, options=options,
+        branch = orbit_branch(there, motion, wanted.name, method=wanted.method, options=options,
                               direction=_inwards(begin, options), both=both)
     except AnalysisError as error:
         if not layout_of(field).memory:

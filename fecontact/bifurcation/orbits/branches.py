@@ -72,11 +72,12 @@ def orbit_branch(
     Parameters
     ----------
     field : VectorField
-        The system; that of the branch if ``start`` is a point of one.
+        The system; that of the branch if ``start`` is a point of one. Parameters have its base
+        values, at points of branches those of the branch.
     start : BranchPoint, PeriodicMotion, Trajectory, FieldRun or (times, states)
         A Hopf point of equilibria; a period doubling or branch point of orbits; a resonance 1:3 or
         1:4 of a curve; any other point of a branch of orbits, to continue it; or a steady periodic
-        motion.
+        motion. If the motion knows the value of the parameter that varies, the branch begins there.
     parameter : str, optional
         The parameter to vary; by default that of the point, or the only one of the field.
     method : Collocation, Shooting or HarmonicBalance, optional
@@ -135,7 +136,8 @@ def orbit_branch(
     if name == known:
         direction = direction * float(np.copysign(1.0, start.tangent[-1]))
     return _from_motion(start.orbit(field), name, replace(
-        request, method=method or start.method, direction=direction))
+        request, field=based(field, start.parameter_values(field)),
+        method=method or start.method, direction=direction))
 
 
 def as_motion(start: PeriodicMotion | Trajectory | FieldRun | tuple[Any, ...]) -> PeriodicMotion:
@@ -184,13 +186,20 @@ def _from_hopf(point: HopfPoint, request: Request) -> Branch:
 def values_of(
     motion: PeriodicMotion, field: VectorField, free: int, options: ContinuationOptions
 ) -> Array:
-    """Parameter values (k,) of a motion, by default those of the field, the free one in bounds."""
-    given = field.values if motion.parameter_values is None else motion.parameter_values.copy()
-    if given.shape != field.values.shape:
-        raise InputError(f"parameter_values of the motion must be {len(field.values)} numbers, one "
-                         f"for each parameter of the field, not of shape {given.shape}.")
+    """Parameter values (k,) of the field, the free one that of a motion which has it, in bounds."""
+    given, known = field.values, motion.parameter_values
+    if known is not None:
+        if known.shape != given.shape:
+            raise InputError(f"parameter_values of the motion must be {len(given)} numbers, one "
+                             f"for each parameter of the field, not of shape {known.shape}.")
+        given[free] = known[free]
     given[free] = inside(float(given[free]), options)
     return given
+
+
+def based(field: VectorField, values: Array) -> VectorField:
+    """The field with these base values (k,)."""
+    return field.with_(dict(zip(field.parameters, values.tolist(), strict=True)))
 
 
 def _from_motion(motion: PeriodicMotion, parameter: str, request: Request) -> Branch:
@@ -216,7 +225,9 @@ def _around(point: BranchPoint, name: str, request: Request) -> Branch:
 
     def beside(half: Request, away: float) -> Branch:
         motion = of_several(at, half.sign * away * np.eye(2)[place])
-        branch = _from_motion(motion, name, half)
+        assert motion.parameter_values is not None
+        branch = _from_motion(motion, name, replace(
+            half, field=based(half.field, motion.parameter_values)))
         if is_single(branch.points[0], at.order):
             raise AnalysisError(f"{point.place}: no orbit of {at.order} periods was found there.")
         return branch

@@ -44,7 +44,8 @@ class PeriodicMotion(Summarised):
     periods : int
         Number of excitation periods in one period of the motion; 1 without excitation.
     parameter_values : (k,) sequence, optional
-        Parameter values of the field for this motion; by default its base values.
+        Parameter values of the field for this motion; by default its base values. A branch begins
+        at the one of the parameter that varies; the others are those of the field that it is given.
     state_names : sequence of str
         Names (d,) of the states, for plots; empty where they have none.
 

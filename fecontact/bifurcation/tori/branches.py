@@ -70,6 +70,8 @@ def torus_branch(
     start : BranchPoint, PeriodicMotion, Trajectory, FieldRun or (times, states)
         A Neimark-Sacker point of orbits by any method; a point of a branch of tori; a steady
         quasi-periodic run; with ``second`` also an orbit, as one without the second excitation.
+        Of orbits and runs the free parameter begins at their value, if they know it, and at a point
+        of a branch of orbits also the parameter of that branch; others have the field's values.
     parameter : str, optional
         The parameter to vary; by default that of the point, or the only one of the field.
     second : str or SecondExcitation, optional
@@ -116,7 +118,9 @@ def torus_branch(
         raise InputError(f"{start.place} has no tori to follow: take a point of the kind "
                          f"'Neimark-Sacker', one of a branch of tori, or a run.")
     if isinstance(start, BranchPoint):
-        start = start.orbit(field, _SAMPLES)
+        own_name = start.branch.parameter_name
+        field = field.with_({own_name: float(start.parameter_values(field)[field.index(own_name)])})
+        excitation, start = excitation_of(field, second), start.orbit(field, _SAMPLES)
     motion = as_motion(start)
     if motion.period is not None and second is None:
         raise InputError("torus_branch: a periodic motion starts tori only with a second "
