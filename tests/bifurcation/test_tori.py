@@ -21,6 +21,7 @@ from fecontact.bifurcation import (
     ContinuationOptions,
     HarmonicBalance,
     PeriodicMotion,
+    SecondExcitation,
     TorusBalance,
     orbit_branch,
     periodic_motion,
@@ -121,6 +122,25 @@ def test_back_at_the_orbit_the_branch_ends(orbits):
     assert back.points[-1].parameter == pytest.approx(born.parameter, rel=1e-4)
 
 
+@pytest.mark.parametrize(("m", "direction", "end"), [(0.3, -1.0, 0.07), (0.1, 1.0, 0.5)])
+def test_tori_end_where_either_radius_vanishes(m, direction, end):
+    """A normal form of two oscillators: squared radii (2 m - 0.14) / 1.72, (0.2 - 0.4 m) / 1.72."""
+    def pair(t, x, p, out):
+        first, second = x[0] * x[0] + x[1] * x[1], x[2] * x[2] + x[3] * x[3]
+        grows = p[0] - first - 0.7 * second, 0.2 - 0.4 * first - 2.0 * second
+        out[0], out[1] = grows[0] * x[0] - x[1], grows[0] * x[1] + x[0]
+        out[2], out[3] = grows[1] * x[2] - 2.7 * x[3], grows[1] * x[3] + 2.7 * x[2]
+
+    times = np.linspace(0.0, 300.0, 6000)
+    radii = np.sqrt([(2.0 * m - 0.14) / 1.72, (0.2 - 0.4 * m) / 1.72])
+    waves = [r * wave(w * times) for r, w in zip(radii, (1.0, 2.7), strict=True)
+             for wave in (np.cos, np.sin)]
+    tori = torus_branch(vector_field(pair, {"m": m}, 4), (times, np.transpose(waves)), "m",
+                        direction=direction, bounds=(-1.0, 1.0), method=TorusBalance(2))
+    assert (tori.status, tori.special, tori.message) == (BranchStatus.SINGLE_FREQUENCY, (), "")
+    assert tori.points[-1].parameter == pytest.approx(end, abs=1e-8)
+
+
 def test_errors_fall_with_the_harmonics_and_are_estimated():
     field = forced_van_der_pol(0.4, 0.5, 1.6)
     run = settled(field, [1.0, 0.0], 200.0, 3000.0)
@@ -196,6 +216,27 @@ def test_the_second_excitation_grows_from_nothing():
     direct = first_torus(two_tone_duffing(), without_second(field), "second", second=SECOND,
                  method=TorusBalance((5, 5)))
     assert branch.points[-1].values["maximum"] == pytest.approx(direct.values["maximum"], rel=1e-6)
+
+
+def test_an_orbit_without_the_second_excitation_gives_its_frequency_alone():
+    """A linear oscillator: each amplitude is that of a frequency response."""
+    def two_tones(t, x, p, out):
+        out[0] = x[1]
+        out[1] = (-0.2 * x[1] - x[0] + p[0] * np.cos(2.0 * t)
+                  + p[1] * np.cos(CIRCLE * p[3] * t + p[2]))
+
+    field = vector_field(two_tones, {"first": 1.0, "second": 0.5, "phase": 0.0, "f2": 0.25},
+                         ["x", "v"], period=np.pi)
+    bare = field.with_(second=0.0)
+    orbit = periodic_motion(bare, initial=[0.0, 0.0])
+    point = orbit_branch(bare, orbit, "first", bounds=(1.0, 1.2), method=Collocation(20)).points[-1]
+    for start, first in ((orbit, 1.0), (point, 1.2)):
+        torus = torus_motion(torus_branch(field, start, "f2", bounds=(0.2, 0.25),
+                                          second=SecondExcitation("phase", "f2"),
+                                          method=TorusBalance(2)).points[0])
+        for pair, force, w in (((1, 0), first, 2.0), ((0, 1), 0.5, CIRCLE / 4.0)):
+            assert abs(torus.harmonic(*pair)[0]) == pytest.approx(
+                force / abs(1.0 - w**2 + 0.2j * w), rel=1e-6)
 
 
 def test_a_run_finds_both_tones_too():

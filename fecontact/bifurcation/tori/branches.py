@@ -20,7 +20,7 @@ from fecontact.bifurcation.continuation.problem import (
 )
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.layout import Layout, layout_of
-from fecontact.bifurcation.harmonic.series import real_coefficients
+from fecontact.bifurcation.harmonic.series import real_coefficients, turned
 from fecontact.bifurcation.orbits.branches import as_motion, values_of
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.tori.elements import elements_of
@@ -274,14 +274,14 @@ def _converged(problem: TorusProblem, u: Array) -> tuple[TorusProblem, Array]:
     """
     u, _, converged = damped_newton(problem, u, unit(len(u)), _TOLERANCE, _CORRECTIONS)
     X = problem.coefficients(u) / problem.sizes
-    orbit = 1 in problem.unknown and np.abs(X[2 * problem.orders[0] + 1 :]).max() < (
-        _ORBIT * np.abs(X).max())
+    torus = replace(problem, reference=problem.coefficients(u).copy())
+    orbit = problem.unknown and np.abs(turned(X, torus.thinnest)).max() < _ORBIT * np.abs(X).max()
     if not converged or orbit:
         name, end = list(problem.field.parameters)[problem.free], "a periodic orbit"
         raise AnalysisError(f"No torus was found at {name} = {u[-1]:.6g}: Newton's method "
                             f"{f'ends at {end}' if converged else 'does not converge'}; start from "
                             f"a steady quasi-periodic run, or take other harmonics.")
-    return replace(problem, reference=problem.coefficients(u).copy()), u
+    return torus, u
 
 
 def _followed(

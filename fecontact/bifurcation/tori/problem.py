@@ -185,9 +185,15 @@ class TorusProblem(SeriesUnknowns, Problem):
                        scales=self._grown(u)), u, tangent
 
     @cached_property
-    def _second(self) -> int:
-        """First row of the coefficients with k2 > 0."""
-        return 2 * self.orders[0] + 1
+    def thinnest(self) -> Array:
+        """Turns (K,) of the harmonics along the free angle in which the reference changes least.
+
+        The angle is a combination c of those whose frequency is unknown, k.c of a harmonic k. Where
+        the torus shrinks to an orbit, nothing changes along it, whatever angles describe the torus.
+        """
+        turns = self.pairs[:, self.unknown].astype(float)
+        moved = np.array([turned(self.reference / self.sizes, one).reshape(-1) for one in turns.T])
+        return np.asarray(turns @ np.linalg.eigh(moved @ moved.T)[1][:, 0])
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, Any]:
         """Frequencies, extremes of the states, errors and stability."""
@@ -212,13 +218,11 @@ class TorusProblem(SeriesUnknowns, Problem):
 
     def tests(self, u: Array, linearisation: Any, tangent: Array) -> Mapping[str, float]:
         """Test function of tori that shrink to an orbit."""
-        if 1 not in self.unknown:
+        if not self.unknown:
             return {}
-        before = self.reference[self._second :] / self.sizes
-        if not before.any():
-            return {}
-        return {_SHRINKS: shrunk(np.ones(1), self.coefficients(u)[self._second :] / self.sizes,
-                                  before)}
+        before, now = (turned(X / self.sizes, self.thinnest)
+                       for X in (self.reference, self.coefficients(u)))
+        return {_SHRINKS: shrunk(np.ones(1), now, before)} if before.any() else {}
 
     def ended(self, u: Array, linearisation: Any, tangent: Array) -> BranchStatus | None:
         """At tori that their harmonics do not resolve."""
@@ -447,7 +451,8 @@ class TorusLinearisation(BorderedEquations):
         """Change of the torus at fixed parameter with twice the samples, relative to its size."""
         problem = self.problem
         finer = replace(problem, samples=(2 * problem.samples[0], 2 * problem.samples[1]))
-        residual = TorusLinearisation(finer, self.u).residual
+        # What Newton's method has left is no error of the samples.
+        residual = TorusLinearisation(finer, self.u).residual - self.residual
         change = self.solve(unit(len(self.u)), np.append(-residual, 0.0))
         scaled = problem.coefficients(change) / self.problem.sizes
         return float(np.sqrt((scaled**2).sum())) / self._size
