@@ -252,19 +252,41 @@ def merged(given: object, by_name: Mapping[str, Any]) -> dict[str, Any]:
     return {**(given or {}), **by_name}  # type: ignore[dict-item]
 
 
+class _BeyondError(IndexError):
+    """Raised where a function of the user reaches beyond its own arrays."""
+
+
+class _Guarded(np.ndarray):
+    """Array whose indices that do not exist are told from those of other arrays."""
+
+    def __getitem__(self, key: Any) -> Any:
+        try:
+            return super().__getitem__(key)
+        except IndexError as error:
+            raise _BeyondError(str(error)) from None
+
+    def __setitem__(self, key: Any, value: Any) -> None:
+        try:
+            super().__setitem__(key, value)
+        except IndexError as error:
+            raise _BeyondError(str(error)) from None
+
+
 def require_within(
-    owner: str, function: Callable[..., Any], arrays: str, *arguments: Any
+    owner: str, function: Callable[..., Any], held: str, *arguments: float | Array
 ) -> None:
     """Raise InputError if a function of the user, called in Python, reaches beyond its arrays.
 
     Compiled code does not check indices. Whatever else is wrong with these arguments, such as a
-    division by zero, is no matter. ``arrays`` says what the arrays hold.
+    division by zero or a table that ends before them, is no matter. ``held`` says what the arrays
+    hold.
     """
+    guarded = [one.view(_Guarded) if isinstance(one, np.ndarray) else one for one in arguments]
     try:
         with np.errstate(all="ignore"):
-            getattr(function, "py_func", function)(*arguments)
-    except IndexError as error:
+            getattr(function, "py_func", function)(*guarded)
+    except _BeyondError as error:
         raise InputError(f"{owner} {function.__name__} uses an entry beyond its arrays ({error}), "
-                         f"which hold {arrays}; give as many as it uses.") from None
+                         f"which hold {held}; give as many as it uses.") from None
     except Exception:
         return

@@ -127,6 +127,18 @@ def test_kind_errors_of_functions():
         vector_field(forced, {"force": 1.0}, 1, period=lambda parameters: None)
 
 
+TABLE = np.array([1.0, 2.0])
+
+
+def from_table(t, x, p, out):
+    out[0] = TABLE[int(7.0 + x[0])] if x[0] > 0.5 else 0.0
+
+
+def test_tables_may_end_before_states_that_a_motion_does_not_reach():
+    field = vector_field(from_table, {}, 1, differentiation="differences")
+    assert field.rates(np.zeros(1), np.zeros((1, 1)), field.values) == 0.0
+
+
 @pytest.mark.parametrize(("parameters", "states", "numbers"), [
     ({"force": 1.0}, 1, "states: 1, parameters: 1"), ({"a": 1.0, "b": 1.0}, 2, "states: 2, par")])
 def test_functions_stay_within_their_arrays(parameters, states, numbers):
