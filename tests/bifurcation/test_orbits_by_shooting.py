@@ -39,7 +39,13 @@ from fecontact.bifurcation import (
 )
 from fecontact.bifurcation.orbits.restored import restored_shooting
 from fecontact.integrate import strobe
-from fecontact.laws import Frictionless, Harmonic, LinearContact, PrescribedForce
+from fecontact.laws import (
+    Frictionless,
+    Harmonic,
+    JenkinsFriction,
+    LinearContact,
+    PrescribedForce,
+)
 
 FEW = ContinuationOptions(step=5e-3, largest_step=0.05, points=60)
 
@@ -68,6 +74,30 @@ def test_extremes_of_a_linear_response_are_those_of_the_closed_form(segments):
         size = 1.0 / abs(1.0 - w**2 + 0.1j * w)
         assert point.values["maximum"] == pytest.approx([size, w * size], rel=5e-6)
         assert point.values["minimum"] == pytest.approx([-size, -w * size], rel=5e-6)
+
+
+def test_an_element_that_slides_at_the_end_of_the_period_keeps_its_deflection():
+    """The derivative to the period is that of runs, and steps are as long as elsewhere."""
+    along = np.array([[1.0], [0.0], [0.0]])
+    basis = basis_from_matrices([[1.0]], [[0.0]], {"contact": along[None], "B": along})
+
+    def system(frequency):
+        return ContactSystem(
+            basis, normal=PrescribedForce(1.0), friction=JenkinsFriction(2.0, 0.3),
+            drive=Drive(stiffness_x=1.0, damping_x=0.02, amplitude_x=1.0, frequency_hz=frequency))
+
+    field = contact_field(system(0.16), "drive.frequency_hz")
+    start = periodic_motion(system(0.16), initial=[0.0, 0.0, 0.0], transient=3000.0)
+    branch = orbit_branch(field, start, method=Shooting(1), bounds=(0.16, 0.2))
+    assert branch.status is BranchStatus.BOUND
+    assert len(branch) < 100
+    point = branch.points[0]
+    assert point.u[2] == pytest.approx(-0.15, abs=1e-12)
+    problem, u, _ = restored_shooting(field, point)
+    ends = [simulate(system(0.16 + step), 1.0 / (0.16 + step), initial=u[:3], outputs=2,
+                     rtol=1e-11).states[-1] for step in (1e-5, -1e-5)]
+    assert problem.linearise(u).factors.local[0, :, -1] == pytest.approx(
+        (ends[0] - ends[1]) / 2e-5, rel=1e-5, abs=1e-5)
 
 
 def test_doubled_orbits_agree_with_collocation(two_masses):

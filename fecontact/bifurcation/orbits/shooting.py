@@ -40,9 +40,12 @@ from fecontact.integrate.sensitivities import Sensitivity, differentiated
 from fecontact.integrate.solvers import AUTO, Solver
 from fecontact.integrate.trajectory import Status
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.elastic_sliders import slider_counts
 
 # Phase after the start of a segment below which the start itself is used.
 _AT_START = 1e-10
+# Phase about the nearest state of an orbit within which it crosses the plane of the phase.
+_IN_PHASE = 1.0 / 64.0
 # Part of a period over which rates of set-valued motions are taken.
 _BRIEF = 1e-5
 # Largest gap between the runs of a set-valued orbit, in scales of the states.
@@ -135,14 +138,27 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
         row = f / self.scales[: len(f)] ** 2
         return row / np.linalg.norm(row * self.scales[: len(f)])
 
+    @cached_property
+    def _sliders(self) -> Any:
+        """Whether states (d,) are deflections of elastic Coulomb elements."""
+        system = self.field.system()
+        nodes, modes = slider_counts(system) > 0, system.basis.modes
+        return np.append(np.zeros(2 * modes, dtype=bool), np.repeat(nodes, system.memory))
+
     def rates(self, t: float, state: Array, values: Array) -> Array:
-        """Rates (d,) of a state; of a set-valued motion those of a brief run from there."""
-        if self.solver.smooth:
-            return np.asarray(self.field.rates(np.array([t]), state[None].copy(), values)[0])
+        """Rates (d,) of a state.
+
+        Those of set-valued motions, and of deflections that an element keeps while it slides, are
+        those of a brief run from there.
+        """
+        smooth = np.asarray(self.field.rates(np.array([t]), state[None].copy(), values)[0])
+        if self.solver.smooth and not self._sliders.any():
+            return smooth
         h = _BRIEF * float(self.scales[-2])
         first, middle, last = run_from(self.field.system(values), t + np.array([[0.0, h, 2.0 * h]]),
                                        state[None].copy(), self.rtol, self.solver)[0]
-        return np.asarray((4.0 * middle - 3.0 * first - last) / (2.0 * h))
+        found = (4.0 * middle - 3.0 * first - last) / (2.0 * h)
+        return np.where(self._sliders, found, smooth) if self.solver.smooth else np.asarray(found)
 
     def linearise(self, u: Array) -> "ShootingLinearisation":
         """Residual and linearisation at u, each computed on demand."""
@@ -331,8 +347,8 @@ def started_in_phase(problem: ShootingProblem, u: Array, like: Array) -> Array:
                                           - problem.reference))
 
     if problem.autonomous:
-        index = int(np.argmin([apart(phase) for phase in grid[:-1]]))
-        low, high, shift = grid[index - 1] - (index == 0), grid[index + 1], grid[index]
+        shift = min(grid[:-1], key=apart)
+        low, high = shift - _IN_PHASE, shift + _IN_PHASE
         if off(low) * off(high) < 0.0:
             shift = float(brentq(off, low, high, xtol=1e-12))
     else:
