@@ -40,6 +40,7 @@ from fecontact.laws import (
     Harmonic,
     JenkinsFriction,
     LinearContact,
+    ParallelSliders,
     PrescribedForce,
 )
 from fecontact.system.model_limits import unresisted_motion
@@ -71,6 +72,19 @@ def test_a_response_over_an_amplitude_goes_through_zero(method):
     motion = branch.points[-1].orbit(found)
     zero = orbit_branch(found, motion, method=method, bounds=(0.0, 1.0), direction=-1.0).points[-1]
     assert orbit_branch(found, zero, bounds=(-1.0, 0.0), direction=1.0).parameter[-1] == -1.0
+
+
+def test_orbits_by_shooting_end_where_an_element_no_longer_slides():
+    """It keeps any deflection there: the branch had gone along these at one frequency."""
+    system = ContactSystem(
+        basis_from_matrices([[1.0]], [[0.0]], {"contact": [[[1.0], [0.0], [0.0]]],
+                                               "B": [[1.0], [0.0], [0.0]]}),
+        normal=PrescribedForce(1.0), friction=ParallelSliders(0.5, 1.0, (1.0, 2.0), (3.0, 1.0)),
+        drive=Drive(stiffness_x=1.0, damping_x=0.02, amplitude_x=1.0, frequency_hz=0.188))
+    branch, = frequency_response(system, (0.188, 0.2), method=Shooting(1)).branches
+    assert branch.status is BranchStatus.STALLED
+    assert branch.parameter[-1] == pytest.approx(0.18897, abs=1e-5)
+    assert "never slides" in branch.message
 
 
 def test_levels_of_the_duffing_oscillator(response):

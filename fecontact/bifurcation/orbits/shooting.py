@@ -16,6 +16,7 @@ from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, en
 from fecontact.bifurcation.continuation.rounding import Rounding
 from fecontact.bifurcation.fields.contact_field import ContactField
 from fecontact.bifurcation.harmonic.estimates import OBSERVED_SAMPLES, peaks
+from fecontact.bifurcation.harmonic.layout import kept_by, layout_of
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
 from fecontact.bifurcation.orbit_methods import Shooting
@@ -46,6 +47,8 @@ from fecontact.system.elastic_sliders import slider_counts
 _AT_START = 1e-10
 # Phase about the nearest state of an orbit within which it crosses the plane of the phase.
 _IN_PHASE = 1.0 / 64.0
+# Largest change of what an element keeps that sticks, by derivatives of runs.
+_STICKS = 1e-6
 # Part of a period over which rates of set-valued motions are taken.
 _BRIEF = 1e-5
 # Largest gap between the runs of a set-valued orbit, in scales of the states.
@@ -192,6 +195,8 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
         if not self.solver.smooth:
             self._require_return(u)
             linearisation.require_certain()
+        elif self._sliders.any() and not self.autonomous:
+            linearisation.require_sliding()
         low, high = linearisation.extremes
         self.noted[:] = [(u, (high - low) / 2.0)]
         return {"period": self.period(u), **linearisation.floquet.stored, "mesh": self.mesh,
@@ -470,6 +475,23 @@ class ShootingLinearisation:
     def floquet(self) -> Floquet:
         """Multipliers and stability."""
         return floquet_of(self.factors, self.problem.autonomous)
+
+    def require_sliding(self) -> None:
+        """Raise AnalysisError if an elastic Coulomb element sticks all the time.
+
+        Its deflection less its displacement, a row w, then is kept: w M = w of each segment.
+        """
+        problem = self.problem
+        layout = layout_of(problem.field)
+        w = np.zeros((layout.memory, layout.states))
+        w[:, : layout.displacements] = -kept_by(problem.field, layout).rows
+        w[:, layout.internal] = np.eye(layout.memory)
+        w = w[problem._sliders[layout.internal]]
+        if (np.max([np.abs(w @ run.monodromy - w).max(axis=1) for run in self.runs], axis=0)
+                < _STICKS).any():
+            raise AnalysisError(f"At {problem.parameter_name} = {self.u[-1]:.6g} an elastic "
+                                f"Coulomb element never slides: it keeps any deflection, so that "
+                                f"orbits are not isolated; follow them by HarmonicBalance().")
 
     def require_certain(self) -> None:
         """Warn where differences of set-valued runs to one side have other multipliers."""
