@@ -73,7 +73,7 @@ def by_sides(
     # The start counts once.
     most = options.points + regular(points[:1])
     left = most - min(regular(points), options.points // 2 + regular(points[:1]))
-    others, _ = side(replace(options, points=max(left, 2)), turned=True)
+    others, _ = side(replace(options, points=left), turned=True)
     points, whole = shortened(points, most - regular(others))
     turned = [replace(point, tangent=-point.tangent) for point in others[:0:-1]]
     return [*turned, *points], end if whole else End(BranchStatus.POINTS)
