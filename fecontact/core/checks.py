@@ -257,7 +257,7 @@ class _BeyondError(IndexError):
 
 
 class _Guarded(np.ndarray):
-    """Array whose indices that do not exist are told from those of other arrays."""
+    """Array whose errors of indices differ from those of other arrays."""
 
     def __getitem__(self, key: Any) -> Any:
         try:

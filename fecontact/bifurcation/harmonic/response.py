@@ -219,8 +219,8 @@ class FrequencyResponse(Summarised):
 def highest_harmonic(branch: Branch) -> int:
     """Highest harmonic of the excitation that the points of a branch of a response store."""
     stored = branch.column("observed_harmonics").shape[1] - 1
-    if isinstance(branch.method, HarmonicBalance):
-        stored = min(stored, branch.method.highest)
+    # Harmonics that a series does not have are stored as zero.
+    stored = min(stored, getattr(branch.method, "highest", stored))
     return stored // int(branch.attributes["periods"])
 
 

@@ -451,7 +451,7 @@ class TorusLinearisation(BorderedEquations):
         """Change of the torus at fixed parameter with twice the samples, relative to its size."""
         problem = self.problem
         finer = replace(problem, samples=(2 * problem.samples[0], 2 * problem.samples[1]))
-        # What Newton's method has left is no error of the samples.
+        # The residual that Newton's method leaves is no error of the samples.
         residual = TorusLinearisation(finer, self.u).residual - self.residual
         change = self.solve(unit(len(self.u)), np.append(-residual, 0.0))
         scaled = problem.coefficients(change) / self.problem.sizes
