@@ -240,13 +240,13 @@ def first_below(b, stack):
 
 
 @helper
-def sign_changes(b, places, stack):
+def sign_changes(b, places, stack, sign=0.0):
     """Fill ``places`` with the s at which p changes sign, ascending; return their number.
 
     Sign changes closer than FINEST may be missed, as may those beyond the length of ``places``.
-    ``stack`` (DEPTH, n + 2) is workspace; b is kept.
+    ``stack`` (DEPTH, n + 2) is workspace; b is kept. ``sign`` is the sign before, zero for none.
     """
-    return changes_of_sign(_signs, _NO_DIPS, b, 0.0, places, stack)
+    return changes_of_sign(_signs, _NO_DIPS, b, sign, places, stack)
 
 
 @helper

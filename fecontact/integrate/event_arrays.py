@@ -8,7 +8,13 @@ import numpy as np
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.integrate.event_table import CONTACT_EVENTS
-from fecontact.integrate.events import AnyEvent, ContactEvents, Crossing, direction_sign
+from fecontact.integrate.events import (
+    AnyEvent,
+    ContactEvents,
+    Crossing,
+    WatchedEvents,
+    direction_sign,
+)
 from fecontact.integrate.rodas5p.event_kernels import (
     FIRST_OWN,
     FOUND,
@@ -72,7 +78,8 @@ def watch_for(
         np.array([isinstance(one, Crossing) for one in own], dtype=np.int64),
         np.zeros((n + len(own), PLACES)), np.zeros(n + len(own), dtype=np.int64), np.zeros(64),
         note_events.address if events else 0, stops,
-        np.zeros((places, 3)), np.zeros((places, states)), counts)
+        np.zeros((places, 3)), np.zeros((places, states)), counts,
+        events.after if isinstance(events, WatchedEvents) else -np.inf)
 
 
 def take_events(watch: Watch, found: list[tuple[Array, Array]], time: float) -> None:

@@ -219,11 +219,17 @@ def quantity_row(
 AnyEvent = ContactEvents | Event | Crossing
 
 
-def as_events(events: AnyEvent | Sequence[AnyEvent] | None) -> tuple[AnyEvent, ...]:
+class WatchedEvents(tuple[AnyEvent, ...]):
+    """Events to watch for; those up to the time ``after`` [s] do not count."""
+
+    after = -np.inf
+
+
+def as_events(events: AnyEvent | Sequence[AnyEvent] | None) -> WatchedEvents:
     """One, several or no events as a tuple."""
-    if events is None:
-        return ()
-    return tuple(events) if isinstance(events, Sequence) else (events,)
+    if events is None or isinstance(events, WatchedEvents):
+        return events or WatchedEvents()
+    return WatchedEvents(events if isinstance(events, Sequence) else (events,))
 
 
 def _require_sense(owner: str, sense: str) -> None:

@@ -38,6 +38,8 @@ _DEEP = 100.0
 _GROWTH, _LOOKS = 1e-2, 200
 # Shortest run [s], and in spacings of floating-point numbers at its times.
 _SHORTEST, _SPACINGS = 1e-100, 1e5
+# Rounding of the time of an event, relative to the times of the run.
+_EVENT_ROUNDING = 1e-13
 # Energy that friction may give within the error of a run, relative to what it exchanges.
 _GIVEN = 1e-3
 
@@ -121,13 +123,17 @@ def simulate(
     if isinstance(outputs, int | np.integer) and not isinstance(outputs, bool):
         require_memory("outputs", int(outputs), _row_size(moving))
     times = output_times(t_start, t_end, outputs)
-    if isinstance(moving, ContactSystem) and isinstance(initial, FieldRun):
-        initial = initial.states[-1]
     require_rtol(rtol)
     require_max_step(max_step)
     require_kind("simulate", bool, keep_steps=keep_steps)
     require_solver(solver, *(["events"] if events is not None else []))
     watched = as_events(events)
+    if (isinstance(initial, Trajectory | FieldRun) and initial.status is Status.EVENT
+            and t_start == initial.time[-1]):
+        # The event that ended the run before lies at its last time, up to rounding.
+        watched.after = t_start + _EVENT_ROUNDING * max(abs(t_start), abs(t_end))
+    if isinstance(moving, ContactSystem) and isinstance(initial, FieldRun):
+        initial = initial.states[-1]
     if isinstance(system, VectorField):
         if isinstance(moving, ContactSystem):
             run = simulate(moving, t_end, t_start=t_start, initial=initial, outputs=times,

@@ -75,6 +75,23 @@ def test_a_run_stops_at_an_event(stop, when, solver, error):
     assert run.states[:-1] == pytest.approx(whole.states[: len(run.time) - 1], abs=10.0 * error)
 
 
+@LOCATING
+@pytest.mark.parametrize("stop", ["touch-down", "lift-off"])
+def test_runs_from_stop_to_stop(stop, solver, error):
+    """A mass that bounces on a spring: a run goes on from the event at which the last ended."""
+    settings = {"outputs": 3, "rtol": 1e-10, "solver": solver}
+    whole = simulate(drop(), 4.0, initial=START, events=ContactEvents(), **settings)
+    expected = whole.events.only(stop).time
+    run, found = START, []
+    while len(found) < len(expected):
+        run = simulate(drop(), 4.0, initial=run, events=ContactEvents(stop=stop), **settings)
+        assert run.status is Status.EVENT
+        assert run.events.kind.count(stop) == 1
+        found.append(run.time[-1])
+    assert len(expected) > 1
+    assert found == pytest.approx(expected, abs=10.0 * error)
+
+
 def test_turning_points_are_crossings():
     """Free fall from 1 m/s upwards is highest after 0.1 s, 0.05 m higher."""
     top = Crossing("B", "y", of="velocity", sense="falling")

@@ -145,6 +145,19 @@ def test_runs_end_at_events():
     assert run.states[-1, 0] == pytest.approx(0.3, abs=1e-13)
 
 
+@pytest.mark.parametrize("watched", [
+    lambda stop: Crossing("x", sense="falling", stop=stop), lambda stop: Crossing("v", stop=stop),
+    lambda stop: fc.Event(beyond, [0.3], stop=stop)])
+def test_runs_go_on_from_stop_to_stop(watched):
+    whole = fc.simulate(FORCED, 30.0, initial=[0.0, 1.0, 1.0], rtol=1e-10, events=watched(False))
+    run, found = [0.0, 1.0, 1.0], []
+    while len(found) <= len(whole.events):
+        run = fc.simulate(FORCED, 30.0, initial=run, rtol=1e-10, events=watched(True))
+        found.append(run.time[-1])
+    assert len(found) > 4
+    assert found == pytest.approx([*whole.events.time, 30.0], abs=1e-7)
+
+
 def test_fields_of_python_run_as_compiled_ones_do():
     def swinging(t, x, p, out):
         out[0] = x[1]

@@ -13,7 +13,13 @@ from fecontact.bifurcation import Axis, basins
 from fecontact.integrate import ContactEvents, Crossing, SetValued, strobe
 from fecontact.integrate.nonsmooth.problem import AT_EVENT, IDLE
 from fecontact.integrate.step_loop import FINISHED, MINIMUM_STEP, RUNNING, STEP
-from fecontact.laws import ConstantFriction, LinearContact, RoughSurface
+from fecontact.laws import (
+    ConstantFriction,
+    Harmonic,
+    LinearContact,
+    PrescribedForce,
+    RoughSurface,
+)
 
 UPWARDS = [[0.0], [1.0], [0.0]]
 STATIC = SetValued(static_coefficient=1.0)
@@ -53,6 +59,68 @@ def test_a_run_ends_at_an_event(events):
     assert run.states[-1] == pytest.approx(
         [0.5, -np.sqrt(0.29)] if isinstance(events, Crossing) else [0.0, 0.2], abs=1e-8)
     assert run.time[:-1] == pytest.approx(0.1 * np.arange(len(run.time) - 1), abs=1e-12)
+
+
+@fc.event
+def _velocity(t, y, p):
+    return y[1]
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1])
+@pytest.mark.parametrize(("sense", "first", "every"), [("both", 1, 1), ("rising", 1, 2),
+                                                       ("falling", 2, 2)])
+def test_turning_points_on_ground_at_rest(friction, sense, first, every):
+    """The slip ends at each of them: it passes half a period after the one before."""
+    system = belt(0.0, friction=ConstantFriction(friction), normal=PrescribedForce(0.1))
+    half = 0.5 * TURN
+    for watched in (Crossing("B", "x", of="velocity", sense=sense), fc.Event(_velocity, (), sense)):
+        run = fc.simulate(system, 9.5 * half, initial=[1.0, 0.0], outputs=3, solver=SetValued(),
+                          rtol=1e-10, events=watched)
+        assert run.events.time == pytest.approx(half * np.arange(first, 10, every), abs=1e-8)
+        assert np.abs(run.events.states[:, 1]).max() < 1e-14
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_slip_that_ends_and_begins_again(number):
+    """Velocities that leave zero to the side from which they came have passed nothing."""
+    rng = np.random.default_rng(number)
+    shapes = rng.normal(size=(4, 4))
+    rows = np.zeros((2, 3, 4))
+    rows[:, 0] = np.eye(4)[:2]
+    basis = fc.basis_from_matrices(np.eye(4), 50.0 * shapes @ shapes.T + 100.0 * np.eye(4),
+                                   {"contact": rows, "B": rows[0]}, damping=0.5 * np.eye(4))
+    system = fc.ContactSystem(
+        basis, normal=PrescribedForce((6.0, 4.0)), friction=ConstantFriction(0.3),
+        load=fc.Load(forces=[fc.PointLoad(point="B", component="x", signal=Harmonic(6.0, 0.7))]))
+    start = np.concatenate([0.02 * rng.normal(size=4), 0.3 * rng.normal(size=4)])
+    run = fc.simulate(system, 4.0, initial=start, outputs=200001, rtol=1e-9, solver=SetValued(),
+                      events=[Crossing(node, "x", of="velocity") for node in range(2)])
+    for node in range(2):
+        speed = run.velocity(node)[:, 0]
+        moving = np.abs(speed) > 1e-9
+        sides, times = np.sign(speed[moving]), run.time[moving]
+        passed = times[1:][sides[1:] != sides[:-1]]
+        assert len(passed) > 0
+        assert run.events.only(f"event {node}").time == pytest.approx(passed, abs=5e-5)
+
+
+@pytest.mark.parametrize("events", [
+    ContactEvents(stop="slip"), ContactEvents(stop="stick"),
+    Crossing("B", "x", 0.1, of="velocity", stop=True)])
+def test_runs_from_stop_to_stop(events):
+    watched = (ContactEvents() if isinstance(events, ContactEvents) else
+               Crossing("B", "x", 0.1, of="velocity"))
+    whole = fc.simulate(belt(), 30.0, initial=[0.5, 0.2], outputs=3, solver=STATIC, rtol=1e-11,
+                        events=watched)
+    kind = events.stop[0] if isinstance(events, ContactEvents) else "event 0"
+    expected = whole.events.only(kind).time
+    run, found = [0.5, 0.2], []
+    while len(found) <= len(expected):
+        run = fc.simulate(belt(), 30.0, initial=run, outputs=3, solver=STATIC, rtol=1e-11,
+                          events=events)
+        found.append(run.time[-1])
+    assert len(expected) > 1
+    assert found == pytest.approx([*expected, 30.0], abs=1e-7)
 
 
 def test_events_of_a_bouncing_ball():

@@ -4,6 +4,9 @@ Clusters and stops change at moments at which a step ends anyway. Normal laws th
 while a cluster slips, and functions of users, are examined some times a step, and what has
 changed is narrowed down by bisection; what `Crossing` watches is a polynomial within the step,
 whose changes of sign are found however close.
+
+A step may end where such a function is zero up to rounding, as a velocity is where the slip ends.
+The sign is then the one before, until the function leaves zero.
 """
 
 # Compiled functions: their types are those of their signatures for numba.
@@ -14,9 +17,10 @@ from fecontact.core.addresses import function_at
 from fecontact.core.compiled import compile_law, helper, routine
 from fecontact.integrate.bernstein import from_nested, sign_changes
 from fecontact.integrate.nonsmooth.dop853 import PARTS, interpolate
-from fecontact.integrate.nonsmooth.equations import derivative
-from fecontact.integrate.nonsmooth.event_search import Data
-from fecontact.integrate.nonsmooth.problem import FORCE, STICK, Step
+from fecontact.integrate.nonsmooth.equations import derivative, set_slips
+from fecontact.integrate.nonsmooth.event_search import ROUNDING, Data
+from fecontact.integrate.nonsmooth.problem import AT_EVENT, FORCE, STICK, Step
+from fecontact.integrate.nonsmooth.transitions import hold_velocity
 from fecontact.integrate.rodas5p.event_kernels import (
     FIRST_OWN,
     FOUND,
@@ -39,6 +43,9 @@ NOTE = Callable[[Step, float, int, Data], float]
 note_at = function_at(NOTE)
 
 _LOOKS, _HALVINGS = 16, 44
+# Values of users' functions without a sign: relative to the value before, and of those that are
+# linear in roundings of their terms, as many as the end of a step is away from its event.
+_NO_SIGN, _ROUNDINGS = 1e-12, 64.0
 
 
 @helper
@@ -61,6 +68,18 @@ def _counts(rising, k, watch):
     return watch.own_direction[k] >= 0 if rising else watch.own_direction[k] <= 0
 
 
+@helper
+def _no_sign(k, data):
+    """Size up to which a value of a user's function has no sign."""
+    watch, Y = data.watch, data.progress.state
+    if watch.linear[k] == 0:
+        return _NO_SIGN * abs(watch.own_values[k])
+    row, size = watch.own_parameters[k], abs(watch.own_parameters[k, 0])
+    for i in range(watch.states.shape[1]):
+        size += abs(row[1 + i]) * max(abs(Y[i]), data.limits.floor[i])
+    return _ROUNDINGS * ROUNDING * size
+
+
 @routine
 def _look(part, step, data):
     """Put the state within a step into the workspace, and what acts there; the time."""
@@ -69,6 +88,19 @@ def _look(part, step, data):
     interpolate(part, progress.state, workspace.parts, workspace.state)
     derivative(t, workspace.state, data.problem, progress.status, progress.closed, data.evaluation,
                workspace.rate)
+    return t
+
+
+@routine
+def _look_at_end(step, data):
+    """Put the state at the end of a step into the workspace, without the slip that ends there."""
+    p, progress, workspace = data.problem, data.progress, data.workspace
+    t = _look(1.0, step, data)
+    if progress.counts[AT_EVENT] != 0:
+        for c in range(len(p.rows)):
+            workspace.held[c] = workspace.past[c] and abs(progress.status[c]) == 1
+        set_slips(t, workspace.state, p, data.evaluation)
+        hold_velocity(p, workspace.held, data.evaluation, workspace.state)
     return t
 
 
@@ -85,13 +117,22 @@ def _note_linear(k, upto, step, data):
         for q in range(PARTS):
             c[1 + q] += row[1 + i] * workspace.parts[q, i]
     from_nested(c, b)
-    sign = b[0] if b[0] != 0.0 else watch.own_values[k]
+    t = _look_at_end(step, data)
+    b[PARTS] = event_at(watch.own[k])(t, workspace.state[:size], row)
+    sign, last, small = watch.own_values[k], watch.own_values[k], _no_sign(k, data)
+    for i in range(len(b)):
+        if abs(b[i]) <= small:
+            b[i] = 0.0
+        else:
+            sign = b[i] if sign == 0.0 else sign
+            last = b[i]
     places = watch.changed[:MOST]
-    for i in range(sign_changes(b, places, workspace.halves)):
+    for i in range(sign_changes(b, places, workspace.halves, sign)):
         sign = -sign
         if places[i] <= upto and _counts(sign > 0.0, k, watch):
             t = _look(places[i], step, data)
             note(watch, t, FIRST_OWN + k, -1, workspace.state)
+    watch.own_values[k] = last
 
 
 @routine
@@ -145,17 +186,19 @@ def _note_step(upto, step, data):
             looks = True
     for look in range(_LOOKS if looks else 1):
         left, right = (upto * look / _LOOKS, upto * (look + 1) / _LOOKS) if looks else (0.0, upto)
-        t = _look(right, step, data)
+        _look(right, step, data)
         for j in range(len(watch.zones)):
             if nodes and _zone(j, data) != watch.zones[j]:
                 _note_touch(j, left, right, step, data)
                 _look(right, step, data)
         for k in range(len(watch.own)):
+            if watch.linear[k]:
+                continue
+            t = _look_at_end(step, data) if right == 1.0 else _look(right, step, data)
             new = event_at(watch.own[k])(t, state[:size], watch.own_parameters[k])
-            if not watch.linear[k]:
+            if not abs(new) <= _no_sign(k, data):
                 _note_own(k, left, right, new, step, data)
-                _look(right, step, data)
-            watch.own_values[k] = new
+                watch.own_values[k] = new
 
 
 @routine
@@ -177,6 +220,8 @@ def _note_change(begin, t, data):
     for k in range(len(watch.own)):
         old = watch.own_values[k]
         new = event_at(watch.own[k])(t, Y[:size], watch.own_parameters[k])
+        if abs(new) <= _no_sign(k, data):
+            continue
         rising = old < 0.0 < new
         if not begin and (rising or old > 0.0 > new) and _counts(rising, k, watch):
             note(watch, t, FIRST_OWN + k, -1, Y)

@@ -78,6 +78,8 @@ class Watch(NamedTuple):
     counts : (3,) array
         Events found; whether contact nodes are watched; whether steps must end at the kinks of
         the normal forces.
+    after : float
+        Events up to this time are dropped: those at which the run before has ended.
     """
 
     stick_speed: Vector
@@ -97,6 +99,7 @@ class Watch(NamedTuple):
     found: Matrix
     states: Matrix
     counts: IntegerVector
+    after: float
 
 
 NOTE = Callable[[
@@ -267,14 +270,17 @@ def _own(k, left, right, view, watch):
 
 @helper
 def first_stop(begun, watch):
-    """Drop the events after the first at which the run stops; its time, inf if none does."""
+    """Drop the events that do not count, as those after the first at which the run stops.
+
+    The time of that, inf if the run does not stop.
+    """
     stop = np.inf
     for row in range(begun, watch.counts[FOUND]):
-        if watch.stops[int(watch.found[row, 1])] != 0:
+        if watch.stops[int(watch.found[row, 1])] != 0 and watch.found[row, 0] > watch.after:
             stop = min(stop, watch.found[row, 0])
     kept = begun
     for row in range(begun, watch.counts[FOUND]):
-        if watch.found[row, 0] <= stop:
+        if watch.after < watch.found[row, 0] <= stop:
             for table in (watch.found, watch.states):
                 for k in range(table.shape[1]):
                     table[kept, k] = table[row, k]
