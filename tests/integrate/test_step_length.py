@@ -8,6 +8,7 @@ from fecontact.integrate.rodas5p.step_length import (
     LAST_STEP,
     REJECTED_LAST,
     growth,
+    length_beyond,
     next_length,
     root_of,
 )
@@ -51,3 +52,17 @@ def test_steps_change_within_bounds():
 def test_steps_do_not_grow_after_one_that_failed():
     assert lengths([(1e-3, 0.1)], rejected=(0,)) == [1e-3]
     assert lengths([(1e-3, 0.1), (1e-3, 0.1)], rejected=(0,))[1] > 1.2e-3
+
+
+def test_steps_cut_at_a_kink_are_followed_by_what_their_error_allows():
+    numbers = np.zeros(5)
+    numbers[LAST_STEP], numbers[LAST_ROOT], numbers[REJECTED_LAST] = 1e-3, 1.0, 1.0
+    # Neither the trend nor the failure before counts.
+    assert length_beyond(1e-3, 1e-6, root_of(0.1), 1.0, numbers) == pytest.approx(
+        0.9e-6 * 0.1**-0.2, rel=1e-12)
+    assert numbers[REJECTED_LAST] == 0.0
+    assert numbers[LAST_STEP] == 1e-6
+    assert length_beyond(-3e-6, 1e-6, root_of(1e-5), 1.0, numbers) == 3e-6
+    # The next step, much shorter and less accurate, is followed by its own error.
+    assert length_beyond(0.0, 1e-8, root_of(0.5), 1.0, numbers) == pytest.approx(
+        0.9e-8 * 0.5**-0.2, rel=1e-12)

@@ -4,13 +4,12 @@ The same equations as :mod:`fecontact.system.kernels`, laid out for speed, by th
 :mod:`fecontact.integrate.rodas5p.blocks`.
 """
 
-import math
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from fecontact.core.compiled import helper, routine
-from fecontact.core.simd.functions import by_kind, copysign
+from fecontact.core.simd.functions import by_kind
 from fecontact.core.simd.vectors import select, somewhere
 from fecontact.core.types import Array
 from fecontact.integrate.rodas5p.blocks import block_at
@@ -20,7 +19,6 @@ from fecontact.system.node_forces import (
     axis_force,
     node_forces,
     node_gradients,
-    normal_force,
     slip_entry,
 )
 from fecontact.system.nodes import AXES, COMBINATIONS, MEMORY, MODES, NODES
@@ -397,47 +395,3 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
                              * g.rates[j, k, slip_entry(tangent, states)])
             out[2 * m + j * states + k] = rate
     add_node_forces(blocks, forces, out[m : 2 * m])
-
-
-@routine
-def next_kink(moved, problem, progress, w, within):
-    """Time until the forces of a node change their character, or ``within`` if later.
-
-    By the velocity and acceleration of the nodes: touch-down and lift-off on level ground, the
-    penetrations ``control.depth`` (n,), slip velocities that fall to ``control.slow`` (n,) of
-    either sign, and normal forces that fall to zero. Stepping there saves the steps that would fail
-    because forces change within them; it is an estimate, and nothing depends on its accuracy.
-    """
-    s, blocks, g = problem.system, problem.blocks, progress.gradients
-    depth, slow = problem.control.depth, problem.control.slow
-    n, d = len(s.gap), s.rows.shape[1]
-    project(blocks, progress.state, w[0], w[1])
-    project(blocks, progress.rate, w[1], w[2])
-    first = within
-    for j in range(n):
-        u, v, a = -w[0, n + j] - s.gap[j], -w[1, n + j], -w[2, n + j]
-        first = _crossing(u, v, a, first)
-        first = _crossing(u - depth[j], v, a, first)
-        force = normal_force(j, u, v, s)[0]
-        lift = -force / (g.partial[j, 1, 1] * -v + g.partial[j, 1, d + 1] * -a)
-        first = select((force > 0.0) & (lift > 0.0) & (lift < first), lift, first)
-        motion = nodes.motion_at(j, w[1], w[2], n, d)
-        slip = nodes.slip_velocity(j, motion.places, moved, s)
-        size = nodes.size_of(slip)
-        towards = -(slip[0] * motion.speeds[0] + slip[1] * motion.speeds[2])
-        stop = (size - slow[j]) * size / towards
-        first = select((force > 0.0) & (size > 1.5 * slow[j]) & (towards > 0.0) & (stop < first),
-                       stop, first)
-    return first
-
-
-@helper
-def _crossing(u, v, a, within):
-    """Smallest positive root of u + v t + a t^2 / 2, or ``within`` if that is earlier.
-
-    Roots that do not exist are no numbers, which no comparison holds for.
-    """
-    q = -(v + copysign(math.sqrt(v * v - 2.0 * a * u), v))
-    one, other = q / a, 2.0 * u / q
-    within = select((one > 0.0) & (one < within), one, within)
-    return select((other > 0.0) & (other < within), other, within)

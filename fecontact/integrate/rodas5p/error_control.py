@@ -105,11 +105,14 @@ def passes_corner(control, s, workspace):
 
 
 @helper
-def set_stage_rate(problem, progress, workspace):
-    """Fill ``workspace.base`` with the rates of ``stage``, by ``given`` and ``load``."""
+def set_stage_rate(problem, progress, workspace, motion):
+    """Fill ``workspace.base`` with the rates of ``stage``, by ``given`` and ``load``.
+
+    ``motion`` (3, d n) takes the motion and the forces of the near nodes.
+    """
     extend_near(workspace.stage, problem, progress, workspace)
     dynamics.set_rate(workspace.stage, problem.system, workspace.near, workspace.given,
-                      workspace.load, workspace.nodes, workspace.scratch, workspace.base)
+                      workspace.load, motion, workspace.scratch, workspace.base)
 
 
 @routine
@@ -121,7 +124,7 @@ def defect_error(step, G, problem, progress, workspace):
     methods. Unlike the difference of the embedded solutions, the defect holds for steps in which a
     normal force begins, ends or has a corner.
 
-    ``workspace.nodes``, ``workspace.given`` and ``workspace.load`` are overwritten.
+    ``workspace.given`` and ``workspace.load`` are overwritten, and more nodes may be near.
     """
     s, right = problem.system, workspace.right
     m = len(problem.control.largest)
@@ -133,14 +136,14 @@ def defect_error(step, G, problem, progress, workspace):
                              workspace.stage)
         dynamics.set_given(min(step.t + part * step.h, step.latest), s, workspace.given,
                            workspace.load)
-        set_stage_rate(problem, progress, workspace)
+        set_stage_rate(problem, progress, workspace, workspace.slots)
         for k in range(m, 2 * m):
             right[k] -= weight * workspace.base[k]
     for k in range(m, 2 * m):
         right[k] = G * (right[k] + workspace.after[k] - progress.state[k])
     progress.counts[RATES] += len(DEFECT_POINTS)
     stage_solver.solve_stage(G, s, problem.blocks, progress.gradients, workspace.reduced, right,
-                             workspace.nodes, workspace.base)
+                             workspace.slots, workspace.base)
     return modal_error(workspace.base, problem.control, progress,
                        workspace) / problem.control.switch_part
 
@@ -207,9 +210,9 @@ def set_scale(control, progress, workspace):
 
 
 # Gauss's rule of two points on each quarter of a step.
-DEFECT_POINTS = np.array([0.125 + 0.25 * quarter + side * 0.125 / np.sqrt(3.0)
-                          for quarter in range(4) for side in (-1.0, 1.0)])
-DEFECT_WEIGHTS = np.full(8, 0.125)
+DEFECT_POINTS = np.array([0.25 + 0.5 * half + side * 0.25 / np.sqrt(3.0)
+                          for half in range(2) for side in (-1.0, 1.0)])
+DEFECT_WEIGHTS = np.full(4, 0.25)
 # Gauss-Lobatto points: both ends and two inside; exact for powers of degree five.
 _INSIDE = 0.5 - 0.5 / np.sqrt(5.0)
 _POINTS = np.array([0.0, _INSIDE, 1.0 - _INSIDE, 1.0])

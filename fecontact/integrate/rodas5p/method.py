@@ -34,13 +34,14 @@ from fecontact.integrate.rodas5p.event_kernels import (
     next_switch,
     note_events_at,
 )
+from fecontact.integrate.rodas5p.kinks import caution_after_failure, up_to_kink
 from fecontact.integrate.rodas5p.missed_contacts import first_missed_at
 from fecontact.integrate.rodas5p.sliders import BEGIN, END, OUTPUT, SWITCH, attend_at
 from fecontact.integrate.rodas5p.state import CAUTIOUS, MISSED, Step
 from fecontact.integrate.rodas5p.step_length import (
     REJECTED_LAST,
     growth,
-    next_length,
+    length_beyond,
     next_stop,
     root_of,
     target_of,
@@ -141,29 +142,17 @@ def _next_target(t, h, last, smallest, data):
     lies ahead.
     """
     problem, progress, workspace = data.problem, data.progress, data.workspace
-    s, control, numbers = problem.system, problem.control, progress.numbers
+    s, control = problem.system, problem.control
     end = data.output.times[-1]
     after = np.nextafter(t, end)
-    if last <= ANEW:
-        # Rates just after t: they may jump at a break.
-        dynamics.set_given(after, s, workspace.given, workspace.load)
-        moved = dynamics.motion_given(workspace.given)
-        choose_near(h, problem, progress, workspace)
-    else:
-        moved = ground_motion(after, s)
+    # Just after t: what is given may jump at a break.
+    moved = ground_motion(after, s)
     stop, latest, is_break = next_stop(t, control.breaks, end)
     target = target_of(t, h, last == CUT, stop)
-    caution, limit = 0.0, numbers[CAUTIOUS]
-    if limit > 0.0:
-        reach = max(target - t, limit)
-        kink = dynamics.next_kink(moved, problem, progress, workspace.nodes, reach)
-        # Nearer kinks would shrink the steps without end. They are left to the error control,
-        # and so are kinks within rounding of this time.
-        if max(1e-3 * limit, 100.0 * smallest) < kink < 0.9 * reach:
-            # Rather a little too far than too short.
-            target = min(t + 1.0003 * kink, stop)
-            caution = limit
-        numbers[CAUTIOUS] = 0.0
+    target, caution = up_to_kink(t, target, stop, smallest, moved, problem, progress, workspace)
+    if last <= ANEW:
+        dynamics.set_given(after, s, workspace.given, workspace.load)
+        choose_near(h, problem, progress, workspace)
     return Step(t, target - t, target, latest, moved, caution, is_break and target == stop)
 
 
@@ -201,7 +190,7 @@ def _stages(step, G, problem, progress, workspace):
             if somewhere(now != last):
                 dynamics.set_given(now, s, workspace.given, workspace.load)
                 last = now
-            set_stage_rate(problem, progress, workspace)
+            set_stage_rate(problem, progress, workspace, workspace.nodes)
             switched = switched | switches(workspace.near.used[0], workspace.near.nodes,
                                            workspace.nodes[2], progress.signs)
             for k in range(size):
@@ -256,13 +245,15 @@ def error_at_end(step, end, problem, progress, workspace):
 @routine
 def switch_error(step, G, end, problem, progress, workspace):
     """Error of a step in which a normal force switches; what is known of the end stays."""
+    known = workspace.near.used[0]
     error = defect_error(step, G, problem, progress, workspace)
     if somewhere(error <= 1.0):
         last = min(step.target, step.latest)
         if step.at_break:
             last = dynamics.just_after(step.target, end)
         dynamics.set_given(last, problem.system, workspace.given, workspace.load)
-        set_end(problem, progress, workspace)
+        if workspace.near.used[0] != known:
+            set_end(problem, progress, workspace)
     return error
 
 
@@ -296,7 +287,7 @@ def _switch_part(step, smallest, problem, progress, workspace, watch):
 def _refused(step, error, progress, workspace):
     """Outcome of a step whose error is too large, and the length of the next attempt."""
     progress.numbers[REJECTED_LAST] = 1.0
-    progress.numbers[CAUTIOUS] = 0.0 if step.caution > 0.0 else step.h
+    progress.numbers[CAUTIOUS] = caution_after_failure(step)
     if not error < np.inf:
         workspace.stages[:] = 0.0
     return FAILED if error < np.inf else NOT_A_NUMBER, step.h * growth(root_of(error))
@@ -344,10 +335,9 @@ def _attempt(step, last, smallest, data):
                         / vary.variation.tolerance)
     if not error <= 1.0:
         return _refused(step, error, progress, workspace)
-    h = next_length(step.h, root_of(error), control.longest, numbers)
+    h = length_beyond(step.caution, step.h, root_of(error), control.longest, numbers)
     numbers[MISSED] = 0.0
-    if step.caution > 0.0:
-        numbers[CAUTIOUS] = step.caution
+    numbers[CAUTIOUS] = step.caution
     return TAKEN, h
 
 

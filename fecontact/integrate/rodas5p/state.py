@@ -130,7 +130,7 @@ class Step(NamedTuple):
         Motion of the ground just after its begin.
     caution : float
         Length of the step before, which failed, if this one is cut to end at a kink of the
-        forces; else zero.
+        forces; negative if it ends before that, as the kink itself was too far; else zero.
     at_break : bool
         Whether it ends at a break.
     """

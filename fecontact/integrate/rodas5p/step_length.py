@@ -23,6 +23,8 @@ _POWER = -1.0 / ORDER
 _LEAST, _LARGEST = 1e-6, 1e10
 # The last error counted as a hundredth at least.
 _LARGEST_LAST_ROOT = 1e-2**_POWER
+# The root of a last step that no step has to shrink after.
+_NO_TREND = 1e-30
 
 
 @helper
@@ -49,6 +51,18 @@ def growth(root):
 def next_length(h, root, longest, numbers):
     """Length of the step after an accepted one of the length h, which ``numbers`` take note of."""
     return min(h * predicted(growth(root), h, root, _LARGEST_LAST_ROOT, numbers), longest)
+
+
+@helper
+def length_beyond(caution, h, root, longest, numbers):
+    """The same where steps may have been cut to end at a kink of the forces.
+
+    Such a step is followed by what its error alone allows, up to |``caution``|, its length before
+    it was cut; that is zero for other steps. Cut steps begin no trend.
+    """
+    usual, cut = next_length(h, root, longest, numbers), caution != 0.0
+    numbers[LAST_ROOT] = select(cut, _NO_TREND, numbers[LAST_ROOT])
+    return select(cut, min(h * growth(root), abs(caution)), usual)
 
 
 @helper

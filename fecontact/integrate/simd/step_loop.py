@@ -21,8 +21,9 @@ from fecontact.integrate.near_nodes import set_end
 from fecontact.integrate.polynomial_bounds import may_switch, needs_search
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import tableau
-from fecontact.integrate.rodas5p.dynamics import motion_given, next_kink, set_given
+from fecontact.integrate.rodas5p.dynamics import set_given
 from fecontact.integrate.rodas5p.error_control import passes_corner, sign_of, switches
+from fecontact.integrate.rodas5p.kinks import caution_after_failure, up_to_kink
 from fecontact.integrate.rodas5p.method import error_at_end, solve, switch_error
 from fecontact.integrate.rodas5p.missed_contacts import first_missed_at
 from fecontact.integrate.rodas5p.sliders import (
@@ -41,7 +42,7 @@ from fecontact.integrate.rodas5p.step_length import (
     LAST_STEP,
     REJECTED_LAST,
     growth,
-    next_length,
+    length_beyond,
     root_of,
     target_of,
 )
@@ -70,7 +71,7 @@ from fecontact.integrate.step_loop import (
 )
 from fecontact.integrate.step_loop import TAKEN as ACCEPTED
 from fecontact.integrate.step_polynomials import set_polynomials
-from fecontact.system.nodes import GroundMotion
+from fecontact.system.nodes import GroundMotion, ground_motion
 
 # How a call returned: so many attempts were made, lanes are free that more runs may take, or all
 # runs have ended.
@@ -190,20 +191,13 @@ def _next_step(b):
     problem, progress, w = b.problem, b.progress, b.workspace
     numbers = progress.numbers
     t, h, stop = numbers[TIME], numbers[STEP], b.limits[END]
-    if somewhere(t != b.limits[KNOWN]):
+    anew = (t != b.limits[KNOWN]) | (numbers[CAUTIOUS] != 0.0)
+    moved = ground_motion(t, problem.system)
+    target = target_of(t, h, b.limits[OUTCOME] == float(CUT), stop)
+    target, caution = up_to_kink(t, target, stop, b.limits[SMALLEST], moved, problem, progress, w)
+    if somewhere(anew):
         set_given(t, problem.system, w.given, w.load)
     b.limits[KNOWN] = t
-    moved = motion_given(w.given)
-    target = target_of(t, h, b.limits[OUTCOME] == float(CUT), stop)
-    limit, caution = numbers[CAUTIOUS], spread(0.0)
-    if somewhere(limit > 0.0):
-        reach = max(limit, target - t)
-        kink = next_kink(moved, problem, progress, w.nodes, reach)
-        cut = (limit > 0.0) & (kink > max(1e-3 * limit, 100.0 * b.limits[SMALLEST])) & (
-            kink < 0.9 * reach)
-        target = select(cut, min(stop, t + 1.0003 * kink), target)
-        caution = select(cut, limit, 0.0)
-        numbers[CAUTIOUS] = spread(0.0)
     return Step(t, target - t, target, target, moved, caution, False)
 
 
@@ -324,13 +318,12 @@ def _set_next(step, error, good, missed, again, part, b):
     failed = opposite(good | again)
     step_before, root_before, rejected = (numbers[LAST_STEP], numbers[LAST_ROOT],
                                           numbers[REJECTED_LAST])
-    longer = next_length(step.h, root, b.problem.control.longest, numbers)
+    longer = length_beyond(step.caution, step.h, root, b.problem.control.longest, numbers)
     numbers[STEP] = select(good, longer, step.h * select(again, part, growth(root)))
     numbers[LAST_STEP] = select(good, numbers[LAST_STEP], step_before)
     numbers[LAST_ROOT] = select(good, numbers[LAST_ROOT], root_before)
     numbers[REJECTED_LAST] = select(failed, 1.0, select(good, 0.0, rejected))
-    after_failure = select(failed & opposite(step.caution > 0.0), step.h, 0.0)
-    numbers[CAUTIOUS] = select(good, step.caution, after_failure)
+    numbers[CAUTIOUS] = select(good, step.caution, select(failed, caution_after_failure(step), 0.0))
     b.limits[OUTCOME] = select(good, float(ACCEPTED), select(again, select(
         part < 1.0, float(CUT), float(ANEW)), float(FAILED)))
     numbers[MISSED] = select(good, 0.0, select(missed, numbers[MISSED] + 1.0, numbers[MISSED]))

@@ -1,0 +1,108 @@
+"""Steps that end where forces change their character, against closed forms of the motions."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from systems import mass_in_plane, mass_in_y
+
+from fecontact.integrate.rodas5p import driver
+from fecontact.integrate.rodas5p.kinks import _BEYOND, _SHORT
+from fecontact.integrate.rodas5p.state import CAUTIOUS
+from fecontact.integrate.step_loop import REJECTIONS, STEP, TIME
+from fecontact.laws import ConstantFriction, Frictionless, LinearContact, PrescribedForce
+
+# Angular frequency [rad/s] of the free mass.
+W = 10.0
+
+
+def ends_of_steps(system, state, reach, steps=1, caution=1.0):
+    """Ends of the first steps, all taken at once, after one of the length ``reach`` has failed.
+
+    With ``caution`` -1 another one has failed that ended just beyond a kink.
+    """
+    run = driver.start(system, np.array(state), np.array([0.0, 10.0]), rtol=1e-2,
+                       method="rodas5p")
+    run.progress.numbers[STEP] = reach
+    run.progress.numbers[CAUTIOUS] = caution * reach
+    found = []
+    for _ in range(steps):
+        run.advance(1)
+        found.append(run.progress.numbers[TIME])
+    assert run.progress.counts[REJECTIONS] == 0
+    return found
+
+
+def falling(height, speed):
+    """A mass on a spring above a stop, its state, and the time at which it touches."""
+    def place(t):
+        return height * np.cos(W * t) - speed / W * np.sin(W * t)
+
+    system = mass_in_y(spring=W**2, normal=LinearContact(1e3, 2.0), friction=Frictionless())
+    return system, [height, -speed], brentq(place, 0.0, np.pi / W, xtol=1e-15)
+
+
+def test_a_step_ends_just_beyond_a_touch():
+    system, state, touch = falling(0.001, 2.0)
+    (end,) = ends_of_steps(system, state, 1.2 * touch)
+    assert end / touch == pytest.approx(_BEYOND, abs=1e-7)
+
+
+def test_where_that_is_too_far_it_ends_just_before_and_the_next_just_beyond():
+    system, state, touch = falling(0.02, 2.0)
+    reach = 1.2 * touch
+    first, second = ends_of_steps(system, state, reach, 2, caution=-1.0)
+    assert touch - 1.2 * _SHORT * reach < first < touch - 0.8 * _SHORT * reach
+    assert 1.0 < second / touch < 1.0 + 1e-6
+
+
+@pytest.mark.parametrize("height", [0.02, 0.04])
+def test_the_way_to_a_touch_is_known_up_to_the_third_power_of_time(height):
+    # What is left of the motion is a fourth derivative W^4 y: its part W^4 y t^4 / 24.
+    system, state, touch = falling(height, 2.0)
+    reach = 1.2 * touch
+    (first,) = ends_of_steps(system, state, reach, caution=-1.0)
+    speed = np.hypot(2.0, W * height)
+    most = W**4 * height * touch**4 / 24.0 / speed
+    assert abs(first + _SHORT * reach - touch) < 1.5 * most + 2e-5 * touch
+    # Without the third power it would be W^2 v t^3 / 6.
+    assert most + 2e-5 * touch < 0.2 * W**2 * 2.0 * touch**3 / 6.0 / speed
+
+
+def test_a_step_ends_where_a_pressing_force_falls_to_zero():
+    stiffness, damping, depth, speed = 400.0, 4.0, 1e-3, 0.05
+    decay, w = 0.5 * damping, np.sqrt(stiffness - 0.25 * damping**2)
+
+    def motion(t):
+        b = (-speed + decay * depth) / w
+        wave = depth * np.cos(w * t) + b * np.sin(w * t)
+        rate = w * (b * np.cos(w * t) - depth * np.sin(w * t))
+        return np.exp(-decay * t) * wave, np.exp(-decay * t) * (rate - decay * wave)
+
+    def force(t):
+        u, v = motion(t)
+        return stiffness * u + damping * v
+
+    zero = brentq(force, 0.0, 0.1, xtol=1e-15)
+    assert motion(zero)[0] > 0.0
+    system = mass_in_y(normal=LinearContact(stiffness, damping), friction=Frictionless())
+    (end,) = ends_of_steps(system, [-depth, speed], 1.5 * zero)
+    # The tangent at the begin would be 0.7 % off.
+    rate = (force(1e-7) - force(0.0)) / 1e-7
+    assert abs(-force(0.0) / rate / zero - 1.0) > 6e-3
+    assert end / zero == pytest.approx(_BEYOND, abs=1e-4)
+
+
+def test_a_step_ends_where_slip_is_about_to_cease():
+    # Friction slows the mass evenly, but for its smoothing: by 0.3 % less on the way.
+    system = mass_in_plane(normal=PrescribedForce(2.0), friction=ConstantFriction(0.5, 1e4))
+    run = driver.start(system, np.zeros(4), np.array([0.0, 1.0]), rtol=1e-2,
+                       method="rodas5p")
+    slow = float(run.problem.control.slow[0])
+    (end,) = ends_of_steps(system, [0.0, 0.0, 0.02, 0.0], 0.03)
+    assert end == pytest.approx((0.02 - slow) * _BEYOND, rel=4e-3)
+
+
+def test_steps_that_have_not_failed_do_not_look_ahead():
+    system, state, touch = falling(0.1, 2.0)
+    assert ends_of_steps(system, state, 0.5 * touch, caution=0.0) == [0.5 * touch]
+    assert ends_of_steps(system, state, 0.5 * touch) == [0.5 * touch]
