@@ -53,6 +53,13 @@ class Gradients(NamedTuple):
     polynomial: Annotated[Array, COMBINATIONS, MODES]
 
 
+@helper
+def give_motion(moved, given):
+    """Let the motion of the ground in ``given`` be another one."""
+    given[TRAVEL], given[SPEED] = moved.travel, moved.speed
+    given[SECOND_TRAVEL], given[SECOND_SPEED] = moved.second_travel, moved.second_speed
+
+
 @routine
 def set_given(t, s, given, load):
     """Fill ``given`` (10,) with what is given at time t, and ``load`` (m,) with its modal force."""
@@ -64,9 +71,7 @@ def set_given(t, s, given, load):
             given[PULL + axis] = stiffness * value + damping * rate
             given[PULL_RATE + axis] = stiffness * rate
             kernels.add_drive_force(given[PULL + axis], axis, s, load)
-    moved = nodes.ground_motion(t, s)
-    given[TRAVEL], given[SPEED] = moved.travel, moved.speed
-    given[SECOND_TRAVEL], given[SECOND_SPEED] = moved.second_travel, moved.second_speed
+    give_motion(nodes.ground_motion(t, s), given)
     kernels.add_loads(t, s, load)
 
 
@@ -357,20 +362,32 @@ def set_load_rate(t, later, after_t, s, out):
 
 
 @routine
-def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
+def set_time_rate(s, blocks, given, change, g, rate_of_loads, w, out):
     """Fill ``out`` (size,) with df/dt at a fixed state.
 
-    The ground that moves on under a node acts as the node moving back: travel enters with x,
-    speed with x'. ``acceleration`` (2,) is that of the ground's motions, ``rate_of_loads`` (m,) the
-    rate of the modal loads.
+    ``change`` holds the rates of the ground's motion, ``rate_of_loads`` (m,) those of the modal
+    loads; ``w`` (3, d n) is a work array.
     """
-    m, n, d = len(rate_of_loads), len(s.gap), s.rows.shape[1]
-    states, forces = g.rates.shape[1], w[2]
+    m = len(rate_of_loads)
     for i in range(m):
         out[i] = 0.0
         out[m + i] = rate_of_loads[i]
-        for axis in range(d):
+        for axis in range(s.rows.shape[1]):
             out[m + i] += given[PULL_RATE + axis] * s.drive_shapes[axis, i]
+    for k in range(2 * m, len(out)):
+        out[k] = 0.0
+    add_ground_change(change, s, blocks, g, w, out)
+
+
+@routine
+def add_ground_change(change, s, blocks, g, w, out):
+    """Add to ``out`` (size,) what a change of the ground's motion makes of y'.
+
+    The ground that moves on under a node acts as the node moving back: travel enters with x,
+    speed with x'. ``w`` (3, d n) is a work array.
+    """
+    n, d = len(s.gap), s.rows.shape[1]
+    m, states, forces = len(blocks.position), g.rates.shape[1], w[2]
     for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         pressing = 0.0
@@ -378,20 +395,26 @@ def set_time_rate(s, blocks, given, acceleration, g, rate_of_loads, w, out):
             rate = 0.0
             for tangent in range(d - 1):
                 axis = 2 * tangent
-                rate -= (nodes.ground_moved(tangent, j, given[SPEED], given[SECOND_SPEED], s)
+                rate -= (nodes.ground_moved(tangent, j, change.travel, change.second_travel, s)
                          * g.partial[j, row, axis]
-                         + nodes.ground_moved(tangent, j, acceleration[0], acceleration[1], s)
+                         + nodes.ground_moved(tangent, j, change.speed, change.second_speed, s)
                          * g.partial[j, row, d + axis])
             if row < d:
                 forces[row * n + at] = rate
             else:
                 pressing = rate
-        for k in range(states):
-            rate = 0.0
-            if k < s.memory[j]:
-                rate = g.rates[j, k, 2] * pressing
-                for tangent in range(d - 1):
-                    rate -= (nodes.ground_moved(tangent, j, acceleration[0], acceleration[1], s)
-                             * g.rates[j, k, slip_entry(tangent, states)])
-            out[2 * m + j * states + k] = rate
+        for k in range(s.memory[j]):
+            rate = g.rates[j, k, 2] * pressing
+            for tangent in range(d - 1):
+                rate -= (nodes.ground_moved(tangent, j, change.speed, change.second_speed, s)
+                         * g.rates[j, k, slip_entry(tangent, states)])
+            out[2 * m + j * states + k] += rate
     add_node_forces(blocks, forces, out[m : 2 * m])
+
+
+@helper
+def rates_of_ground(varying, moved, acceleration):
+    """Rates of the ground's motion; zero if it is ``varying``, whose stages know them."""
+    part = 0.0 if varying else 1.0
+    return nodes.GroundMotion(part * moved.speed, part * acceleration[0],
+                              part * moved.second_speed, part * acceleration[1])

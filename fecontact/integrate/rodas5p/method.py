@@ -36,6 +36,7 @@ from fecontact.integrate.rodas5p.event_kernels import (
 )
 from fecontact.integrate.rodas5p.kinks import caution_after_failure, up_to_kink
 from fecontact.integrate.rodas5p.missed_contacts import first_missed_at
+from fecontact.integrate.rodas5p.moving_ground import ground_in, increments_in, set_ground
 from fecontact.integrate.rodas5p.sliders import BEGIN, END, OUTPUT, SWITCH, attend_at
 from fecontact.integrate.rodas5p.state import CAUTIOUS, MISSED, Step
 from fecontact.integrate.rodas5p.step_length import (
@@ -163,7 +164,9 @@ def _linearise(step, after_t, problem, progress, workspace):
     acceleration = dynamics.ground_acceleration(step.t, later,
                                                 dynamics.motion_given(workspace.given), s)
     dynamics.set_load_rate(step.t, later, after_t, s, workspace.pull_rate)
-    dynamics.set_time_rate(s, workspace.near, workspace.given, acceleration, progress.gradients,
+    change = dynamics.rates_of_ground(
+        problem.control.varying, dynamics.motion_given(workspace.given), acceleration)
+    dynamics.set_time_rate(s, workspace.near, workspace.given, change, progress.gradients,
                            workspace.pull_rate, workspace.nodes, workspace.time_rate)
     take_scales(problem.control, progress)
 
@@ -177,7 +180,9 @@ def _stages(step, G, problem, progress, workspace):
     s, blocks, switched = problem.system, problem.blocks, False
     size = len(progress.state)
     m = len(workspace.load)
-    last, rise = step.t, 1.0 / step.h
+    last, rise, varying = step.t, 1.0 / step.h, problem.control.varying
+    if varying:
+        set_ground(step, step.moved, s, workspace.ground)
     tableau.begin_stages(progress.state, workspace.sums)
     for i in range(tableau.STAGES):
         if i == 0:
@@ -190,6 +195,8 @@ def _stages(step, G, problem, progress, workspace):
             if somewhere(now != last):
                 dynamics.set_given(now, s, workspace.given, workspace.load)
                 last = now
+            if varying:
+                dynamics.give_motion(ground_in(i, workspace.ground), workspace.given)
             set_stage_rate(problem, progress, workspace, workspace.nodes)
             switched = switched | switches(workspace.near.used[0], workspace.near.nodes,
                                            workspace.nodes[2], progress.signs)
@@ -198,8 +205,13 @@ def _stages(step, G, problem, progress, workspace):
         if tableau.TIME[i] != 0.0:
             for k in range(m, size):
                 workspace.right[k] += tableau.TIME[i] * step.h * workspace.time_rate[k]
+        if varying:
+            dynamics.add_ground_change(increments_in(i, workspace.ground), s, workspace.near,
+                                       progress.gradients, workspace.nodes, workspace.right)
         stage_solver.solve_stage(G, s, blocks, progress.gradients, workspace.reduced,
                                  workspace.right, workspace.nodes, workspace.stages[i])
+    if varying:
+        dynamics.give_motion(ground_motion(last, s), workspace.given)
     for k in range(size):
         workspace.after[k] = workspace.stage[k] + workspace.stages[tableau.STAGES - 1, k]
     progress.counts[RATES] += tableau.STAGES

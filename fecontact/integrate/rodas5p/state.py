@@ -9,7 +9,7 @@ from fecontact.core.records import ANY, allocate
 from fecontact.core.types import Array, Integers
 from fecontact.integrate import bernstein, step_loop, step_polynomials
 from fecontact.integrate.rodas5p import dynamics as motion
-from fecontact.integrate.rodas5p import stage_solver, tableau
+from fecontact.integrate.rodas5p import moving_ground, stage_solver, tableau
 from fecontact.integrate.rodas5p.blocks import Blocks, near_blocks
 from fecontact.integrate.rodas5p.step_length import LAST_ROOT
 from fecontact.integrate.step_loop import STEP, TIME
@@ -81,6 +81,8 @@ class Control(NamedTuple):
         elements.
     slider_counts : (n,) array
         Number of these elements of each node.
+    varying : int
+        Whether the speed of the ground varies in time.
     """
 
     displacement_scale: Annotated[Array, MODES]
@@ -107,6 +109,7 @@ class Control(NamedTuple):
     many: int
     sliders: int
     slider_counts: Annotated[Integers, NODES]
+    varying: int
 
 
 class Problem(NamedTuple):
@@ -194,7 +197,7 @@ class Workspace(NamedTuple):
     :func:`fecontact.integrate.rodas5p.error_control.set_creeps` fills it. ``ends`` to ``places``
     serve to look at a step's polynomials: the nodes at its ends, its coefficients, those of the
     nodes, and room for what they may do. ``sums`` (2, size, 8) are what stages add to those after
-    them.
+    them, ``ground`` is the motion of ground of varying speed in these.
     """
 
     near: Blocks
@@ -225,6 +228,7 @@ class Workspace(NamedTuple):
     halves: Annotated[Array, bernstein.DEPTH, step_polynomials.COLUMNS]
     places: Annotated[Array, step_polynomials.MOST]
     sums: Annotated[Array, 2, SIZE, tableau.STAGES]
+    ground: Annotated[Array, tableau.STAGES, moving_ground.WIDTH]
 
 
 def workspace_for(

@@ -24,7 +24,7 @@ from fecontact.core.copies import put, put_rows
 from fecontact.core.records import Block, Size, allocate, shapes
 from fecontact.core.types import Array
 from fecontact.integrate import collocated_columns as collocation
-from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
+from fecontact.integrate.rodas5p import dynamics, moving_ground, stage_solver, tableau
 from fecontact.integrate.rodas5p import state as run_arrays
 from fecontact.integrate.rodas5p import variational_stages as columns
 from fecontact.integrate.rodas5p.blocks import block_at
@@ -39,6 +39,7 @@ from fecontact.system.nodes import (
     MODES,
     NODES,
     SIZE,
+    GroundMotion,
     SystemArrays,
     ground_motion,
     memory_of,
@@ -81,6 +82,8 @@ class Variation(NamedTuple):
         Work array: displacements, velocities and forces of the nodes.
     given, load : (2, GIVEN), (2, m) arrays
         Motions and loads that are prescribed at a stage in the systems above and below.
+    ground : (2, STAGES, WIDTH) array
+        Motion of ground of varying speed in the stages, in these systems.
     forces : (d n,) array
         Work array of node forces.
     paths : (STAGES, D, n) array
@@ -102,6 +105,7 @@ class Variation(NamedTuple):
     nodes: Annotated[Array, 3, AXES * NODES]
     given: Annotated[Array, 2, dynamics.GIVEN]
     load: Annotated[Array, 2, MODES]
+    ground: Annotated[Array, 2, tableau.STAGES, moving_ground.WIDTH]
     none: Annotated[Array, MODES]
     forces: Annotated[Array, AXES * NODES]
     paths: Annotated[Array, tableau.STAGES, DIRECTIONS, NODES]
@@ -156,7 +160,7 @@ def variation_for(
 
 
 @routine
-def _expand(side, step, y, s, blocks, v, g, time_rate):
+def _expand(side, step, y, varying, s, blocks, v, g, time_rate):
     """Fill gradients g and the rate at a fixed state of y' of a system at the begin of a step.
 
     What is given there goes to row ``side`` of that in v.
@@ -167,17 +171,20 @@ def _expand(side, step, y, s, blocks, v, g, time_rate):
     dynamics.set_gradients(y, s, blocks, dynamics.motion_given(given), v.nodes, g)
     acceleration = dynamics.ground_acceleration(step.t, later, dynamics.motion_given(given), s)
     dynamics.set_load_rate(step.t, later, after_t, s, v.none)
-    dynamics.set_time_rate(s, blocks, given, acceleration, g, v.none, v.nodes, time_rate)
+    change = dynamics.rates_of_ground(varying, dynamics.motion_given(given), acceleration)
+    dynamics.set_time_rate(s, blocks, given, change, g, v.none, v.nodes, time_rate)
     v.none[:] = 0.0
+    if varying:
+        moving_ground.set_ground(step, dynamics.motion_given(given), s, v.ground[side])
 
 
 @routine
-def _begin_parameter(step, progress, blocks, vary):
+def _begin_parameter(step, varying, progress, blocks, vary):
     """Fill d2f/dt dp (v.vectors[6]) and v.between at the begin of a step."""
     v, y = vary.variation, progress.state
     drift, other = v.vectors[6], v.vectors[5]
-    _expand(0, step, y, vary.above, blocks, v, v.ahead, drift)
-    _expand(1, step, y, vary.below, blocks, v, v.behind, other)
+    _expand(0, step, y, varying, vary.above, blocks, v, v.ahead, drift)
+    _expand(1, step, y, varying, vary.below, blocks, v, v.behind, other)
     for k in range(len(y)):
         drift[k] = (drift[k] - other[k]) / vary.width
     columns.set_between(v.ahead, progress.gradients, v.behind, vary.width, vary.central != 0,
@@ -241,6 +248,21 @@ def _set_forced(part, Y, u, blocks, vary, out):
 
 
 @routine
+def _add_ground(i, s, blocks, gradients, ground, vary, out):
+    """Add to ``out`` the derivative of what the increments of the ground in stage i make of y'."""
+    v, width = vary.variation, vary.width
+    dynamics.add_ground_change(moving_ground.increments_in(i, ground), s, blocks, v.between,
+                               v.nodes, out)
+    above = moving_ground.increments_in(i, v.ground[0])
+    below = moving_ground.increments_in(i, v.ground[1])
+    change = GroundMotion(
+        (above.travel - below.travel) / width, (above.speed - below.speed) / width,
+        (above.second_travel - below.second_travel) / width,
+        (above.second_speed - below.second_speed) / width)
+    dynamics.add_ground_change(change, s, blocks, gradients, v.nodes, out)
+
+
+@routine
 def _largest_error(scale, v):
     largest = 0.0
     for c in range(len(v.columns)):
@@ -295,13 +317,13 @@ def propagate(
     state, gradients, stages = progress.state, progress.gradients, workspace.stages
     m = len(v.none)
     Y = v.vectors[0]
-    varies = vary.width != 0.0
+    varies, varying = vary.width != 0.0, problem.control.varying
     acceleration = dynamics.ground_acceleration(step.t, dynamics.t_plus(step), step.moved, s)
     columns.learn(gradients, v.usual)
-    columns.set_paths(step, acceleration, s, blocks, stages, v)
+    columns.set_paths(step, acceleration, varying, workspace.ground, s, blocks, stages, v)
     columns.set_second_derivatives(step, acceleration, problem, progress, workspace, v)
     if varies:
-        _begin_parameter(step, progress, blocks, vary)
+        _begin_parameter(step, varying, progress, blocks, vary)
     moved, last = step.moved, step.t
     counts, sliders = problem.control.slider_counts, problem.control.sliders != 0
     force, rates = np.empty(v.inside.force.shape[1]), np.empty(v.inside.rates.shape[1:])
@@ -320,6 +342,11 @@ def propagate(
                     dynamics.set_given(now, vary.above, v.given[0], v.load[0])
                     dynamics.set_given(now, vary.below, v.given[1], v.load[1])
             last = now
+            if varying:
+                moved = moving_ground.ground_in(i, workspace.ground)
+            if varying and varies:
+                for side in range(2):
+                    dynamics.give_motion(moving_ground.ground_in(i, v.ground[side]), v.given[side])
             if sliders:
                 keep_sides(moved, Y, s, counts, force, rates, sides)
             dynamics.set_gradients(Y, s, blocks, moved, v.nodes, v.inside)
@@ -328,6 +355,8 @@ def propagate(
             columns.learn(v.inside, v.usual)
         if varies:
             _set_forced(tableau.TIME[i] * step.h, Y, stages[i], blocks, vary, v.vectors[3])
+            if varying:
+                _add_ground(i, s, blocks, gradients, workspace.ground, vary, v.vectors[3])
         columns.set_ahead(i, state, s, stages, v)
         columns.solve_stage(i, step.h, problem, progress, workspace, vary)
     if len(state) > 2 * m:

@@ -10,10 +10,19 @@ there; this is found once a step, by differences.
 
 from fecontact.core.compiled import helper, routine
 from fecontact.integrate.rodas5p import dynamics, stage_solver, tableau
+from fecontact.integrate.rodas5p.moving_ground import increments_in
 from fecontact.integrate.step_polynomials import STEEPEST
 from fecontact.system.elastic_sliders import deflection_of
 from fecontact.system.node_forces import friction_entry, node_gradients, slip_entry
-from fecontact.system.nodes import NodeMotion, ground_moved, memory_of, node_contact
+from fecontact.system.nodes import (
+    GroundMotion,
+    NodeMotion,
+    ground_moved,
+    ground_speed,
+    ground_travel,
+    memory_of,
+    node_contact,
+)
 from fecontact.system.polynomial_forces import (
     add_polynomial_product,
     has_polynomial,
@@ -47,27 +56,30 @@ def learn(here, usual):
 
 
 @routine
-def set_paths(step, acceleration, s, blocks, stages, v):
+def set_paths(step, acceleration, varying, ground, s, blocks, stages, v):
     """Fill v.paths (STAGES, D, n) with what each stage moves the nodes against the other side.
 
     Along the D directions of a node: its motion, in the order of the columns of
-    ``Gradients.partial``, and its internal variables. ``acceleration`` is that of the ground.
+    ``Gradients.partial``, and its internal variables. ``acceleration`` is that of the ground, or
+    its motion in the stages is ``ground`` if that is ``varying``.
     """
     paths, w = v.paths, v.nodes
     m, n, d = len(v.none), len(s.gap), s.rows.shape[1]
     states = v.inside.rates.shape[1]
-    first, second = step.moved.speed, step.moved.second_speed
     for i in range(tableau.STAGES):
         dynamics.project(blocks, stages[i], w[0], w[1])
         part = tableau.TIME[i] * step.h
+        moved = GroundMotion(part * step.moved.speed, part * acceleration[0],
+                             part * step.moved.second_speed, part * acceleration[1])
+        if varying:
+            moved = increments_in(i, ground)
         for j in range(n):
             for axis in range(d):
                 paths[i, axis, j], paths[i, d + axis, j] = w[0, axis * n + j], w[1, axis * n + j]
             for tangent in range(d - 1):
                 axis = 2 * tangent
-                paths[i, axis, j] -= part * ground_moved(tangent, j, first, second, s)
-                paths[i, d + axis, j] -= part * ground_moved(
-                    tangent, j, acceleration[0], acceleration[1], s)
+                paths[i, axis, j] -= ground_travel(tangent, j, moved, s)
+                paths[i, d + axis, j] -= ground_speed(tangent, j, moved, s)
             for k in range(states):
                 paths[i, 2 * d + k, j] = stages[i, 2 * m + j * states + k]
 
