@@ -34,8 +34,9 @@ EndsAt = Callable[[Array], Array]
 Sides = tuple[bool, bool]
 Parameter = str | tuple[Callable[[ContactSystem, float], ContactSystem], float]
 
-# Largest change of ground velocity, relative to the velocity scale of friction.
-_SLIP = 0.05
+# Largest change of ground velocity, relative to the velocity scale of friction, and at how many
+# times it is looked for.
+_SLIP, _OFTEN = 0.005, 101
 # Largest change of penetrations, relative to their scale, and at how many times it is examined.
 _DEPTH, _SOMETIMES = 1e-4, 9
 # Change of the state for a difference of runs, in parts of its largest value.
@@ -351,7 +352,7 @@ def _moved(
     # A relative change of 1e-5 of a belt speed of 0.2 m/s exceeds a velocity scale of 1 um/s, and a
     # gap of zero has no size of its own of which a part could be taken.
     scale = min((law.velocity_scale for _, _, law in system.law_groups("friction")), default=np.inf)
-    faster = np.abs(_passing(above) - _passing(below)).max(initial=0.0) * move / (high - low)
+    faster = _faster(above, below, times) * move / (high - low)
     deeper = _deeper(above, below, times, state)
     above, below, low, high = perturbed_systems(system_at, value, move / max(
         1.0, faster / (_SLIP * scale), deeper / (_DEPTH * system.penetration_scale)))
@@ -390,7 +391,8 @@ def _deeper(above: ContactSystem, below: ContactSystem, times: Array, state: Arr
     return float(np.abs(one - other).max(initial=0.0))
 
 
-def _passing(system: ContactSystem) -> Array:
-    """Speed (n,) with which the other side passes each node, as its parameter says."""
-    motion = system.prescribed_motion
-    return np.tensordot([one.speed for one in motion.motions], motion.factors, 1)
+def _faster(above: ContactSystem, below: ContactSystem, times: Array) -> float:
+    """Largest difference of the speeds with which the other side passes a node in two systems."""
+    one, other = above.prescribed_motion, below.prescribed_motion
+    return max(float(np.abs(one.velocity(t) - other.velocity(t)).max(initial=0.0))
+               for t in np.linspace(times[0], times[-1], _OFTEN))

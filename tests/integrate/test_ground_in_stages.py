@@ -11,6 +11,7 @@ from fecontact.integrate.trajectory import Status
 from fecontact.laws import (
     ConstantFriction,
     DahlFriction,
+    ExponentialFriction,
     HarmonicSpeed,
     JenkinsFriction,
     PrescribedForce,
@@ -86,9 +87,11 @@ def test_in_space_the_belt_moves_both_ways():
 @pytest.mark.parametrize("parameter", ["ground.motion.amplitude", "ground.motion.frequency_hz",
                                        "ground.speed"])
 def test_derivatives_are_those_of_collocation(parameter):
-    system = on_belt(ConstantFriction(0.5, 1e3), normal=3.0, speed=0.03)
-    ways = [sensitivity(system, 0.7, initial=[1e-3, 0.01], rtol=1e-9, parameter=parameter,
-                        solver=solver) for solver in (Rodas5P(), Radau())]
-    for name in ("monodromy", "parameter_derivative"):
-        one, other = (getattr(way, name) for way in ways)
-        assert np.abs(one - other).max() < 2e-6 * np.abs(other).max()
+    # The smoothing of the latter is narrow: it is passed within 1 um/s.
+    for friction in (ConstantFriction(0.5, 1e3), ExponentialFriction(0.5, 0.4, 1e3)):
+        system = on_belt(friction, normal=3.0, speed=0.03)
+        ways = [sensitivity(system, 0.7, initial=[1e-3, 0.01], rtol=1e-9, parameter=parameter,
+                            solver=solver) for solver in (Rodas5P(), Radau())]
+        for name in ("monodromy", "parameter_derivative"):
+            one, other = (getattr(way, name) for way in ways)
+            assert np.abs(one - other).max() < 1e-5 * np.abs(other).max()

@@ -52,7 +52,6 @@ from fecontact.integrate.step_runs import complete, until_end
 from fecontact.integrate.task import Task
 from fecontact.integrate.trajectory import Solution, Status
 from fecontact.laws.base import NormalLaw
-from fecontact.laws.ground.motion import constant_speed
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.elastic_sliders import (
     booked,
@@ -225,13 +224,6 @@ def _moved_both_ways(system: ContactSystem, above: ContactSystem, below: Contact
         for moved in (above, below)))
 
 
-def _varies(system: ContactSystem) -> bool:
-    """Whether the speed of the ground varies in time."""
-    arrays = system.arrays
-    steady = (0, constant_speed.address)
-    return arrays.ground_motion not in steady or arrays.second_motion not in steady
-
-
 def control_for(
     system: ContactSystem, state: Array, times: Array, *, rtol: float, max_step: float | None,
     work: bool,
@@ -268,7 +260,7 @@ def control_for(
         near=take_near.address if n > FEW else 0,
         many=0 if counts_as_few(n, bounds) else modes_may_switch.address,
         sliders=attend.address if counts.any() else 0, slider_counts=counts,
-        varying=int(_varies(system)))
+        varying=int(not system.prescribed_motion.constant))
 
 
 def _levels(system: ContactSystem) -> Array:
