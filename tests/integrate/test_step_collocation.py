@@ -20,6 +20,7 @@ from fecontact.laws import (
     DahlFriction,
     ExponentialFriction,
     Harmonics,
+    HarmonicSpeed,
     LinearContact,
     PowerContact,
     PrescribedForce,
@@ -202,6 +203,18 @@ def test_work_of_creep():
     for rtol in (1e-7, 1e-8, 1e-9, 1e-10):
         run = simulate(system, 0.3, initial=begin, outputs=31, solver=LONG, rtol=rtol)
         assert run.node_creep_work[-1, 0] == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-4])
+def test_stick_on_a_belt_of_varying_speed_at_loose_tolerances(rtol):
+    """The belt works c V^2 / 2 a second against the dashpot of a mass that it takes along."""
+    V, c = 0.05, 1.0
+    system = mass_in_x(100.0, normal=PrescribedForce(10.0), friction=ConstantFriction(0.5),
+                       ground=Ground(motion=HarmonicSpeed(V, 1.0)), drive=Drive(damping_x=c))
+    run = simulate(system, 10.0, outputs=1001, rtol=rtol, initial=[0.0, 0.0], solver=LONG)
+    assert run.status is Status.FINISHED
+    assert run.statistics["steps"] < 1500
+    assert run.energies.belt_friction_work[-1] == pytest.approx(5.0 * c * V**2, rel=5e-3)
 
 
 def test_steps_end_where_slip_turns_round():

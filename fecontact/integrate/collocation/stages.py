@@ -93,6 +93,35 @@ def set_matrix_rows(i, h, J, c):
         c.matrix[row, row] += 1.0
 
 
+@helper
+def _slip_change(h, problem, workspace, c):
+    """Largest change of a slip velocity by ``c.right`` at a stage, in units of what is allowed.
+
+    The force of a node that sticks follows its slip velocity, which may be far below the errors of
+    velocities that the tolerance of the run allows.
+    """
+    s, control, projected = problem.system, problem.control, c.line[0]
+    m, n, largest = c.accelerations.shape[1], len(s.gap), 0.0
+    for j in range(n):
+        if workspace.nodes[2, n + j] != 0.0:
+            for i in range(STAGES):
+                projected[i] = 0.0
+                for k in range(m):
+                    projected[i] += s.rows[j, 0, k] * c.right[i * m + k]
+            moved = s.sliding[j, 0, 0] * c.given[STAGES - 1, dynamics.SPEED]
+            allowed = control.slip_part * (control.slip_scale[j]
+                                           + abs(workspace.nodes[1, j] - moved))
+            for i in range(STAGES):
+                slip = 0.0
+                for other in range(STAGES):
+                    slip += ONCE[i, other] * projected[other]
+                part = h * abs(slip) / allowed
+                # Comparisons with NaN are false.
+                if part > largest:
+                    largest = part
+    return largest
+
+
 @routine
 def _improve(h, before, anew, problem, progress, workspace, c):
     """One iteration of Newton's method; how much it changes, in units of the tolerance.
@@ -117,6 +146,7 @@ def _improve(h, before, anew, problem, progress, workspace, c):
         c.flags[JACOBIANS] += 1
     solve(c.matrix, c.pivots, c.right)
     progress.counts[RATES] += STAGES
+    slipping = _slip_change(h, problem, workspace, c)
     size, speeds = 0.0, speed_scale(problem, progress)
     for k in range(m):
         to_speed = h * problem.control.largest[k] / speeds
@@ -132,7 +162,7 @@ def _improve(h, before, anew, problem, progress, workspace, c):
                 size = np.inf
         for i in range(STAGES):
             c.accelerations[i + 1, k] += c.right[i * m + k]
-    return size / c.tolerance
+    return max(size / c.tolerance, slipping)
 
 
 @helper
