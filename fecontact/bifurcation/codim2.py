@@ -25,6 +25,7 @@ from fecontact.bifurcation.continuation.problem import (
     ContinuationOptions,
     Problem,
     options_of,
+    require_direction,
 )
 from fecontact.bifurcation.equilibria.codim2 import critical_square, equilibrium_curve
 from fecontact.bifurcation.equilibria.problem import equilibrium_at
@@ -37,7 +38,6 @@ from fecontact.core.errors import (
     AnalysisError,
     FecontactError,
     InputError,
-    require_finite,
     shown,
 )
 from fecontact.core.resources.blas_threads import one_blas_thread
@@ -112,7 +112,7 @@ def codim2_curve(
     require_kind("codim2_curve", BranchPoint, point=point)
     require_kind("codim2_curve", str, parameter=parameter)
     require_kind("codim2_curve", (Mapping, type(None)), bounds=bounds)
-    require_finite("codim2_curve", direction=direction)
+    require_direction("codim2_curve", direction)
     require_kind("codim2_curve", (str, type(None)), to=to)
     require_flags("codim2_curve", both=both)
     if not (isinstance(keep, str) and keep in ("kind", "period")):

@@ -11,7 +11,12 @@ from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
 from fecontact.bifurcation.continuation.inner_product import unit
 from fecontact.bifurcation.continuation.points import HopfPoint
-from fecontact.bifurcation.continuation.problem import ContinuationOptions, options_of, sizes_of
+from fecontact.bifurcation.continuation.problem import (
+    ContinuationOptions,
+    options_of,
+    require_direction,
+    sizes_of,
+)
 from fecontact.bifurcation.continuation.rounding import Rounding
 from fecontact.bifurcation.orbit_methods import Collocation, Method
 from fecontact.bifurcation.orbits import starts
@@ -21,7 +26,7 @@ from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.multiplier_rounding import MultiplierRounding
 from fecontact.bifurcation.orbits.same_orbit import VANISHING
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError, require_finite
+from fecontact.core.errors import InputError
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike, ComplexArray
 from fecontact.integrate.field_runs.field_run import FieldRun
@@ -166,7 +171,7 @@ def orbit_family(
     how = method or Collocation()
     by = discretisation_by(how)
     by.require_family(how, field)
-    require_finite("orbit_family", direction=direction)
+    require_direction("orbit_family", direction)
     free = field.index(field.parameter_or_only(unfolding))
     if field.forcing_period(field.values) is not None:
         raise InputError("orbit_family: the field depends on time, and so has no families of "

@@ -246,9 +246,10 @@ def merged(given: object, by_name: Mapping[str, Any]) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If what is given is no mapping.
+        If what is given is no mapping, or a name is no text.
     """
     require_kind("with_", (Mapping, type(None)), changes=given)
+    as_texts(tuple(given or ()), "with_: names of parameters")  # type: ignore[arg-type]
     return {**(given or {}), **by_name}  # type: ignore[dict-item]
 
 
@@ -274,12 +275,12 @@ class _Guarded(np.ndarray):
 
 def require_within(
     owner: str, function: Callable[..., Any], held: str, *arguments: float | Array
-) -> None:
+) -> bool:
     """Raise InputError if a function of the user, called in Python, reaches beyond its arrays.
 
     Compiled code does not check indices. Whatever else is wrong with these arguments, such as a
     division by zero or a table that ends before them, is no matter. ``held`` says what the arrays
-    hold.
+    hold. Return True if the call came to its end without an error.
     """
     guarded = [one.view(_Guarded) if isinstance(one, np.ndarray) else one for one in arguments]
     try:
@@ -289,4 +290,5 @@ def require_within(
         raise InputError(f"{owner} {function.__name__} uses an entry beyond its arrays ({error}), "
                          f"which hold {held}; give as many as it uses.") from None
     except Exception:
-        return
+        return False
+    return True

@@ -5,6 +5,7 @@ import pytest
 from collocation_fields import lorenz_field
 
 from fecontact.bifurcation import (
+    ContinuationOptions,
     CrossingPoint,
     equilibrium_branch,
     find_equilibrium,
@@ -66,6 +67,20 @@ def test_transcritical_points(a, tmp_path):
         assert found.form == "transcritical"
         assert found.criticality is None
         assert found.coefficient == pytest.approx(a, rel=1e-9)
+
+
+@pytest.mark.parametrize("bounds", [(-1.0, 1.0), (-1e3, 1e3)])
+def test_the_other_branch_has_the_width_of_the_first_where_the_parameter_is_zero(bounds):
+    def fork(t, x, p, out):
+        out[0] = p[0] * x[0] - 3.0 * x[0] ** 3
+
+    field = vector_field(fork, {"p": bounds[0]}, 1)
+    found, = equilibrium_branch(field, [0.0], bounds=bounds).special
+    assert abs(found.parameter) < 1e-9
+    other = equilibrium_branch(field, found, options=ContinuationOptions(points=60))
+    reached = other.parameter[-1]
+    assert 0.5 * bounds[1] < reached < 10.0 * bounds[1]
+    assert other.column("state")[-1, 0] ** 2 == pytest.approx(reached / 3.0, rel=1e-9)
 
 
 def linear(t, x, p, out):

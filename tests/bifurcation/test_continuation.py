@@ -123,6 +123,11 @@ def test_events_and_stops():
     assert [point.kind for point in first.special] == ["fold"]
     once = continue_branch(CUBIC, start, ContinuationOptions(stop_at=iter(["fold"])))
     assert once.status is BranchStatus.STOPPED
+    unknown = {"nowhere": lambda values: np.nan,
+               "here": lambda values: values["x"] - 0.1 if values["x"] > 0.0 else np.nan}
+    told = continue_branch(CUBIC, start, ContinuationOptions(events=unknown, bounds=(-2.0, 2.0)))
+    assert told.message == ("The event 'nowhere' is nan at every point, so that it has no zeros; "
+                            "let its function return a finite number.")
     plain = continue_branch(CUBIC, start, ContinuationOptions(locate=False, bounds=(-2.0, 2.0)))
     assert plain.special == ()
 

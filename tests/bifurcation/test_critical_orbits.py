@@ -36,9 +36,7 @@ def driven():
 
 
 def on_circle(function, start, bounds, states=3, radius=1.0, **parameters):
-    field, t, circle = circle_field(function, **parameters)
-    if states == 2:
-        field = vector_field(function, parameters, 2)
+    field, t, circle = circle_field(function, states, **parameters)
     return field, orbit_branch(
         field, PeriodicMotion(t, radius * circle[:, :states], period=np.pi), start,
         method=Collocation(intervals=12), direction=-1.0 if states == 2 else 1.0, bounds=bounds,

@@ -28,7 +28,13 @@ from fecontact import (
     sensitivity,
     simulate,
 )
-from fecontact.bifurcation import contact_field, find_equilibrium, stability_map, vector_field
+from fecontact.bifurcation import (
+    contact_field,
+    equilibrium_branch,
+    find_equilibrium,
+    stability_map,
+    vector_field,
+)
 from fecontact.laws import (
     Constant,
     ConstantFriction,
@@ -263,6 +269,10 @@ def test_kind_errors():
         find_equilibrium(field, start=[0.3])
     with pytest.raises(InputError, match="must have 1 values"):
         find_equilibrium(field, start=[0.3, 1.0])
+    with pytest.raises(InputError, match=r"holds nan \(value 0 of 1\); every value must be finite"):
+        find_equilibrium(field, start=[np.nan])
+    with pytest.raises(InputError, match="direction = 0 must be above zero, to go forward"):
+        equilibrium_branch(field, [0.3], direction=0)
     driven = belt().with_(**{"drive.amplitude_x": 1e-3, "drive.frequency_hz": 10.0 / TURN})
     with pytest.raises(AnalysisError, match=r"driven with the period 0\.628319 s"):
         find_equilibrium(contact_field(driven, []))

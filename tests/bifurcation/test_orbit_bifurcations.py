@@ -56,6 +56,7 @@ def test_lorenz_symmetric_orbit_loses_its_symmetry(lorenz, asymmetric):
                              method=Collocation(intervals=60), bounds=(300.0, 340.0),
                              direction=-1.0)
     point, = symmetric.of_kind("branch point")
+    assert (point.form, point.coefficient, point.criticality) == (None, None, None)
     assert point.parameter == pytest.approx(312.97, abs=6e-3)
     regular = np.array([at.kind is None for at in symmetric.points])
     low, high = symmetric.column("minimum")[regular], symmetric.column("maximum")[regular]

@@ -127,9 +127,9 @@ def test_curve_of_tori(monkeypatch):
     assert len(called) == len(curve) - 1 + 2
 
 
-def circle_field(function, **parameters):
+def circle_field(function, states=3, **parameters):
     """Orbits of the period pi on the circle of radius one and beside it."""
-    field = vector_field(function, parameters, 3)
+    field = vector_field(function, parameters, states)
     t = np.linspace(0.0, np.pi, 400)
     return field, t, np.stack([np.cos(2.0 * t), np.sin(2.0 * t), 0.0 * t], axis=1)
 

@@ -157,6 +157,37 @@ def test_functions_stay_within_their_arrays(parameters, states, numbers):
         vector_field(forced, {"force": 1.0}, 1, jacobian=rows_beyond)
 
 
+def test_functions_fill_all_rates():
+    def forgets(t, x, p, out):
+        out[0] = x[1]
+        if x[0] > 0.0:
+            out[1] = -x[0]
+
+    with pytest.raises(InputError, match=r"the function forgets leaves out\[1\] as it is; fill"):
+        vector_field(forgets, {}, 2)
+
+    def adds(t, x, p, out):
+        out[0] += x[0]
+
+    with pytest.raises(InputError, match=r"the function adds leaves out\[0\] as it is"):
+        vector_field(adds, {}, 1)
+
+    def diagonal(t, x, p, out):
+        out[0, 0] = out[1, 1] = -1.0
+
+    def falls(t, x, p, out):
+        out[:] = -x
+
+    with pytest.raises(InputError, match=r"jacobian diagonal leaves out\[0, 1\] as it is; .* 4"):
+        vector_field(falls, {}, 2, jacobian=diagonal)
+
+    def without_number(t, x, p, out):
+        out[0] = np.sqrt(x[0])
+        out[1] = np.nan
+
+    assert vector_field(without_number, {}, 2, differentiation="differences").dimension == 2
+
+
 # Contact systems -----------------------------------------------------------------------------
 
 def forced(t, x, p, out):

@@ -4,11 +4,18 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from fecontact.bifurcation.continuation.branch import Branch
+from fecontact.bifurcation.continuation.newton import value_of_event
 from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
-from fecontact.bifurcation.continuation.problem import BranchStatus, ContinuationOptions, Problem
+from fecontact.bifurcation.continuation.problem import (
+    BranchStatus,
+    ContinuationOptions,
+    Problem,
+    require_direction,
+)
 from fecontact.bifurcation.continuation.pseudo_arclength import End, continuation, start_of
-from fecontact.core.errors import require_finite
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.types import Array
 
@@ -43,7 +50,7 @@ def continue_branch(
     FecontactError
         If there is no solution near the start.
     """
-    require_finite("A branch", direction=direction)
+    require_direction("A branch", direction)
     header = BranchHeader(name, labelled(problem, name, attributes or {}))
 
     def side(wanted: ContinuationOptions, *, turned: bool) -> tuple[list[BranchPoint], End]:
@@ -54,8 +61,21 @@ def continue_branch(
 
     points, end = by_sides(side, options, both=both)
     branch = Branch(name, tuple(points), end.status, end.message, header.attributes)
-    message = " ".join(filter(None, (end.message, problem.note(branch.points))))
+    message = " ".join(filter(None, (end.message, problem.note(branch.points),
+                                     _note_of_events(branch.points, options))))
     return replace(branch, message=message)
+
+
+def _note_of_events(points: Sequence[BranchPoint], options: ContinuationOptions) -> str:
+    """Sentences on the user's events that are NaN at all regular points; empty without any."""
+    if not options.events:
+        return ""
+    found = [{**point.values, "parameter": point.parameter} for point in points
+             if point.kind is None]
+    return " ".join(
+        f"The event {name!r} is nan at every point, so that it has no zeros; let its function "
+        f"return a finite number." for name, event in options.events.items()
+        if found and all(np.isnan(value_of_event(name, event, known)) for known in found))
 
 
 def by_sides(

@@ -276,11 +276,12 @@ def _tests(
         found |= {"fold": float(tangent[-1]), **problem.tests(u, linearisation, tangent)}
     if options.events:
         known = {**values, "parameter": float(u[-1])}
-        found |= {name: _of_event(name, event, known) for name, event in options.events.items()}
+        found |= {name: value_of_event(name, event, known)
+                  for name, event in options.events.items()}
     return Tests(found)
 
 
-def _of_event(
+def value_of_event(
     name: str, event: Callable[[Mapping[str, Any]], float], known: Mapping[str, Any]
 ) -> float:
     """The value of a user's event."""

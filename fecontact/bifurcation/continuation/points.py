@@ -116,14 +116,19 @@ class CrossingPoint(BranchPoint):
         return np.asarray(self._detail("other_tangent"))
 
     @property
-    def form(self) -> str:
-        """'fork' or 'transcritical', of equilibria."""
-        return str(self._detail("form"))
+    def form(self) -> str | None:
+        """'fork' or 'transcritical', of equilibria; None of orbits and at a double zero."""
+        found = self._details.get("form")
+        return None if found is None else str(found)
 
     @property
-    def coefficient(self) -> float:
-        """Coefficient c of equilibria, in y' = k m y + c y^3 (fork) or k m y + c y^2."""
-        return float(self._detail("coefficient"))
+    def coefficient(self) -> float | None:
+        """Coefficient c of equilibria, in y' = k m y + c y^3 (fork) or k m y + c y^2.
+
+        None of orbits and at a double zero eigenvalue.
+        """
+        found = self._details.get("coefficient")
+        return None if found is None else float(found)
 
 
 class UnresolvedPoint(BranchPoint):

@@ -10,7 +10,14 @@ import numpy as np
 from fecontact.bifurcation.continuation.predictor import Predictor
 from fecontact.bifurcation.continuation.rounding import Rounding
 from fecontact.core.checks import as_count, as_floats, as_texts, require_flags, require_kind
-from fecontact.core.errors import InputError, choices, nearest, require_positive, shown
+from fecontact.core.errors import (
+    InputError,
+    choices,
+    nearest,
+    require_finite,
+    require_positive,
+    shown,
+)
 from fecontact.core.types import Array, ArrayLike
 
 _GROWTH = 1e4  # largest factor by which scales grow with the orbits of a branch
@@ -292,7 +299,8 @@ class ContinuationOptions:
         Kinds of special points, or names of events, at which the branch ends.
     events : mapping
         Functions by name of the stored values (and 'parameter'); their zeros become points of the
-        kind of that name.
+        kind of that name. Where one is NaN it has none; the message of the branch tells where it
+        is NaN at all points.
     progress : bool or callable, optional
         True for a progress bar on a terminal or in a notebook; a function receives the number of
         points after each.
@@ -401,10 +409,26 @@ def enlarged(scales: Array, sizes: Array, limits: Array | None) -> Array:
     return np.concatenate([larger, scales[d:]])
 
 
-def width_of(given: float | None, options: ContinuationOptions, value: float) -> float:
-    """Width of the diagram in the parameter, by default that of the bounds."""
+def require_direction(owner: str, direction: float) -> None:
+    """Raise :class:`InputError` unless a direction is a finite number other than zero."""
+    require_finite(owner, direction=direction)
+    if direction == 0.0:
+        raise InputError(f"{owner}: direction = {direction!r} must be above zero, to go forward, "
+                         f"or below zero, to go back.")
+
+
+def width_of(
+    given: float | None, options: ContinuationOptions, value: float, known: float | None = None
+) -> float:
+    """Width of the diagram in the parameter, by default that of the bounds.
+
+    Without bounds it is ``known``, the width of the branch from which it starts, or the size of the
+    value at the start.
+    """
     if given is not None:
         require_positive("A branch", width=given)
         return given
     span = options.bounds[1] - options.bounds[0]
-    return float(span) if np.isfinite(span) else abs(float(value)) or 1.0
+    if np.isfinite(span):
+        return float(span)
+    return abs(float(value)) or 1.0 if known is None else float(known)

@@ -14,6 +14,7 @@ from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
     options_of,
+    require_direction,
     sizes_of,
     width_of,
 )
@@ -26,7 +27,7 @@ from fecontact.bifurcation.equilibria.equilibrium import (
 )
 from fecontact.bifurcation.equilibria.problem import EquilibriumProblem, equilibrium_at
 from fecontact.core.checks import require_flags
-from fecontact.core.errors import InputError, require_finite
+from fecontact.core.errors import InputError
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.system.fields.vector_field import VectorField, require_field
@@ -78,8 +79,8 @@ def equilibrium_branch(
         Sizes of the states that count as one in the arclength; by default those of the field or the
         largest state at the start, growing with the states up to 1e4 times that.
     width : float, optional
-        Parameter range that counts as one; by default that of the bounds, or the value at the
-        start.
+        Parameter range that counts as one; by default that of the bounds, or that of the branch of
+        the point, or the value at the start.
 
     Raises
     ------
@@ -89,18 +90,19 @@ def equilibrium_branch(
         If no equilibrium is found at the start, or the rates depend on time there or at a bound.
     """
     require_field(field)
-    require_finite("equilibrium_branch", direction=direction)
+    require_direction("equilibrium_branch", direction)
     if both is not None:
         require_flags("equilibrium_branch", both=both)
     if isinstance(start, str):
         raise InputError(f"equilibrium_branch: start = {start!r} must be an equilibrium or a point "
                          f"of a branch; give the parameter by its name, parameter={start!r}.")
-    tangent, crossed = None, None
+    tangent, crossed, known_width = None, None, None
     if isinstance(start, BranchPoint):
         known = start.branch.parameter_name
         parameter = known if parameter is None else parameter
         begin = equilibrium_at(field, start)
         if parameter == known:
+            known_width = start.branch.attributes.get("width")
             crossed = start if isinstance(start, CrossingPoint) else None
             tangent = np.copysign(1.0, direction) * (
                 start.tangent if crossed is None else crossed.other_tangent)
@@ -108,9 +110,11 @@ def equilibrium_branch(
         begin = _start(field, start)
     parameter = field.parameter_or_only(parameter)
     index = field.index(parameter)
-    problem, chosen = _problem(field, begin, index, options, bounds, scales, width)
+    chosen = options_of(options, bounds)
+    width = width_of(width, chosen, begin.values[index], known_width)
+    problem = _problem(field, begin, index, chosen, scales, width)
     u = np.append(begin.state, begin.values[index])
-    attributes = attributes_of(field, begin.values)
+    attributes = {**attributes_of(field, begin.values), "width": width}
     if crossed is not None and tangent is not None:
         return _crossing(problem, crossed, tangent, chosen, parameter, both is not False,
                          attributes)
@@ -152,18 +156,16 @@ def _start(field: VectorField, start: Equilibrium | ArrayLike | None) -> Equilib
 
 
 def _problem(
-    field: VectorField, begin: Equilibrium, index: int, options: ContinuationOptions | None,
-    bounds: tuple[float, float] | None, scales: ArrayLike | None, width: float | None,
-) -> tuple[EquilibriumProblem, ContinuationOptions]:
-    chosen = options_of(options, bounds)
-    for bound in map(float, chosen.bounds):
+    field: VectorField, begin: Equilibrium, index: int, options: ContinuationOptions,
+    scales: ArrayLike | None, width: float,
+) -> EquilibriumProblem:
+    for bound in map(float, options.bounds):
         # The parameter may be the excitation itself, as an amplitude that starts at zero.
         there = begin.values.copy()
         there[index] = bound
         with suppress(InputError):
             if np.isfinite(bound):
                 require_autonomous(field, there)
-    width = width_of(width, chosen, begin.values[index])
     sizes = default_scales(begin) if scales is None else sizes_of(scales, begin.state)[0]
     limits = _GROWTH * sizes if scales is None else None
-    return EquilibriumProblem(field, begin.values, index, np.append(sizes, width), limits), chosen
+    return EquilibriumProblem(field, begin.values, index, np.append(sizes, width), limits)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.core.checks import as_floats, require_kind
+from fecontact.core.checks import as_floats, require_kind, require_state
 from fecontact.core.errors import AnalysisError, InputError, require_positive
 from fecontact.core.read_only import read_only_arrays
 from fecontact.core.resources.blas_threads import one_blas_thread
@@ -196,7 +196,7 @@ def find_equilibrium(
     AnalysisError
         If the field depends on time, or none is found; the message says where it got stuck.
     InputError
-        If a parameter is unknown or out of range.
+        If a parameter is unknown or out of range, or the start has other than d finite values.
     """
     require_field(field)
     require_kind("find_equilibrium", (Mapping, type(None)), parameters=parameters)
@@ -210,6 +210,7 @@ def find_equilibrium(
     if x.shape != (field.dimension,):
         raise InputError(f"The start of an equilibrium must have {field.dimension} values, not "
                          f"shape {x.shape}.")
+    require_state(x)
     found = newton(field, x, values, tolerance)
     if found is None:
         rate = np.abs(field.rates(np.zeros(1), x[None], values)).max()

@@ -14,6 +14,7 @@ from fecontact.bifurcation.continuation.problem import (
     BranchStatus,
     ContinuationOptions,
     options_of,
+    require_direction,
     sizes_of,
     width_of,
 )
@@ -36,7 +37,7 @@ from fecontact.bifurcation.orbits.discretisations import (
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
 from fecontact.bifurcation.orbits.restored import rescaled, restored, restored_orbit
 from fecontact.core.checks import require_flags, require_kind
-from fecontact.core.errors import AnalysisError, FecontactError, InputError, require_finite
+from fecontact.core.errors import AnalysisError, FecontactError, InputError
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.field_runs.field_run import FieldRun
@@ -107,7 +108,7 @@ def orbit_branch(
                  start=start)
     require_kind("orbit_branch", (*(one.options for one in DISCRETISATIONS), type(None)),
                  method=method)
-    require_finite("orbit_branch", direction=direction)
+    require_direction("orbit_branch", direction)
     require_flags("orbit_branch", both=both)
     request = Request(field, method, options_of(options, bounds), scales, width, direction, both)
     if not isinstance(start, BranchPoint):

@@ -57,7 +57,8 @@ def at_hopf(
     state, w = np.ascontiguousarray(point.u[:-1]), point.angular_frequency
     require_positive("A Hopf point", angular_frequency=w)
     sizes, limits = sizes_of(scales, default_scales(Equilibrium(field, values, state)))
-    widths = np.append(sizes, width_of(width, options, point.parameter))
+    widths = np.append(sizes, width_of(
+        width, options, point.parameter, point.branch.attributes.get("width")))
     mesh = np.linspace(0.0, 1.0, intervals + 1)
     phase = 2.0j * np.pi * node_times(mesh, degree)
     shape = np.array((np.exp(phase)[:, None] * np.asarray(point.eigenvector)).real, order="C")

@@ -15,6 +15,7 @@ from fecontact.bifurcation.continuation.points import NeimarkSackerPoint
 from fecontact.bifurcation.continuation.problem import (
     ContinuationOptions,
     options_of,
+    require_direction,
     sizes_of,
     width_of,
 )
@@ -31,7 +32,7 @@ from fecontact.bifurcation.tori.motion import torus_motion
 from fecontact.bifurcation.tori.problem import TorusProblem
 from fecontact.bifurcation.tori.series import with_orders
 from fecontact.core.checks import require_flags, require_kind
-from fecontact.core.errors import AnalysisError, InputError, require_finite
+from fecontact.core.errors import AnalysisError, InputError
 from fecontact.core.resources.blas_threads import one_blas_thread
 from fecontact.core.types import Array, ArrayLike
 from fecontact.integrate.field_runs.field_run import FieldRun
@@ -95,7 +96,7 @@ def torus_branch(
                  start=start)
     require_kind("torus_branch", (TorusBalance, type(None)), method=method)
     require_kind("torus_branch", (str, SecondExcitation, type(None)), second=second)
-    require_finite("torus_branch", direction=direction)
+    require_direction("torus_branch", direction)
     require_flags("torus_branch", both=both)
     chosen = options_of(options, bounds)
     name = (start.branch.parameter_name if parameter is None and isinstance(start, BranchPoint)

@@ -31,6 +31,8 @@ _FORM = "f(t, x, p, out)"
 _WAYS = ("automatic", "complex", "differences")
 # Samples at which the complex step is checked against differences before it is used.
 _SAMPLES = 16
+# Bits of a NaN that no computation makes; sums with it keep them.
+_UNFILLED = 0x7FF8FEC0_47AC7000
 _NONE = np.zeros(0, dtype=np.int64)
 # States below this part of their scales are zero.
 _NOTHING = 1e-60
@@ -244,8 +246,8 @@ def vector_field(
     Raises
     ------
     InputError
-        If the function cannot be compiled, uses states or parameters that there are not, or does
-        not allow the differentiation asked for.
+        If the function cannot be compiled, uses states or parameters that there are not, leaves
+        entries of ``out`` as they are, or does not allow the differentiation asked for.
         With 'complex', derivatives raise :class:`AnalysisError` where it turns out wrong.
     """
     require_choice("vector_field", "differentiation", differentiation, _WAYS)
@@ -271,9 +273,10 @@ def vector_field(
     for name, compiled, shape in (("function", rates, (d,)), ("jacobian", given, (d, d))):
         if compiled is not None:
             for x in (typical.copy(), -typical):
-                require_within(f"vector_field: the {name}", compiled.python,
-                               f"states: {d}, parameters: {len(values)}", 1.0, x, values,
-                               np.zeros(shape))
+                out = np.full(shape, _UNFILLED, dtype=np.int64).view(float)
+                if require_within(f"vector_field: the {name}", compiled.python,
+                                  f"states: {d}, parameters: {len(values)}", 1.0, x, values, out):
+                    _require_filled(name, compiled.python.__name__, out)
     required = differentiation == "complex"
     complex_rates = None
     if differentiation != "differences":
@@ -287,6 +290,16 @@ def vector_field(
         if required:
             raise InputError(message)
     return FunctionField(rates, given, None, parameters, names, typical, period_of)
+
+
+def _require_filled(name: str, function: str, out: Array) -> None:
+    """Raise InputError if a function has left entries of ``out`` as they were."""
+    left = np.argwhere(out.view(np.int64) == _UNFILLED)
+    if len(left):
+        first = ", ".join(map(str, left[0]))
+        raise InputError(f"vector_field: the {name} {function} leaves out[{first}] as it is; "
+                         f"fill all {out.size} entries of out, with zeros too, or declare fewer "
+                         f"states.")
 
 
 def _require_compiled(function: CompiledLaw, name: str) -> None:
