@@ -339,9 +339,13 @@ def _members(
     instants = np.array(as_floats(times, "times"))
     single = isinstance(systems, MOVING)
     given = [systems] if isinstance(systems, MOVING) else list(systems)
-    if not given or not all(isinstance(system, MOVING) for system in given):
+    if not given:
         raise InputError("systems must be a ContactSystem, a VectorField or a list of them, not "
                          "empty.")
+    for place, system in enumerate(given):
+        if not isinstance(system, MOVING):
+            raise InputError(f"systems[{place}] = {text_of(system)} must be a ContactSystem or a "
+                             f"VectorField.")
     members = [in_time("ensemble", system) for system in given]
     many = initial if is_many(initial) else None
     count = len(members) if not single else len(many) if many is not None else (

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, shown
 from fecontact.core.types import Array
 from fecontact.integrate.event_table import CONTACT_EVENTS
 from fecontact.integrate.events import (
@@ -50,7 +50,7 @@ def watch_for(
             raise InputError("events: a vector field has no contact nodes; watch for a Crossing "
                              "of one of its states, or for an Event.")
         if not isinstance(one, AnyEvent):
-            raise InputError(f"events: {one!r} must be a ContactEvents, Crossing or Event.")
+            raise InputError(f"events: {shown(one)} must be a ContactEvents, Crossing or Event.")
     own = [one for one in events if not isinstance(one, ContactEvents)]
     contact = [one for one in events if isinstance(one, ContactEvents)]
     stops = np.zeros(FIRST_OWN + len(own), dtype=np.int64)

@@ -229,7 +229,10 @@ def as_events(events: AnyEvent | Sequence[AnyEvent] | None) -> WatchedEvents:
     """One, several or no events as a tuple."""
     if events is None or isinstance(events, WatchedEvents):
         return events or WatchedEvents()
-    return WatchedEvents(events if isinstance(events, Sequence) else (events,))
+    # A text is no sequence of events.
+    if isinstance(events, Sequence) and not isinstance(events, str | bytes):
+        return WatchedEvents(events)
+    return WatchedEvents((events,))
 
 
 def _require_sense(owner: str, sense: str) -> None:

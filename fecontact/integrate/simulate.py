@@ -161,7 +161,7 @@ def simulate(
     states = found.states
     trajectory = Trajectory(
         system, found.time, states[:, :m], states[:, m : 2 * m], found.work, found.status,
-        {"solver": solver.name, "rtol": float(rtol), **found.statistics},
+        {"solver": solver.name, "rtol": float(rtol), "method": solver.name, **found.statistics},
         memory=states[:, 2 * m :] if system.memory else None,
         node_friction_work=found.node_friction_work, node_creep_work=found.node_creep_work,
         held_normal_force=found.normal_force,

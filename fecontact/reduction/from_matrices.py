@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.checks import as_floats, require_flags, require_kind
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, shown
 from fecontact.core.types import Array, ArrayLike, Integers
 from fecontact.reduction.damping import Damping, LossFactor, Rayleigh, modal_damping
 from fecontact.reduction.eigenmodes import FreeSystem, fixed_signs, free_modes
@@ -217,11 +217,12 @@ def given_matrix(kind: str, given: Any) -> Given:
         name, labels, given = f"{name} ({given.source})", given.labels, given.matrix
     if not sp.issparse(given):
         try:
-            given = np.asarray(given)
-            given = given if given.dtype.kind == "c" else given.astype(float)
+            array = np.asarray(given)
+            array = array if array.dtype.kind == "c" else array.astype(float)
         except (TypeError, ValueError):
             raise InputError(f"{kind} must be an array of real numbers or a sparse matrix, not "
-                             f"{type(given).__name__}.") from None
+                             f"{shown(given)}.") from None
+        given = array
     if given.ndim != 2 or given.shape[0] != given.shape[1] or not given.shape[0]:
         raise InputError(f"{name} must be square and not empty, not of shape {given.shape}.")
     if given.dtype.kind == "c":

@@ -119,6 +119,10 @@ def test_bad_members():
     system = impact_oscillator(modes=2)
     with pytest.raises(InputError, match="not empty"):
         ensemble([], [0.0, 1.0])
+    with pytest.raises(InputError, match=r"systems\[1\] = 3 must be a ContactSystem or a Vector"):
+        ensemble([system, 3], [0.0, 1.0])
+    with pytest.raises(InputError, match=r"events: 'stick' must be a ContactEvents, Crossing or"):
+        ensemble(system, [0.0, 1.0], initial=np.zeros(4), events="stick")
     with pytest.raises(InputError, match="same size"):
         ensemble([system, impact_oscillator(modes=1)], [0.0, 1.0])
     with pytest.raises(InputError, match="3 initial states for 1 systems"):

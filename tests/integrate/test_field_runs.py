@@ -60,6 +60,7 @@ def test_outputs_between_steps_are_as_good_as_the_tolerance():
         run = fc.simulate(FORCED, 20.0, initial=forced_exactly(0.0), outputs=777, rtol=rtol)
         assert np.abs(run.states - forced_exactly(run.time)).max() < allowed
         assert run.statistics["steps"] < 700
+    assert run.statistics["method"] == "rodas5p"
 
 
 def test_runs_agree_with_dop853():

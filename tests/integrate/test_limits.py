@@ -44,7 +44,7 @@ def test_cvode_agrees():
     size = np.abs(one.states).max(axis=0)
     assert (np.abs(one.states - other.states).max(axis=0) < 2e-4 * size + 1e-15).all()
     assert other.energies.imbalance < 1e-4
-    assert other.statistics["solver"] == "cvode"
+    assert other.statistics["solver"] == other.statistics["method"] == "cvode"
 
 
 def test_cvode_drops_on_a_spring():

@@ -120,7 +120,7 @@ def run_field(
     run = start_field(moving, state, times, rtol=rtol, max_step=max_step, events=events)
     ended = complete(run, progress)
     reached, states = until_end(run, (run.states, run.progress.state))
-    statistics = {"solver": "rodas5p", "rtol": rtol, **run.statistics,
+    statistics = {"solver": "rodas5p", "rtol": rtol, "method": "rodas5p", **run.statistics,
                   "seconds": clock.perf_counter() - begin}
     return FieldRun(MappingProxyType(dict(moving.parameters)), moving.state_names, reached, states,
                     ended, statistics, run.events if events else None)

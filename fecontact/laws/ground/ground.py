@@ -65,7 +65,8 @@ class Ground(Brief):
         Time-dependent speed along y; by default the constant ``speed_y``.
     rotation_speed : float
         Rotation about the normal, below solids only, positive counter-clockwise from above
-        [rad/s]; of flat and even ground.
+        [rad/s]; of flat and even ground. A node meets the velocity of the ground at its own place
+        of reference: displacements must be small beside the distance to the axis.
     centre : (float, float)
         Place of the axis of rotation of the ground [m].
     wave_direction : (float, float)

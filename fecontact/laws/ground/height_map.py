@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from fecontact.core.checks import as_floats
+from fecontact.core.checks import as_floats, as_path
 from fecontact.core.compiled import helper, kernel
 from fecontact.core.errors import InputError, require_finite, require_positive
 from fecontact.core.records import Matrix, Vector
@@ -140,6 +140,7 @@ class HeightMap:
 
     def _read(self, file: str) -> None:
         """Take over the heights, the spacing and the origin of a file."""
+        as_path(file, "a height map")
         for name in ("heights", "spacing_x", "spacing_y", "origin_x", "origin_y"):
             if np.size(given := getattr(self, name)) and np.any(given):
                 raise InputError(f"HeightMap: file = {file!r} cannot be combined with {name}; give "
