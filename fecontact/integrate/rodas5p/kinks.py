@@ -42,7 +42,7 @@ def up_to_kink(t, target, stop, smallest, moved, problem, progress, workspace):
     if somewhere(caution != 0.0):
         limit = abs(caution)
         reach = max(target - t, limit)
-        kink = _next_kink(t, stop, reach, moved, problem, progress, workspace)
+        kink = _next_kink(t, stop, reach, caution > 0.0, moved, problem, progress, workspace)
         short = (caution < 0.0) & (kink > 2.0 * _SHORT * reach)
         length = select(short, kink - _SHORT * reach, _BEYOND * kink)
         nearest = min(limit, target - t) * select(caution < 0.0, _VERY_NEAR, _NEAREST)
@@ -61,21 +61,22 @@ def caution_after_failure(step):
 
 
 @routine
-def _next_kink(t, stop, within, moved, problem, progress, workspace):
+def _next_kink(t, stop, within, slips, moved, problem, progress, workspace):
     """Time until the forces of a node change their character, or ``within`` if later.
 
     Where it seems to be earlier, it is looked for anew with the rates of the accelerations.
+    ``slips`` says if those of friction count.
     """
     blocks, w, between = problem.blocks, workspace.nodes, workspace.between
     dynamics.project(blocks, progress.state, w[0], w[1])
     dynamics.project(blocks, progress.rate, w[1], w[2])
     for k in range(between.shape[1]):
         between[1, k] = 0.0
-    first = _first_of_nodes(within, moved, False, problem, workspace)
+    first = _first_of_nodes(within, slips, moved, False, problem, workspace)
     if somewhere(first < within):
         _set_rate_of_rate(min(t + _PART * within, stop), t, problem, progress, workspace)
         dynamics.project(blocks, workspace.base, between[0], between[1])
-        first = _first_of_nodes(within, moved, True, problem, workspace)
+        first = _first_of_nodes(within, slips, moved, True, problem, workspace)
     return first
 
 
@@ -94,7 +95,7 @@ def _set_rate_of_rate(later, t, problem, progress, workspace):
 
 
 @routine
-def _first_of_nodes(within, moved, improve, problem, workspace):
+def _first_of_nodes(within, slips, moved, improve, problem, workspace):
     """The first time at which forces of a node change their character, or ``within`` if later.
 
     These are touch-down and lift-off on level ground, the penetrations ``control.depth`` (n,),
@@ -117,7 +118,7 @@ def _first_of_nodes(within, moved, improve, problem, workspace):
             changes = nodes.motion_at(j, w[1], w[2], n, d)
             slip = nodes.slip_velocity(j, changes.places, moved, s)
             slowing = _slowing(slip, changes.speeds, slow[j], first)
-            first = select(force[0] > 0.0, slowing, first)
+            first = select(slips & (force[0] > 0.0), slowing, first)
     return first
 
 
