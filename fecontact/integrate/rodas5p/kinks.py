@@ -1,4 +1,4 @@
-"""Where forces change their character ahead of a step, by what is known at its begin.
+"""Estimates of the next kink of the forces, by what is known at the begin of a step.
 
 A step that has failed as forces change within it is tried again so that it ends there. Nodes move
 on by their velocities, accelerations and the rates of these. It is an estimate, and nothing depends
@@ -32,7 +32,9 @@ _TRIALS, _LEFT = 2, 0.1
 
 @helper
 def up_to_kink(t, target, stop, smallest, moved, problem, progress, workspace):
-    """End of a step from t towards ``target``, and its caution as in :class:`Step`.
+    """End of a step from t towards ``target``, and its caution.
+
+    The latter is that of :class:`fecontact.integrate.rodas5p.state.Step`.
 
     After a step that has failed it is at the next kink of the forces that lies ahead. ``moved`` is
     the motion of the ground just after t, and ``stop`` the latest end. ``workspace.given`` and

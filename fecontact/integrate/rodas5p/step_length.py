@@ -55,9 +55,9 @@ def next_length(h, root, longest, numbers):
 
 @helper
 def length_beyond(caution, h, root, longest, numbers):
-    """The same where steps may have been cut to end at a kink of the forces.
+    """Length of the step after an accepted one that may have been cut at a kink of the forces.
 
-    Such a step is followed by what its error alone allows, up to |``caution``|, its length before
+    A cut step is followed by what its error alone allows, up to |``caution``|, its length before
     it was cut; that is zero for other steps. Cut steps begin no trend.
     """
     usual, cut = next_length(h, root, longest, numbers), caution != 0.0
