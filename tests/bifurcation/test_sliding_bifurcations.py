@@ -365,3 +365,22 @@ def test_orbits_without_events_have_their_multipliers():
                           options=ContinuationOptions(step=0.05, points=3))
     assert np.abs(branch.points[0].values["multipliers"]) == pytest.approx(
         np.full(2, np.exp(-DAMPING * 2.0 * np.pi / 0.8)), rel=1e-9)
+
+
+@pytest.mark.parametrize("amplitude", [0.2, 0.3])
+def test_symmetric_orbits_pass_borders_that_both_halves_meet(amplitude):
+    """Both turning points begin or cease to stick at once, where the motion is continuous."""
+    basis = fc.basis_from_matrices([[1.0]], [[100.0]], {"contact": [ROW], "B": ROW, "C": ROW},
+                                   damping=[[1.0]])
+    system = fc.ContactSystem(
+        basis, normal=PrescribedForce(10.0), friction=ConstantFriction(0.5),
+        drive=fc.Drive(stiffness_x=100.0, amplitude_x=amplitude, frequency_hz=1.0))
+    motion = periodic_motion(system, initial=[0.0, 0.0], solver=FILIPPOV)
+    branch = orbit_branch(contact_field(system, {"drive.amplitude_x": None}), motion,
+                          "drive.amplitude_x", bounds=(0.15, 0.4), both=True,
+                          method=Shooting(1, solver=FILIPPOV))
+    assert branch.status is BranchStatus.BOUND
+    assert (branch.parameter.min(), branch.parameter.max()) == pytest.approx((0.15, 0.4))
+    borders = [point for point in branch.special if isinstance(point, DiscontinuityPoint)]
+    assert [point.kind for point in borders] == ["switching-sliding", "grazing-sliding"]
+    assert all(point.persists for point in borders)

@@ -24,15 +24,19 @@ from fecontact.bifurcation.continuation.pseudo_arclength import End
 from fecontact.bifurcation.events.borders import beyond, border_of, nodes_of
 from fecontact.bifurcation.events.conditions import DURATION, STRIKE, Condition
 from fecontact.bifurcation.events.orbit import EventOrbit
+from fecontact.bifurcation.events.phases import Phase
 from fecontact.bifurcation.events.starts import as_shot
 from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
 
-# First steps beyond a border, in those of the branch, and the largest residual there.
-_BEYOND, FITS = (0.1, 0.01, 1e-3), 1e-5
+# First steps beyond a border, in those of the branch, and the largest residual there; more by the
+# margin that is left at the border, in which the speed at an event may change so much.
+_BEYOND, FITS, _PER_MARGIN = (0.1, 0.01, 1e-3), 1e-5, 100.0
 # Margin of a condition that counts as zero at a border, margin that is rounding, and largest number
 # of borders that are met at once.
 _NOTHING, _EQUAL, _DEPTH = 1e-5, 1e-8, 4
+# Singular values below this part of the largest are zero.
+_RANK = 1e-9
 # Most borders on one branch.
 _MOST = 40
 # Distance from a border within which turns of the branch belong to it.
@@ -161,7 +165,8 @@ def _following(
     On symmetric orbits several margins are zero at once: all are examined, one after
     the other.
     """
-    ahead, known = [(problem, last.u, 0)], {problem.phases}
+    ahead, known = [(problem, last.u, 0)], _rotations(problem)
+    fits = max(FITS, _PER_MARGIN * min(abs(problem.linearise(last.u).least.left), _NOTHING))
     while ahead:
         here, at, depth = ahead.pop(0)
         try:
@@ -172,19 +177,26 @@ def _following(
         for candidate, u in [each for each in made if each is not None]:
             if candidate.phases in known:
                 continue
-            known.add(candidate.phases)
+            known |= _rotations(candidate)
             try:
                 linearised = candidate.linearise(u)
-                if np.abs(linearised.residual).max() > FITS:
+                if np.abs(linearised.residual).max() > fits:
                     continue
-                tangent = _null_vector(candidate, linearised.matrix)
+                tangents = _null_vectors(candidate, linearised.matrix, u)
             except FecontactError:
                 continue
-            for start in _starts(candidate, u, tangent, options):
-                return start
+            for tangent in tangents:
+                for start in _starts(candidate, u, tangent, options):
+                    return start
             if depth + 1 < _DEPTH:
                 ahead.append((candidate, u, depth + 1))
     return None
+
+
+def _rotations(problem: EventOrbit) -> set[tuple[Phase, ...]]:
+    """Phases of an orbit, from each of them on."""
+    phases = problem.phases
+    return {phases[first:] + phases[:first] for first in range(len(phases))}
 
 
 def nothing_left(problem: EventOrbit, u: Array) -> list[Condition]:
@@ -197,9 +209,17 @@ def nothing_left(problem: EventOrbit, u: Array) -> list[Condition]:
                                          max(abs(condition.left), _EQUAL, 10.0 * least)))
 
 
-def _null_vector(problem: EventOrbit, matrix: Array) -> Array:
+def _null_vectors(problem: EventOrbit, matrix: Array, u: Array) -> list[Array]:
+    """Tangents of branches; on symmetric orbits also that along which all new phases grow."""
     sizes = 1.0 / np.sqrt(problem.weights())
-    return heading(np.linalg.svd(matrix * sizes)[2][-1] * sizes, problem.weights())
+    values, rows = np.linalg.svd(matrix * sizes)[1:]
+    null = rows[np.count_nonzero(values > _RANK * values[0]):]
+    directions = [null[-1]]
+    short = np.flatnonzero(problem.durations(u) <= _NOTHING * problem.period(u))
+    together = null.T @ null[:, problem.count * problem.dimension + short].sum(axis=1)
+    if len(null) > 1 and together.any():
+        directions.append(together)
+    return [heading(each * sizes, problem.weights()) for each in directions]
 
 
 def _starts(
