@@ -37,7 +37,8 @@ class BranchStatus(Enum):
     HOMOCLINIC = ("The orbits approach a homoclinic orbit: their period grows without bound while "
                   "they stay ever longer near a saddle.")
     DISCONTINUITY = ("The orbit meets a border of its contact states, which the last point of a "
-                     "branch names. The orbits do not continue beyond it.")
+                     "branch names. No orbits were found beyond it; if motions go on there, "
+                     "start a branch from one of them.")
     SADDLE_NODE = ("The curve ends where the saddle of the homoclinic orbits meets another "
                    "equilibrium in a fold.")
     SINGLE_FREQUENCY = ("The tori shrink to a periodic orbit: the branch ends at a Neimark-Sacker "
