@@ -24,7 +24,6 @@ from fecontact.bifurcation.continuation.pseudo_arclength import End
 from fecontact.bifurcation.events.borders import beyond, border_of, nodes_of
 from fecontact.bifurcation.events.conditions import DURATION, STRIKE, Condition
 from fecontact.bifurcation.events.orbit import EventOrbit
-from fecontact.bifurcation.events.phases import Phase
 from fecontact.bifurcation.events.starts import as_shot
 from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
@@ -165,7 +164,7 @@ def _following(
     On symmetric orbits several margins are zero at once: all are examined, one after
     the other.
     """
-    ahead, known = [(problem, last.u, 0)], _rotations(problem)
+    ahead, known = [(problem, last.u, 0)], {problem.phases}
     fits = max(FITS, _PER_MARGIN * min(abs(problem.linearise(last.u).least.left), _NOTHING))
     while ahead:
         here, at, depth = ahead.pop(0)
@@ -177,7 +176,7 @@ def _following(
         for candidate, u in [each for each in made if each is not None]:
             if candidate.phases in known:
                 continue
-            known |= _rotations(candidate)
+            known.add(candidate.phases)
             try:
                 linearised = candidate.linearise(u)
                 if np.abs(linearised.residual).max() > fits:
@@ -191,12 +190,6 @@ def _following(
             if depth + 1 < _DEPTH:
                 ahead.append((candidate, u, depth + 1))
     return None
-
-
-def _rotations(problem: EventOrbit) -> set[tuple[Phase, ...]]:
-    """Phases of an orbit, from each of them on."""
-    phases = problem.phases
-    return {phases[first:] + phases[:first] for first in range(len(phases))}
 
 
 def nothing_left(problem: EventOrbit, u: Array) -> list[Condition]:
