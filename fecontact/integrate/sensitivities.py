@@ -35,7 +35,7 @@ Sides = tuple[bool, bool]
 Parameter = str | tuple[Callable[[ContactSystem, float], ContactSystem], float]
 
 # Largest change of ground velocity, relative to the velocity scale of friction, and at how many
-# times it is looked for.
+# times it is looked for where it varies.
 _SLIP, _OFTEN = 0.005, 101
 # Largest change of penetrations, relative to their scale, and at how many times it is examined.
 _DEPTH, _SOMETIMES = 1e-4, 9
@@ -394,5 +394,6 @@ def _deeper(above: ContactSystem, below: ContactSystem, times: Array, state: Arr
 def _faster(above: ContactSystem, below: ContactSystem, times: Array) -> float:
     """Largest difference of the speeds with which the other side passes a node in two systems."""
     one, other = above.prescribed_motion, below.prescribed_motion
+    looks = 1 if one.constant and other.constant else _OFTEN
     return max(float(np.abs(one.velocity(t) - other.velocity(t)).max(initial=0.0))
-               for t in np.linspace(times[0], times[-1], _OFTEN))
+               for t in np.linspace(times[0], times[-1], looks))

@@ -209,7 +209,7 @@ def set_scale(control, progress, workspace):
         workspace.right[2 * m + k] = control.memory_scale[k]
 
 
-# Gauss's rule of two points on each quarter of a step.
+# Gauss's rule of two points on each half of a step.
 DEFECT_POINTS = np.array([0.25 + 0.5 * half + side * 0.25 / np.sqrt(3.0)
                           for half in range(2) for side in (-1.0, 1.0)])
 DEFECT_WEIGHTS = np.full(4, 0.25)

@@ -8,7 +8,9 @@ solve the same systems, with the factors of the step,
     X_i = x + sum_j A_ij U_j,     H_i = d/de J(t + e d_i h, y + e u_i) at e = 0
 
 and p_i = df/dp(t_i, Y_i) + dJ/dp(t, y) u_i + d_i h d2f/dt dp(t, y) for the column of the
-parameter. So the result is the derivative of what is computed, not another approximation of the
+parameter. Where the speed of the ground varies, its motion in the stages, as
+:mod:`fecontact.integrate.rodas5p.moving_ground` has it, takes the place of its part in d_i h.
+So the result is the derivative of what is computed, not another approximation of the
 same thing. H_i are differences over steps that are small against the scales of the laws, central
 ones but beside kinks: of the forces of each node, once a step along each direction of its motion.
 Derivatives to p are differences between a system above and one below.
@@ -163,7 +165,7 @@ def variation_for(
 def _expand(side, step, y, varying, s, blocks, v, g, time_rate):
     """Fill gradients g and the rate at a fixed state of y' of a system at the begin of a step.
 
-    What is given there goes to row ``side`` of that in v.
+    What is given there goes to row ``side`` of that in v, and so does ground that is ``varying``.
     """
     given, load = v.given[side], v.load[side]
     after_t, later = np.nextafter(step.t, np.inf), dynamics.t_plus(step)
