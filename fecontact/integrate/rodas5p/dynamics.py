@@ -413,8 +413,10 @@ def add_ground_change(change, s, blocks, g, w, out):
 
 
 @helper
-def rates_of_ground(varying, moved, acceleration):
-    """Rates of the ground's motion; zero if it is ``varying``, whose stages know them."""
+def rates_of_ground(varying, moved):
+    """Rates of the motion of ground of constant speed; zero if it is ``varying``.
+
+    The stages know those of the latter.
+    """
     part = 0.0 if varying else 1.0
-    return nodes.GroundMotion(part * moved.speed, part * acceleration[0],
-                              part * moved.second_speed, part * acceleration[1])
+    return nodes.GroundMotion(part * moved.speed, 0.0, part * moved.second_speed, 0.0)

@@ -161,11 +161,9 @@ def _next_target(t, h, last, smallest, data):
 def _linearise(step, after_t, problem, progress, workspace):
     """Compute the derivatives that a step needs at its start besides the matrices."""
     s, later = problem.system, dynamics.t_plus(step)
-    acceleration = dynamics.ground_acceleration(step.t, later,
-                                                dynamics.motion_given(workspace.given), s)
     dynamics.set_load_rate(step.t, later, after_t, s, workspace.pull_rate)
-    change = dynamics.rates_of_ground(
-        problem.control.varying, dynamics.motion_given(workspace.given), acceleration)
+    change = dynamics.rates_of_ground(problem.control.varying,
+                                      dynamics.motion_given(workspace.given))
     dynamics.set_time_rate(s, workspace.near, workspace.given, change, progress.gradients,
                            workspace.pull_rate, workspace.nodes, workspace.time_rate)
     take_scales(problem.control, progress)

@@ -171,9 +171,8 @@ def _expand(side, step, y, varying, s, blocks, v, g, time_rate):
     after_t, later = np.nextafter(step.t, np.inf), dynamics.t_plus(step)
     dynamics.set_given(after_t, s, given, load)
     dynamics.set_gradients(y, s, blocks, dynamics.motion_given(given), v.nodes, g)
-    acceleration = dynamics.ground_acceleration(step.t, later, dynamics.motion_given(given), s)
     dynamics.set_load_rate(step.t, later, after_t, s, v.none)
-    change = dynamics.rates_of_ground(varying, dynamics.motion_given(given), acceleration)
+    change = dynamics.rates_of_ground(varying, dynamics.motion_given(given))
     dynamics.set_time_rate(s, blocks, given, change, g, v.none, v.nodes, time_rate)
     v.none[:] = 0.0
     if varying:
@@ -322,7 +321,7 @@ def propagate(
     varies, varying = vary.width != 0.0, problem.control.varying
     acceleration = dynamics.ground_acceleration(step.t, dynamics.t_plus(step), step.moved, s)
     columns.learn(gradients, v.usual)
-    columns.set_paths(step, acceleration, varying, workspace.ground, s, blocks, stages, v)
+    columns.set_paths(step, varying, workspace.ground, s, blocks, stages, v)
     columns.set_second_derivatives(step, acceleration, problem, progress, workspace, v)
     if varies:
         _begin_parameter(step, varying, progress, blocks, vary)

@@ -56,12 +56,12 @@ def learn(here, usual):
 
 
 @routine
-def set_paths(step, acceleration, varying, ground, s, blocks, stages, v):
+def set_paths(step, varying, ground, s, blocks, stages, v):
     """Fill v.paths (STAGES, D, n) with what each stage moves the nodes against the other side.
 
     Along the D directions of a node: its motion, in the order of the columns of
-    ``Gradients.partial``, and its internal variables. ``acceleration`` is that of the ground, or
-    its motion in the stages is ``ground`` if that is ``varying``.
+    ``Gradients.partial``, and its internal variables. ``ground`` is the motion of the ground in
+    the stages if that is ``varying``.
     """
     paths, w = v.paths, v.nodes
     m, n, d = len(v.none), len(s.gap), s.rows.shape[1]
@@ -69,8 +69,7 @@ def set_paths(step, acceleration, varying, ground, s, blocks, stages, v):
     for i in range(tableau.STAGES):
         dynamics.project(blocks, stages[i], w[0], w[1])
         part = tableau.TIME[i] * step.h
-        moved = GroundMotion(part * step.moved.speed, part * acceleration[0],
-                             part * step.moved.second_speed, part * acceleration[1])
+        moved = GroundMotion(part * step.moved.speed, 0.0, part * step.moved.second_speed, 0.0)
         if varying:
             moved = increments_in(i, ground)
         for j in range(n):
