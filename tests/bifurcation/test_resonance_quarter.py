@@ -20,13 +20,15 @@ BOX = {"e": (-0.3, 0.3), "f": (-0.3, 0.3)}
 def quarter(t, x, p, out):
     # w' = (e + i (f + 0.5)) w + (-1.3 + 0.7 i) w |w|^2 + (D1 + i D2) conj(w)^3 exp(i phi) across
     # the circle, w = a + i z with a = r - 1 - 0.2 z^2: in four turns w = z exp(i phi / 4) of
-    # z' = (e + i f) z + (-1.3 + 0.7 i) z |z|^2 + D conj(z)^3.
+    # z' = (e + i f) z + (-1.3 + 0.7 i) z |z|^2 + D conj(z)^3. If p[4] > 0, |w|^2 saturates there.
     r = np.sqrt(x[0] * x[0] + x[1] * x[1])
     C, S, z = x[0] / r, x[1] / r, x[2]
     a = r - 1.0 - 0.2 * z * z
     s = a * a + z * z
     u, v = a * (a * a - 3.0 * z * z), z * (z * z - 3.0 * a * a)
     k, m = p[2] * C - p[3] * S, p[2] * S + p[3] * C
+    if p[4] > 0.0:
+        s = p[4] * np.arctan(s / p[4])
     g, h = p[0] - 1.3 * s, p[1] + 0.5 + 0.7 * s
     dz = g * z + h * a + k * v + m * u
     radial = g * a - h * z + k * u - m * v + 0.4 * z * dz
@@ -34,9 +36,10 @@ def quarter(t, x, p, out):
     out[2] = dz
 
 
-def resonance(D):
+def resonance(D, saturation=0.0):
     """The field, and the curve of tori e = 0 through its resonance f = 0."""
-    field, t, circle = circle_field(quarter, e=-0.2, f=-0.1, D1=D.real, D2=D.imag)
+    field, t, circle = circle_field(quarter, e=-0.2, f=-0.1, D1=D.real, D2=D.imag,
+                                    saturation=saturation)
     branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "e",
                           method=Collocation(intervals=16), bounds=BOX["e"], scales=np.ones(3))
     tori = codim2_curve(field, branch.of_kind("Neimark-Sacker")[0], "f", bounds=BOX)
@@ -67,14 +70,18 @@ def test_folds_from_a_resonance_1_4(tmp_path):
         codim2_curve(field, point, "f", to="period doubling", bounds=BOX)
 
 
-def test_normal_form():
-    """|w|^2 = 2 |z|^2 of a vector of unit mean square."""
-    _, tori = resonance(0.9 * np.exp(1.1j))
+@pytest.mark.parametrize(("saturation", "rel"), [(0.0, 1e-7), (1e-3, 1e-5), (1e-5, 1e-4)])
+def test_normal_form(saturation, rel):
+    """|w|^2 = 2 |z|^2 of a vector of unit mean square.
+
+    At a saturation of 1e-5 series at radii from 1 % to 50 % of the range agree well, without a, b.
+    """
+    _, tori = resonance(0.9 * np.exp(1.1j), saturation)
     point, = tori.of_kind("resonance 1:4")
     expected = {"a": -2.6 * np.pi, "b": 1.4 * np.pi, "d": 1.8 * np.pi}
-    assert point.normal_form == pytest.approx(expected, rel=1e-7)
+    assert point.normal_form == pytest.approx(expected, rel=rel)
     for name, error in point.normal_form_errors.items():
-        assert abs(point.normal_form[name] - expected[name]) < error < 1e-5
+        assert abs(point.normal_form[name] - expected[name]) < error < 100.0 * rel
 
 
 @pytest.mark.parametrize("size", [0.9, 1.6])

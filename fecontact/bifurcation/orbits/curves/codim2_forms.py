@@ -22,6 +22,7 @@ F. Della Rossa, W. Govaerts and Y. A. Kuznetsov, SIAM J. Appl. Dyn. Syst. 12, 72
 """
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,11 +36,17 @@ from fecontact.bifurcation.orbits.kinks import JacobianKinks
 from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
 
-# Radii of the amplitudes at which series are fitted, where one is the range of the states.
-_RADII = (0.5, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3)
+# Radii of the amplitudes at which series are fitted, where one is the range of the states. Those
+# below the least usual one are for orbits that feel a steep law, where others agree worse than so.
+_RADII = (0.5, 0.3, 0.1, 0.03, 0.01, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6)
+_LEAST_USUAL = 1e-3
+_WELL_ENOUGH = 1e-4
 # Relative difference between two radii at which no other one is tried, and relative error that no
 # agreement shows: the point itself is known to the root of rounding along its curve.
 _AGREEMENT = 1e-7
+# Two smaller radii contradict a value where both differ from it by this multiple of their own
+# difference. Rounding does not: it grows so fast that the last radius differs from all others.
+_CONTRADICTION = 2.0
 # Part of the largest term below which a coefficient that divides counts as zero.
 _CANCELLATION = 1e-9
 
@@ -64,10 +71,10 @@ def orbit_form(
     """'normal_form' and 'normal_form_error', the coefficients of a kind in the order above.
 
     ``pair`` is the critical multiplier with positive imaginary part of a curve of tori, and
-    ``beside`` that of a pair besides the critical one. The error is the difference between two
-    radii; that of the mesh is not in it. It is infinite where second derivatives jump along the
-    orbit, as those of friction with exp(-b |v|) do at zero slip: the share of such jumps in third
-    derivatives is left out. Empty for other kinds, and where nothing is found.
+    ``beside`` that of a pair besides the critical one. The error is that of :func:`agreed`; that of
+    the mesh is not in it. It is infinite where second derivatives jump along the orbit, as those of
+    friction with exp(-b |v|) do at zero slip: the share of such jumps in third derivatives is left
+    out. Empty for other kinds, and where nothing is found.
     """
     if kind not in _FORMS:
         return {}
@@ -86,37 +93,54 @@ def orbit_form(
 def agreed(
     manifold: CentreManifold, order: int, formula: Callable[[Series], list[float]]
 ) -> tuple[Array, Array, Series]:
-    """Coefficients of a series from the two radii that agree best, their difference, the series.
+    """Coefficients of a series from the two radii that agree best, their error, the series.
 
-    Radii at which the rates are not finite are left out.
+    The error is the difference between the two radii, or from smaller radii that agree with each
+    other but not with them. Radii at which the rates are not finite are left out.
 
     Raises
     ------
     AnalysisError
         If less than two are left.
     """
-    before: Array | None = None
-    pairs: list[tuple[float, Array, Array, Series]] = []
+    found: list[tuple[Array, Series]] = []
     with np.errstate(all="ignore"):
         for radius in _RADII:
+            errors = _errors([value for value, _ in found])
+            enough = _AGREEMENT if radius >= _LEAST_USUAL else _WELL_ENOUGH
+            if errors and min(relative for _, relative in errors) < enough:
+                break
             series = Series(manifold, order, radius)
-            if not series.is_finite:
-                continue
-            # A coefficient that the formula leaves open is NaN at all radii.
-            value = np.array(formula(series))
-            if before is not None:
-                error = np.abs(value - before)
-                size = np.nanmax(np.abs(value))
-                relative = 0.0 if size == 0.0 else float(np.nanmax(error) / size)
-                pairs.append((relative if np.isfinite(relative) else np.inf, value, error, series))
-                if relative < _AGREEMENT:
-                    break
-            before = value
-    if not pairs:
+            if series.is_finite:
+                # A coefficient that the formula leaves open is NaN at all radii.
+                found.append((np.array(formula(series)), series))
+        errors = _errors([value for value, _ in found])
+    if not errors:
         raise AnalysisError(f"The rates about the orbit are not finite at amplitudes of "
                             f"{_RADII[-2]:g} of its range; the field must be smooth there.")
-    _, value, error, series = min(pairs, key=lambda one: one[0])
-    return value, np.maximum(error, _AGREEMENT * np.nanmax(np.abs(value))), series
+    place = min(range(len(errors)), key=lambda one: errors[one][1])
+    value, series = found[place + 1]
+    floor = _AGREEMENT * np.nanmax(np.abs(value))
+    return value, np.maximum(errors[place][0], floor), series
+
+
+def _errors(values: Sequence[Array]) -> list[tuple[Array, float]]:
+    """Errors of the values of radii after the first one, and these relative to the largest value.
+
+    The radii fall.
+    """
+    steps = [np.abs(after - before) for before, after in pairwise(values)]
+    found = []
+    for place, value in enumerate(values[1:]):
+        error = steps[place]
+        for later in range(place + 1, len(steps)):
+            away = np.minimum(np.abs(values[later] - value), np.abs(values[later + 1] - value))
+            if np.nanmax(away) > _CONTRADICTION * np.nanmax(steps[later]):
+                error = np.maximum(error, away)
+        size = np.nanmax(np.abs(value))
+        relative = 0.0 if size == 0.0 else float(np.nanmax(error) / size)
+        found.append((error, relative if np.isfinite(relative) else np.inf))
+    return found
 
 
 def _on_circle(multiplier: complex) -> complex:
