@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_codim2_forms import zero_hopf
 from test_curves import takens
 from test_orbit_curves import circle_field, doubling
 
@@ -118,6 +119,15 @@ def test_tori_from_a_zero_hopf_point(kind):
         [1.0, 9.0, 25.0], abs=1e-6)
 
 
+def test_no_bautin_point_beside_a_zero_hopf_point():
+    """Hopf points at a = -1.3 u^2, where l1 is (0.6 + u) / u times a positive number."""
+    field = vector_field(zero_hopf, {"a": -0.5, "b": -0.3}, 3)
+    folds, _ = through(field, [0.6, 0.0, 0.0], "a", "fold", "b", BOX)
+    curve = codim2_curve(field, folds.of_kind("zero-Hopf")[0], "b", bounds=BOX)
+    bautin, = curve.of_kind("Bautin")
+    assert [bautin.values["a"], bautin.values["b"]] == pytest.approx([-0.468, 0.18], rel=1e-6)
+
+
 def no_torus(t, x, p, out):
     # ``rolling`` with the opposite sign of r^2: no torus.
     r, g = x[1] * x[1] + x[2] * x[2], p[1] + x[0] + x[0] * x[0]
@@ -144,7 +154,8 @@ def test_why_nothing_was_found_is_kept(monkeypatch):
     assert str(found.value.__cause__) == "No orbit."
 
 
-def test_folds_from_a_generalised_period_doubling():
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_folds_from_a_generalised_period_doubling(direction):
     """Doubled orbits turn at k^2 + 4 (lam - 0.3 k) = 0, k > 0, and end where they are single."""
     field, t, circle = circle_field(doubling, lam=-0.4, k=-0.5)
     branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "lam",
@@ -152,7 +163,7 @@ def test_folds_from_a_generalised_period_doubling():
     box = {"lam": (-0.5, 0.5), "k": (-0.9, 0.9)}
     curve = codim2_curve(field, branch.of_kind("period doubling")[0], "k", bounds=box)
     point, = curve.of_kind("generalised period doubling")
-    folds = codim2_curve(field, point, "k", bounds=box)
+    folds = codim2_curve(field, point, "k", bounds=box, direction=direction)
     k = folds.column("k")
     assert folds.parameter == pytest.approx(0.3 * k - 0.25 * k**2, abs=1e-8)
     assert folds.column("period") == pytest.approx(np.full(len(k), 2.0 * np.pi), rel=1e-8)
@@ -220,11 +231,11 @@ def test_tori_from_a_resonance_1_1_whatever_rounding_does():
 
 
 def half(t, x, p, out):
-    # w = (a + i b) exp(i phi / 2) across the circle, a' = b, b' = e a + f b - a^3 - a^2 b.
+    # w = (a + i b) exp(i phi / 2) across the circle, a' = b, b' = e a + f b + c a^3 - a^2 b.
     r = np.sqrt(x[0] * x[0] + x[1] * x[1])
     C, S, u, v = x[0] / r, x[1] / r, r - 1.0, x[2]
     square = (u * u + v * v + (u * u - v * v) * C + 2.0 * u * v * S) / 2.0
-    e, f = p[0] - square, p[1] - square
+    e, f = p[0] + p[2] * square, p[1] - square
     ca, sa = (u * (1.0 + C) + v * S) / 2.0, (u * S + v * (1.0 - C)) / 2.0
     cb, sb = (v * (1.0 + C) - u * S) / 2.0, (v * S - u * (1.0 - C)) / 2.0
     radial = cb - (e * sa + f * sb) - v
@@ -237,7 +248,7 @@ def test_doublings_and_tori_of_doubled_orbits_from_a_resonance_1_2():
     """Doublings at e = 0; doubled orbits a^2 = e with tori at f = e, multipliers of w = sqrt(2 e)
     over two turns.
     """
-    field, t, circle = circle_field(half, e=-0.3, f=-0.3)
+    field, t, circle = circle_field(half, e=-0.3, f=-0.3, c=-1.0)
     branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "f",
                           method=Collocation(intervals=16), bounds=(-0.5, 0.5), scales=np.ones(3))
     box = {"e": (-0.5, 0.5), "f": (-0.5, 0.5)}
@@ -258,6 +269,22 @@ def test_doublings_and_tori_of_doubled_orbits_from_a_resonance_1_2():
     assert [e.min(), e.max()] == pytest.approx([0.0, 0.5], abs=1e-4)
     assert sorted(at.values["e"] for at in doubled.of_kind("resonance 1:4")) == pytest.approx(
         [1.0 / 32.0, 9.0 / 32.0], abs=1e-7)
+
+
+def test_no_generalised_period_doubling_beside_a_resonance_1_2():
+    """The coefficient of the doublings, c / f, has a pole there, whose sign rounding decides."""
+    field, t, circle = circle_field(half, e=-0.3, f=-0.3, c=1.0)
+    branch = orbit_branch(field, PeriodicMotion(t, circle, period=np.pi), "f",
+                          method=Collocation(intervals=16), bounds=(-0.5, 0.5), scales=np.ones(3))
+    box = {"e": (-0.5, 0.5), "f": (-0.5, 0.5)}
+    tori = codim2_curve(field, branch.of_kind("Neimark-Sacker")[0], "e", bounds=box)
+    point, = tori.of_kind("resonance 1:2")
+    rng = np.random.default_rng(0)
+    for _ in range(6):
+        moved = replace(point, u=point.u * (1.0 + 1e-14 * rng.normal(size=len(point.u))))
+        doublings = codim2_curve(field, moved, "e", bounds=box,
+                                 options=ContinuationOptions(points=4))
+        assert not doublings.of_kind("generalised period doubling")
 
 
 def chenciner(t, x, p, out):

@@ -15,6 +15,7 @@ from fecontact.bifurcation import (
     codim2_curve,
     equilibrium_branch,
     orbit_branch,
+    periodic_motion,
     vector_field,
 )
 from fecontact.bifurcation.orbits.curves import errors
@@ -305,6 +306,26 @@ def test_a_closed_curve_of_folds_is_gone_round_once():
     angle = np.unwrap(np.arctan2(q, p))
     assert abs(angle[-1] - angle[0]) == pytest.approx(2.0 * np.pi, rel=1e-6)
     assert [point.kind for point in curve.special] == ["turning point"] * 2
+
+
+def mathieu(t, x, p, out):
+    out[0] = x[1]
+    out[1] = (-0.05 * x[1] - (p[0] + 0.3 * np.cos(t)) * x[0] - x[0] * x[0] * x[0]
+              + p[1] * np.cos(t))
+
+
+def test_a_curve_of_doublings_goes_on_where_the_forced_motion_vanishes():
+    """The curve is even in A; its d at A = -0.05 and 0 are those of monodromies by DOP853."""
+    field = vector_field(mathieu, {"d": 0.6, "A": 0.1}, 2, period=2.0 * np.pi)
+    branch = orbit_branch(field, periodic_motion(field, initial=[0.0, 0.0]), "d", direction=-1.0,
+                          method=Collocation(intervals=20), bounds=(0.3, 0.6))
+    curve = codim2_curve(field, branch.of_kind("period doubling")[0], "A",
+                         bounds={"d": (-0.5, 1.0), "A": (-0.05, 0.11)})
+    assert curve.status is BranchStatus.BOUND
+    assert np.sort(curve.column("A"))[[0, -1]] == pytest.approx([-0.05, 0.11], rel=1e-9)
+    assert curve.parameter[np.argmin(curve.column("A"))] == pytest.approx(0.3727682553, abs=1e-8)
+    turning, = curve.special
+    assert [turning.parameter, turning.values["A"]] == pytest.approx([0.3857444190, 0.0], abs=1e-8)
 
 
 def test_kind_errors(masses):

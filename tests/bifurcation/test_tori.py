@@ -314,6 +314,33 @@ def test_a_torus_in_closed_form(turn, w):
                 2 * [b ** abs(k) / root], rel=bound)
 
 
+def subcritical(t, x, p, out):
+    # r' = r (p + 0.4 r^2 - 0.5 r^4) about a forced motion.
+    y = x[0] - 0.1 * np.cos(2.0 * np.pi * t)
+    square = y * y + x[1] * x[1]
+    grows = p[0] + 0.4 * square - 0.5 * square * square
+    out[0] = grows * y - 1.1 * x[1] - 0.2 * np.pi * np.sin(2.0 * np.pi * t)
+    out[1] = grows * x[1] + 1.1 * y
+
+
+def test_small_tori_of_a_subcritical_branch_are_unstable():
+    """The multiplier is exp(2 r^2 (0.4 - r^2)): above 1 up to the fold at p = -0.08."""
+    field = vector_field(subcritical, {"p": -0.2}, ["x", "y"], period=1.0)
+    t = np.linspace(0.0, 1.0, 201)
+    begin = PeriodicMotion(t, np.stack([0.1 * np.cos(2.0 * np.pi * t), 0.0 * t], axis=1), 1.0)
+    orbits = orbit_branch(field, begin, "p", bounds=(-0.2, 0.2), scales=np.ones(2),
+                          method=Collocation(intervals=20))
+    branch = torus_branch(field, orbits.of_kind("Neimark-Sacker")[0], bounds=(-0.2, 0.2),
+                          method=TorusBalance((2, 2)))
+    p = branch.parameter
+    turn = int(np.argmin(p))
+    assert p[turn] == pytest.approx(-0.08, rel=1e-6)
+    resolved = np.abs(p) > 1e-7
+    stable = branch.column("stable").astype(bool)
+    assert not stable[:turn][resolved[:turn]].any()
+    assert stable[turn + 1 :].all()
+
+
 def test_far_from_resonance_the_free_vibration_is_smaller():
     # Averaging about the forced vibration b: a^2 = 4 - 2 b^2.
     field = forced_van_der_pol(0.02, 0.3, 1.3)

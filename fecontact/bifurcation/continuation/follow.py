@@ -88,7 +88,10 @@ def by_sides(
     and the options limit the number of regular ones on both sides together.
     """
     points, end = side(options, turned=False)
-    if not both or end.status in (BranchStatus.CLOSED, BranchStatus.INTERRUPTED):
+    # Branches that would repeat the same orbits count as closed too, but are no loops.
+    loop = end.status is BranchStatus.CLOSED and any(
+        np.array_equal(point.u, points[-1].u) for point in points[:-1])
+    if not both or loop or end.status is BranchStatus.INTERRUPTED:
         return points, end
     # The start counts once.
     most = options.points + regular(points[:1])

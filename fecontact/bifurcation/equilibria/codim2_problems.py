@@ -32,6 +32,8 @@ from fecontact.system.fields.vector_field import VectorField
 
 # Smallest |w^2| in divisions by l, relative to w^2 at the start.
 _NEAR_ZERO = 1e-12
+# Least singular value of the Jacobian, in its largest entry, below which an eigenvalue is zero.
+_AT_ZERO_HOPF = 1e-10
 
 
 class PlaneCurve(FreeParameters, Problem):
@@ -202,7 +204,12 @@ class HopfCurve(PlaneCurve):
                  "double Hopf": pair_test(_others(linearisation.jacobian, square, 2))}
         # With two states a zero eigenvalue belongs to the pair.
         if len(J) > 2:
-            found["zero-Hopf"] = float(sign * np.linalg.svd(J, compute_uv=False)[-1])
+            zero = float(sign * np.linalg.svd(J, compute_uv=False)[-1])
+            found["zero-Hopf"] = zero
+            # At a zero-Hopf point the coefficient has a pole, and rounding decides its sign.
+            found["Bautin"] *= zero
+            if abs(zero) < _AT_ZERO_HOPF:
+                del found["Bautin"]
         return found
 
     def _lyapunov(self, u: Array, linearisation: DenseEquations) -> float:

@@ -27,7 +27,7 @@ _MOST = int(RESOLVED / _CHANGES)
 # Periods over which the growth is averaged, and before.
 _PERIODS, _BEFORE = 2000, 200
 # Distance from one within which a multiplier counts as one, at least.
-_ROUNDING = 1e-3
+_ROUNDING = 1e-8
 
 
 @read_only_arrays

@@ -47,7 +47,7 @@ from fecontact.system.fields.vector_field import VectorField
 
 _NORMAL_FORM_STEP = 1e-3  # step of the differences of normal forms, in ranges of the states
 _NEAR_ZERO = 1e-4  # part of the terms of a coefficient above which its sign needs no better ones
-_AT_RESONANCE = 1e-6  # distance of the cosine of the angle from 1 or -1 at these resonances
+_AT_RESONANCE = 1e-6  # distance of the cosine of the angle, or of a multiplier, from 1 or -1 there
 _LEAST = 1e-200  # in place of zero
 _CUSP_RATE = 1e-3  # relative change of both parameters in a step that counts as zero
 # Points at which a pair beside the critical multipliers passes the unit circle, by the curve.
@@ -139,7 +139,9 @@ class OrbitCurve(Problem):
         found = self._codimension_two(u, linearisation)
         if self.orbit.autonomous:
             found[VANISHING] = vanishing(self.orbit, u, VANISHED_ON_CURVES)
-        found[HALVING] = halves_apart(self.orbit, u)
+        # Orbits of an odd number of periods of the excitation have no halves that could be equal.
+        if self.orbit.autonomous or self.orbit.periods % 2 == 0:
+            found[HALVING] = halves_apart(self.orbit, u)
         return found
 
     def _codimension_two(
@@ -162,11 +164,15 @@ class OrbitCurve(Problem):
                 return value
             return expansion.coefficient(formula, _NORMAL_FORM_STEP)[0].value
 
+        tests: dict[str, float | Callable[[], float]]
         if self.kind == "period doubling":
-            # At a resonance 1:2 the coefficient has a pole.
-            return {"generalised period doubling": lambda: flip * coefficient(expansion.doubling),
-                    "resonance 1:2": flip, "fold-flip": unit, "flip-Neimark-Sacker": pair}
-        tests: dict[str, float | Callable[[], float]] = {
+            tests = {"resonance 1:2": flip, "fold-flip": unit, "flip-Neimark-Sacker": pair}
+            # At a resonance 1:2 the coefficient has a pole, and rounding decides its sign.
+            if abs(flip) > _AT_RESONANCE:
+                tests["generalised period doubling"] = lambda: flip * coefficient(
+                    expansion.doubling)
+            return tests
+        tests = {
             f"resonance 1:{order}": at.cosine - float(np.cos(2.0 * np.pi / order))
             for order in (1, 2, 3, 4)}
         # Next to the resonances 1:1 and 1:2 the coefficient grows beyond all numbers.
