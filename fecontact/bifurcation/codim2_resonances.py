@@ -56,7 +56,8 @@ def folds_at_quarter(
     place = first_least(np.abs(towards))
     turn = np.exp(0.25j * np.angle(D / C))
 
-    def find(away: float) -> FoldPoint | None:
+    def find(attempt: tuple[int, float]) -> FoldPoint | None:
+        place, away = attempt
         shift = away * towards
         size = float(np.sqrt(abs(at.exponent(shift)) / (abs(C) + abs(D))))
         for end in _followed(at, at.motion(shift, size * turn), place).of_kind("fold"):
@@ -65,8 +66,10 @@ def folds_at_quarter(
                 return end
         return None
 
-    return first_found(AWAY, find, f"{point.place}: no fold of orbits of four periods was found "
-                                   f"beside it; follow these from a run near it.")
+    # Over one parameter alone the orbits may never meet the fold to that side.
+    tried = [(over, away) for over in (place, 1 - place) for away in AWAY]
+    return first_found(tried, find, f"{point.place}: no fold of orbits of four periods was found "
+                                    f"beside it; follow these from a run near it.")
 
 
 def fold_at_third(field: VectorField, point: BranchPoint, parameter: str) -> FoldPoint:

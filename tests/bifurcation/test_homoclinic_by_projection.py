@@ -196,6 +196,27 @@ def test_sandstedes_model(sandstede, tmp_path):
     assert motion.times[-1] == curve.points[0].values["time"]
 
 
+def tilted(t, x, p, out):
+    # ``leaf`` with a part of z along the orbit.
+    k = p[2] - 0.3 * x[2]
+    out[0] = p[0] * x[0] + p[1] * x[1] - p[0] * x[0] * x[0] + k * x[0] * (2.0 - 3.0 * x[0])
+    out[1] = (p[1] * x[0] + p[0] * x[1] - 1.5 * p[1] * x[0] * x[0] - 1.5 * p[0] * x[0] * x[1]
+              - 2.0 * k * x[1])
+    out[2] = -2.0 * x[2] + 0.5 * (x[0] * x[0] * (1.0 - x[0]) - x[1] * x[1])
+
+
+def test_a_parameter_that_is_constant_along_the_curve_does_not_turn():
+    """tilde = 0 for all b; rounding moves it by 1e-9 to and fro."""
+    field = vector_field(tilted, {"a": -0.4, "b": 1.0, "tilde": -0.05}, 3)
+    rest = equilibrium_branch(field, [2.0 / 3.0, 0.0, 0.0], "tilde", bounds=(-1.0, 1.0))
+    orbits = orbit_branch(field, rest.of_kind("Hopf")[0], method=Collocation(intervals=50),
+                          bounds=(-1.0, 1.0))
+    curve = codim2_curve(field, orbits.points[-1], "b", to="homoclinic",
+                         bounds={"tilde": (-1.0, 1.0), "b": (0.5, 2.0)})
+    assert np.abs(curve.parameter).max() < 1e-8
+    assert not curve.of_kind("turning point")
+
+
 def koper(t, x, p, out):
     # Koper's van der Pol oscillator of three variables.
     out[0] = 10.0 * (p[1] * x[1] - x[0] * x[0] * x[0] + 3.0 * x[0] - p[0])

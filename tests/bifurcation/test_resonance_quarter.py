@@ -46,11 +46,12 @@ def resonance(D, saturation=0.0):
     return field, tori
 
 
-def test_folds_from_a_resonance_1_4(tmp_path):
+@pytest.mark.parametrize("size", [0.9, 1.4])
+def test_folds_from_a_resonance_1_4(size, tmp_path):
     """Rest points |(e + i f) / R + C| = |D|, R = |z|^2, are double where sin a = +- |D / C| for the
-    angle a from -C to e + i f.
+    angle a from -C to e + i f. For |D| = 1.4 one of them has e < 0, which no f leads to from -C.
     """
-    D, C = 0.9 * np.exp(1.1j), -1.3 + 0.7j
+    D, C = size * np.exp(1.1j), -1.3 + 0.7j
     field, tori = resonance(D)
     point, = read_branch(write_branch(tmp_path / "tori.h5", tori)).of_kind("resonance 1:4")
     assert [point.values["e"], point.values["f"]] == pytest.approx([0.0, 0.0], abs=1e-8)

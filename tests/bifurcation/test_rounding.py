@@ -36,6 +36,12 @@ def test_a_parameter_that_rests_has_no_folds(rounding):
     assert kinds((0.995e-8, -1.005e-8), branch=(1.0, 1.0), rounding=rounding) == set()
 
 
+def test_turns_of_a_parameter_that_nearly_rests_may_be_errors_of_its_tangents():
+    for slopes, uncertain in (((0.99e-6, -0.99e-6), True), ((0.5e-7, -1.01e-6), False)):
+        ends = tuple(np.array([1.0, slope * WIDTH]) for slope in slopes)
+        assert RestingParameter(WIDTH).turns(ends, ({}, {})) is uncertain
+
+
 def test_signs_of_the_test_for_branch_points_beside_a_slope_of_rounding():
     """The test has the sign of the slope, which rounding gives at one of the points."""
     assert kinds((0.995e-8, -1.005e-8), branch=(1.0, -1.0)) == {"branch point"}

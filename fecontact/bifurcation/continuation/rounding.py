@@ -7,6 +7,9 @@ from fecontact.core.types import Array
 
 # Slope of the parameter along a branch, in widths of the diagram, below which its sign is rounding.
 FLAT = 1e-8
+# Slope below which the tangents of points within the tolerance of Newton's method may have any
+# sign.
+_NEARLY_FLAT = 1e-6
 
 
 class Rounding:
@@ -66,6 +69,10 @@ class RestingParameter(Rounding):
     def kinds(self, tangents: Any, values: Any, tests: Any) -> set[str]:
         """A fold where the parameter rests at both points."""
         return {"fold"} if all(abs(slope) < FLAT for slope in self.slopes(tangents)) else set()
+
+    def turns(self, tangents: Any, values: Any) -> bool:
+        """Whether both slopes are so small that errors of the points may change their signs."""
+        return all(abs(slope) < _NEARLY_FLAT for slope in self.slopes(tangents))
 
 
 class NoFolds(Rounding):
