@@ -41,7 +41,7 @@ from fecontact.bifurcation.orbit_methods import Collocation
 from fecontact.bifurcation.orbits.branches import orbit_branch
 from fecontact.bifurcation.orbits.curves.codim2 import orbit_curve
 from fecontact.bifurcation.orbits.restored import over_first
-from fecontact.core.errors import InputError, choices
+from fecontact.core.errors import AnalysisError, InputError, choices
 from fecontact.core.ties import first_largest, first_least
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
@@ -108,6 +108,8 @@ _CHOSEN = (2, 5, 1)
 _TORI = replace(_SEARCH, stop_at=("Neimark-Sacker",), largest_step=0.05, points=60)
 _LONG = replace(_SEARCH, stop_at=(), largest_step=0.1, points=200)
 _INTERVALS = 40
+# Least scale of a state of an orbit that has grown, in the largest one.
+_EVEN = 0.1
 
 
 def nearby_torus(field: VectorField, point: BranchPoint, parameter: str) -> BranchPoint:
@@ -115,16 +117,22 @@ def nearby_torus(field: VectorField, point: BranchPoint, parameter: str) -> Bran
 
     Near a double Hopf point, with r1' = r1 (m1 + p11 r1^2 + p12 r2^2) and likewise r2, the orbits
     r1^2 = -m1 / p11 lose stability to a torus at m2 = p21 m1 / p11 (Kuznetsov, Elements of Applied
-    Bifurcation Theory, section 8.6). They are followed from Hopf points on both sides.
+    Bifurcation Theory, section 8.6). Near a zero-Hopf point, with u' = m1 + b u^2 + c r^2 and
+    r' = r (m2 + d u), they do at u = m2 = 0 if c d < 0 (section 8.5). They are followed from Hopf
+    points on both sides.
 
     Raises
     ------
     InputError
         As :func:`fecontact.bifurcation.codim2_switch.other_curve`.
     AnalysisError
-        If none is found on either side.
+        If c d > 0, or none is found on either side.
     """
     assert isinstance(point, ZeroHopfPoint | DoubleHopfPoint)
+    form = point.normal_form if isinstance(point, ZeroHopfPoint) else {}
+    if form and form["c"] * form["d"] > 0.0:
+        raise AnalysisError(f"{point.place}: no tori begin there; its normal form has c d = "
+                            f"{form['c'] * form['d']:.4g}, which must be below 0.")
     square = (2.0 * np.pi * point.frequency_hz) ** 2
     return _first(field, point, parameter, square, _TORI,
                   lambda branch: branch.points[-1].kind == "Neimark-Sacker",
@@ -166,19 +174,32 @@ def _first(
     if square == 0.0:
         tangent = np.copysign(1.0, tangent[field.dimension]) * tangent
     beside = list(_along(problem, u, tangent, first, both=square != 0.0))
-    # Tori of some zero-Hopf points lie across the other parameter alone.
+    # Tori of some zero-Hopf points lie across the other parameter alone, or beyond where orbits
+    # over one parameter go on over the other one, forward or back.
     across = _across(tangent, first, parameter, width)
-    tried = [(over, at) for over in sorted(width, key=lambda name: name != across)
-             for at in beside]
+    sides = (0.0, 1.0, -1.0) if isinstance(point, ZeroHopfPoint) else (0.0,)
+    tried = [(over, at, side) for side in sides
+             for over in sorted(width, key=lambda name: name != across) for at in beside]
 
-    def find(attempt: tuple[str, BranchPoint]) -> BranchPoint | None:
-        over, at = attempt
+    def find(attempt: tuple[str, BranchPoint, float]) -> BranchPoint | None:
+        over, at, side = attempt
         reach = _ABOUT * width[over]
         hopf_point = _hopf_at(field, begin, at, (first, parameter), over)
         branch = orbit_branch(
             field, hopf_point, method=Collocation(_INTERVALS), options=options,
             bounds=(hopf_point.parameter - reach, hopf_point.parameter + reach),
             width=width[over])
+        if side != 0.0:
+            over, = {first, parameter} - {over}
+            end = branch.points[-1]
+            value = float(end.parameter_values(field)[field.index(over)])
+            reach = _ABOUT * width[over]
+            # The orbit has become much larger than those at the Hopf point.
+            sizes = np.asarray(end.values["maximum"]) - np.asarray(end.values["minimum"])
+            branch = orbit_branch(
+                field, end, over, options=options, direction=side,
+                scales=np.maximum(sizes, _EVEN * sizes.max()),
+                bounds=(value - reach, value + reach), width=width[over])
         return _over(field, branch.points[-1], first, width[first]) if wanted(branch) else None
 
     return first_found(tried, find, f"{point.place}: {missing}")

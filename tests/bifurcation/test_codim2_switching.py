@@ -138,8 +138,23 @@ def no_torus(t, x, p, out):
 def test_there_need_not_be_a_torus():
     field = vector_field(no_torus, {"a": -0.5, "b": -0.4}, 3)
     curve, _ = through(field, [-0.7, 0.0, 0.0], "a", "fold", "b", BOX)
-    with pytest.raises(AnalysisError, match="no torus was found beside it; follow orbits from a"):
+    with pytest.raises(AnalysisError, match="no tori begin there; its normal form has c d = 2, "):
         codim2_curve(field, curve.of_kind("zero-Hopf")[0], "b", to="Neimark-Sacker", bounds=BOX)
+
+
+def climbing(t, x, p, out):
+    # x' = a + x^2 - r^2, r' = r (b + x + x^2): tori at x = 0, b = 0, a > 0, Hopf points at a < 0.
+    r, g = x[1] * x[1] + x[2] * x[2], p[1] + x[0] + x[0] * x[0]
+    out[0] = p[0] + x[0] * x[0] - r
+    out[1], out[2] = g * x[1] - x[2], g * x[2] + x[1]
+
+
+def test_tori_that_lie_on_no_branch_over_one_parameter():
+    field = vector_field(climbing, {"a": -0.5, "b": -0.4}, 3)
+    curve, _ = through(field, [-0.7, 0.0, 0.0], "a", "fold", "b", BOX)
+    tori = codim2_curve(field, curve.of_kind("zero-Hopf")[0], "b", to="Neimark-Sacker", bounds=BOX)
+    assert tori.column("b") == pytest.approx(np.zeros(len(tori)), abs=1e-9)
+    assert np.sort(tori.column("a"))[[0, -1]] == pytest.approx([0.0, 1.0], abs=1e-3)
 
 
 def test_why_nothing_was_found_is_kept(monkeypatch):

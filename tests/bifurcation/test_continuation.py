@@ -89,6 +89,34 @@ def test_a_branch_that_passes_by_its_start_goes_on():
     assert len(branch.of_kind("fold")) == round(branch.points[-1].values["w"] / np.pi)
 
 
+class TurnsBack(Plane):
+    """x = p^2 - 0.1 p, whose tangent is turned by mistake beyond p = 0.2, once."""
+
+    may_turn_back = True
+
+    def __init__(self):
+        super().__init__(lambda x, p: x - p * p + 0.1 * p, lambda x, p: (1.0, 0.1 - 2.0 * p))
+        self.turned = False
+
+    def adapted(self, u, tangent):
+        turns, self.turned = not self.turned and u[-1] > 0.2, self.turned or u[-1] > 0.2
+        return self, u, -tangent if turns else tangent
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_branch_that_goes_back_along_itself_ends_and_says_so(sign):
+    branch = continue_branch(TurnsBack(), np.array([0.0, 0.0]),
+                             ContinuationOptions(bounds=(-1.0, 1.0)), name="p", both=True,
+                             direction=sign)
+    assert branch.status is (BranchStatus.CLOSED if sign > 0.0 else BranchStatus.BOUND)
+    turn = branch.parameter.max()
+    assert 0.2 < turn < 0.3
+    assert branch.message.startswith(f"At p = {turn:.6g} it turned back along itself: the points")
+    # It ends with the first step that comes to a point passed before, and has its other side.
+    assert 0.1 < branch.parameter[-1 if sign > 0.0 else 0] < 0.3
+    assert branch.parameter.min() == -1.0
+
+
 @pytest.mark.parametrize("turn", [0.3, 0.6])
 def test_turns_between_points_are_limited(turn):
     branch = continue_branch(CIRCLE, np.array([1.0, 0.0]),

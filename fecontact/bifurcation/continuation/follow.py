@@ -96,10 +96,13 @@ def by_sides(
     # The start counts once.
     most = options.points + regular(points[:1])
     left = most - min(regular(points), options.points // 2 + regular(points[:1]))
-    others, _ = side(replace(options, points=left), turned=True)
+    others, other = side(replace(options, points=left), turned=True)
     points, whole = shortened(points, most - regular(others))
     turned = [replace(point, tangent=-point.tangent) for point in others[:0:-1]]
-    return [*turned, *points], end if whole else End(BranchStatus.POINTS)
+    end = end if whole else End(BranchStatus.POINTS)
+    # Both sides say so where they went back along themselves.
+    said = other.message if other.status is BranchStatus.CLOSED else ""
+    return [*turned, *points], replace(end, message=" ".join(filter(None, (end.message, said))))
 
 
 def labelled(problem: Problem, name: str, attributes: Mapping[str, Any]) -> dict[str, Any]:

@@ -129,6 +129,9 @@ class Problem(Protocol):
         :meth:`examine` confirms.
     ends : mapping
         Test functions that end the branch where they become negative, and the status there.
+    may_turn_back : bool
+        Whether steps are compared with points passed before, in the opposite direction, to end a
+        branch that goes back along itself.
     """
 
     keeps_matrix: ClassVar[bool] = False
@@ -137,6 +140,7 @@ class Problem(Protocol):
     event_precision: ClassVar[float] = 1e-12
     confirms: ClassVar[frozenset[str]] = frozenset()
     ends: ClassVar[Mapping[str, BranchStatus]] = {}
+    may_turn_back: ClassVar[bool] = False
 
     @property
     def predictor(self) -> Predictor:

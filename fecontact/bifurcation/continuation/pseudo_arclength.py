@@ -101,6 +101,8 @@ def continuation(
     here, step, count, message, origin = start, options.step, 1, "", problem
     before: Solution | None = None
     halved, whole = 0, step
+    # Points passed, with the directions back, and their problems.
+    passed = [(problem, BranchPoint(start.u, -start.tangent, {}))]
     fast = problem.fast_steps(options)
     while count < options.points:
         if fast is not None and halved == 0:
@@ -155,6 +157,13 @@ def continuation(
             if count > 2 and _passes(problem, here, there, origin, start, options):
                 yield BranchPoint(start.u, start.tangent, start.values)
                 return End(BranchStatus.CLOSED)
+            if problem.may_turn_back:
+                again = next((place for place, known in enumerate(passed[1:-1], 1)
+                              if _passes(problem, here, there, *known, options)), None)
+                if again is not None:
+                    return End(BranchStatus.CLOSED, _turned_back(
+                        [float(known.u[-1]) for _, known in passed[again:]], header))
+                passed.append((problem, BranchPoint(there.u, -there.tangent, {})))
             yield BranchPoint(there.u, there.tangent, there.values)
             count += 1
             last, here = here, there
@@ -327,10 +336,10 @@ def _next_step(
 
 
 def _passes(
-    problem: Problem, here: Solution, there: Solution, origin: Problem, start: Solution,
-    options: ContinuationOptions,
+    problem: Problem, here: Solution, there: Solution, origin: Problem,
+    start: Solution | BranchPoint, options: ContinuationOptions,
 ) -> bool:
-    """Whether the start of the branch lies on the step from here to there."""
+    """Whether the start of the branch, or another point, lies on the step from here to there."""
     weights = problem.weights()
     row = weights * here.tangent
     step = Step(problem, here, there, options, row)
@@ -345,6 +354,15 @@ def _passes(
     near = step.cubic(along)
     return (norm(problem, again - near) < 1e-2 * length + _MET_AGAIN
             and _lead_to_one(problem, again, near, row, options))
+
+
+def _turned_back(values: list[float], header: BranchHeader | None) -> str:
+    """Sentence on a branch that repeats points, passed at these values of the parameter."""
+    name = "the parameter" if header is None else header.parameter_name
+    turn = max(values, key=lambda value: abs(value - values[0]))
+    return (f"At {name} = {turn:.6g} it turned back along itself: the points from there on repeat "
+            f"those before, and what lies beyond was not reached; take more intervals, or start "
+            f"from a point beyond.")
 
 
 def _lead_to_one(

@@ -88,6 +88,7 @@ class OrbitCurve(Problem):
 
     keeps_matrix: ClassVar[bool] = True
     polishes: ClassVar[bool] = True
+    may_turn_back: ClassVar[bool] = True
     ends: ClassVar[Mapping[str, BranchStatus]] = {VANISHING: BranchStatus.HOPF,
                                                   HALVING: BranchStatus.CLOSED}
 
