@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.checks import as_count, as_floats, require_kind, require_rtol
-from fecontact.core.errors import InputError, require_positive
+from fecontact.core.errors import LARGEST, InputError, require_positive
 from fecontact.core.errors import shown as text_of
 from fecontact.core.progress import progress_bar, shown
 from fecontact.core.read_only import read_only_arrays
@@ -228,7 +228,9 @@ def ensemble(
                     run_one(index, starts(index) if last is None else last, before)
                 except _LeftError:
                     return
-                last = states[index, -1] if np.isfinite(states[index, -1]).all() else None
+                end = states[index, -1]
+                # A motion that escapes leaves no state to go on from.
+                last = end if (np.abs(end) <= LARGEST).all() else None
                 with turn:
                     done[0] += 1
 

@@ -6,6 +6,7 @@ from fields_in_time import LORENZ, ROSSLER, Pendulum
 from scipy.integrate import solve_ivp
 
 import fecontact as fc
+from fecontact import AnalysisError, InputError
 from fecontact.bifurcation import (
     Axis,
     ContinuationOptions,
@@ -221,3 +222,29 @@ def test_exponents_at_the_start_are_those_of_the_equilibrium():
 def test_lost_exponents_are_told():
     with pytest.warns(fc.ModelWarning, match="interval = 20"):
         lyapunov_exponents(ROSSLER, 400.0, initial=[1.0, 1.0, 1.0], count=3, interval=20.0)
+
+
+def growing(t, x, p, out):
+    out[0], out[1] = x[1], -x[0] + p[0] * x[1]
+
+
+GROWING = vector_field(growing, {"k": 0.1}, ["x", "v"])
+
+
+def test_exponents_of_a_motion_that_escapes():
+    """Rates grow with the motion: the usual interval is far below the memory for its instants."""
+    with pytest.raises(AnalysisError, match=r"The motion escapes: at t = .* choose a start"):
+        lyapunov_exponents(GROWING.with_(k=1.0), 1000.0, initial=[1.0, 1.0])
+    with pytest.raises(InputError, match=r"number of intervals in duration = .* longer interval"):
+        lyapunov_exponents(ROSSLER.with_(a=5.0), 1000.0, initial=[1.0, 0.0, 1.0], transient=10.0,
+                           count=2)
+
+
+def test_a_scan_goes_on_from_its_start_where_a_motion_escapes():
+    found = poincare_scan(GROWING, "k", [-0.1, 0.1, 1.6], section=Crossing("x"), transient=100.0,
+                          keep=1, initial=[1.0, 1.0], chains=1)
+    assert found.up.shape == found.down.shape == (3, 1, 2)
+    assert np.abs(found.up[0]).max() < 1e-3
+    # x grows by exp(k t / 2); on the way down, too, it begins at the start again.
+    for way in (found.up, found.down):
+        assert 1.0 < np.abs(way[1]).max() < 1e7

@@ -12,15 +12,17 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 from test_orbit_curves import circle_field, twisted
 
-from fecontact import AnalysisError, InputError
+from fecontact import AnalysisError, ContactSystem, Drive, InputError, basis_from_matrices
 from fecontact.bifurcation import (
     BranchStatus,
     Collocation,
     ContinuationOptions,
     PeriodicMotion,
     codim2_curve,
+    contact_field,
     equilibrium_branch,
     orbit_branch,
+    periodic_motion,
     vector_field,
 )
 from fecontact.bifurcation.continuation import pseudo_arclength
@@ -28,6 +30,7 @@ from fecontact.bifurcation.orbits import by_collocation
 from fecontact.bifurcation.orbits.collocation import CollocationProblem, Intervals
 from fecontact.bifurcation.orbits.restored import restored
 from fecontact.io import read_branch, write_branch
+from fecontact.laws import RoughSurface
 
 
 def vanderpol(t, x, p, out):
@@ -369,6 +372,24 @@ def test_special_points_within_a_step_ask_for_more_intervals_too(monkeypatch):
     for ahead in ([poor, good], [good, poor]):
         finer, _, _ = refined(problem, u, tangent, ahead)
         assert finer.intervals == Intervals(16, 800, 1e-5).after(count, 1.1e-5, 4) > count
+
+
+def test_meshes_follow_an_impact_that_moves_along_the_branch():
+    """Its phase changes with the frequency, so that the mesh of the orbit before misses it."""
+    rows = np.array([[0.0], [1.0], [0.0]])
+    system = ContactSystem(
+        basis_from_matrices([[0.092]], [[0.0]], {"contact": rows[None], "B": rows}),
+        normal=RoughSurface(0.3e6, 5.2e-6, 6.0),
+        drive=Drive(stiffness_y=99.085, damping_y=0.02046, amplitude_y=0.47e-3,
+                    frequency_hz=10.24))
+    field = contact_field(system, {"drive.frequency_hz": None})
+    motion = periodic_motion(system, initial=[0.0, 0.0])
+    branch = orbit_branch(field, motion, "drive.frequency_hz", method=Collocation(60),
+                          bounds=(10.2, 10.35), scales=20.0 * np.ptp(motion.states, axis=0),
+                          options=ContinuationOptions(step=0.05, points=20))
+    errors = branch.column("state_error")
+    assert np.median(errors) < 1e-5
+    assert (errors < 1e-5).mean() > 0.7
 
 
 def test_fewer_intervals_wait_for_ten_steps_again():

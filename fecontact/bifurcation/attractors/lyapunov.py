@@ -10,6 +10,7 @@ import numpy as np
 
 from fecontact.core.checks import as_count
 from fecontact.core.errors import (
+    LARGEST,
     AnalysisError,
     FecontactError,
     InputError,
@@ -112,7 +113,7 @@ def lyapunov_exponents(
     InputError
         For values out of range.
     AnalysisError
-        If the run could not reach its end.
+        If the run could not reach its end, or the motion escapes beyond 1e60.
 
     References
     ----------
@@ -130,18 +131,17 @@ def lyapunov_exponents(
     if as_count(count, "count") > size:
         raise InputError(f"count = {count} must be a whole number from 1 to {size}.")
     if interval is not None:
-        # Instants, and per exponent the growth in each interval, its history and temporaries.
-        require_memory("lyapunov_exponents: the number of intervals in duration",
-                       duration / interval, 8.0 * (4 + 4 * count), ", by a longer interval")
+        _require_intervals(duration, interval, count)
     state, time = start_state(moving, initial, 0.0), float(transient)
     with (shown(progress, lambda: progress_bar("Lyapunov exponents", time + duration)) as tell,
           one_blas_thread):
         if transient > 0.0:
             run = start_any(moving, state, np.array([0.0, transient]), rtol=rtol)
-            _reach_end(finish(run, tell), run.time)
+            _reach_end(finish(run, tell), run.time, run.states)
             state = run.states[-1]
         if interval is None:
             interval = _usual_interval(moving, duration, state, count)
+            _require_intervals(duration, interval, count)
         steps = max(round(duration / interval), 1)
         instants = time + interval * np.arange(steps + 1)
         Q = np.linalg.qr(np.random.default_rng(0).normal(size=(size, count)))[0]
@@ -149,7 +149,7 @@ def lyapunov_exponents(
         for first in range(0, steps, _INTERVALS):
             piece = instants[first : first + _INTERVALS + 1]
             run = start_any(moving, state, piece, rtol=rtol, vary=True)
-            _reach_end(finish(run, tell), run.time)
+            _reach_end(finish(run, tell), run.time, run.states)
             state = run.states[-1]
             for k, transition in enumerate(run.transitions[1:], first):
                 Q, R = np.linalg.qr(transition @ Q)
@@ -185,7 +185,19 @@ def _usual_interval(moving: Moving, duration: float, state: Array, count: int) -
     return min(interval, _KEPT / max(steep, 1e-300))
 
 
-def _reach_end(status: int, time: float) -> None:
+def _require_intervals(duration: float, interval: float, count: int) -> None:
+    """Raise InputError unless so many intervals fit into memory."""
+    # Instants, and per exponent the growth in each interval, its history and temporaries.
+    require_memory("lyapunov_exponents: the number of intervals in duration",
+                   duration / interval, 8.0 * (4 + 4 * count), ", by a longer interval")
+
+
+def _reach_end(status: int, time: float, states: Array) -> None:
     if status != step_loop.FINISHED:
         raise AnalysisError(f"The run ended at t = {time:.9g} s before its end: "
                             f"{ENDS[status].value}")
+    largest = float(np.abs(states[-1]).max())
+    if not largest <= LARGEST:
+        raise AnalysisError(f"The motion escapes: at t = {time:.9g} s a state is {largest:g}, and "
+                            f"every one must be from {-LARGEST:g} to {LARGEST:g}; choose a start "
+                            f"whose motion stays bounded, or a shorter duration.")

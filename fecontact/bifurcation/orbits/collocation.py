@@ -46,6 +46,8 @@ _NEWTON = 1e-2
 _CALM = 10
 # Numbers of intervals are multiples of this: so many are eliminated at once.
 _AT_ONCE = 8
+# Part to which another distribution of as many intervals has to reduce the error to be made again.
+_WORTH = 0.5
 
 
 @dataclass(frozen=True)
@@ -155,6 +157,9 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
         Of orbits along the branch; None keeps their number.
     calm : int
         Steps in a row after which fewer of them would have done.
+    misfit : float
+        Error of the orbit ahead for which this mesh was made, on the mesh before; infinite where
+        the mesh is that of the last orbit.
     noted : list of (u, error)
         The last orbit whose error was estimated.
     """
@@ -166,6 +171,7 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
     predictor: Predictor = BENT
     sizes: Intervals | None = None
     calm: int = 0
+    misfit: float = np.inf
     noted: list[tuple[Array, float]] = field(default_factory=list)
 
     keeps_matrix: ClassVar[bool] = True
@@ -271,25 +277,31 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
             predictor = predictor.moved(self._carried(mesh, predictor.rows))
         u_on, turned = predictor.rows[:2]
         problem = replace(self, mesh=mesh, age=age, reference=self._nodes_on(mesh, u_on),
-                          scales=self._grown(u), predictor=predictor, calm=calm)
+                          scales=self._grown(u), predictor=predictor, calm=calm, misfit=np.inf)
         return problem, u_on, turned
 
     def refined(
         self, u: Array, tangent: Array, ahead: Sequence[Solution | BranchPoint]
     ) -> tuple["CollocationProblem", Array, Array] | None:
-        """See :meth:`Problem.refined`: more intervals, distributed for the least accurate orbit."""
+        """See :meth:`Problem.refined`: more intervals, distributed for the least accurate orbit.
+
+        Where there can be no more, as many: the mesh is that of the orbit before, whose impact may
+        be elsewhere. This is repeated as long as it halves the error.
+        """
         if self.sizes is None:
             return None
         worst = max(ahead, key=_error_of)
-        count = self.sizes.after(self.intervals, _error_of(worst), self.degree)
-        if count <= self.intervals:
+        error = _error_of(worst)
+        count = max(self.sizes.after(self.intervals, error, self.degree), self.intervals)
+        if count == self.intervals and not self.sizes.tolerance < error <= _WORTH * self.misfit:
             return None
         mesh = equidistributed(self.mesh, self.nodes(worst.u), self.degree, count)
         known = self.predictor.rows
         moved = self._carried(mesh, np.concatenate([[u, tangent], known[2:]]) if len(known)
                               else np.array([u, tangent]))
         problem = replace(self, mesh=mesh, age=0, reference=self._nodes_on(mesh, moved[0]),
-                          predictor=self.predictor.moved(moved[: len(known)]), calm=0)
+                          predictor=self.predictor.moved(moved[: len(known)]), calm=0,
+                          misfit=error)
         return problem, moved[0], moved[1]
 
     def _grown(self, u: Array) -> Array:
