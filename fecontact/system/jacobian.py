@@ -4,9 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecontact.core.compiled import borrowing, helper, kernel
+from fecontact.core.compiled import borrowing, helper, kernel, routine
 from fecontact.core.copies import put
 from fecontact.core.records import Block, Matrix, Vector
+from fecontact.core.simd.kinds import WIDTH
+from fecontact.core.simd.vectors import fused, read, spread, write
 from fecontact.core.types import Array
 from fecontact.system.kernels import linear_rates, prescribed_at, rates_under
 from fecontact.system.node_forces import (
@@ -38,6 +40,9 @@ from fecontact.system.polynomial_forces import (
     has_polynomial,
     set_polynomial_gradient,
 )
+
+# From so many modes on the products of all nodes are added together.
+_MANY_MODES = 8
 
 
 @helper
@@ -175,6 +180,54 @@ def _add_contact(j, node_force, s, partial, gradient, rate, out):
                 out[m + i, k] += row * gradient[axis, k]
 
 
+@routine
+def _keep_contact(count, j, node_force, s, partial, pushed, padded, rate):
+    """Add the forces of node j, and keep its rows and gradients for :func:`_add_products`."""
+    _, d, m = s.rows.shape
+    _set_gradients(j, s, partial, padded[count : count + d])
+    for axis in range(d):
+        for i in range(m):
+            pushed[count + axis, i] = s.rows[j, axis, i]
+            rate[m + i] += s.rows[j, axis, i] * node_force[axis]
+
+
+@routine
+def _add_products(count, rows, gradients, sums, A):
+    """Add the sum of the products of ``count`` rows (m,) and gradients (2 m,) to the rates of q'.
+
+    Sums of eight columns stay in registers, those of four rows at a time.
+    """
+    m = rows.shape[1]
+    for block in range(gradients.shape[1]):
+        first = block * WIDTH
+        width = min(WIDTH, 2 * m - first)
+        i = 0
+        while i + 3 < m:
+            a, b, c, d = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
+            for k in range(count):
+                gradient = read(gradients[k, block])
+                a = fused(spread(rows[k, i]), gradient, a)
+                b = fused(spread(rows[k, i + 1]), gradient, b)
+                c = fused(spread(rows[k, i + 2]), gradient, c)
+                d = fused(spread(rows[k, i + 3]), gradient, d)
+            write(sums[0], a)
+            write(sums[1], b)
+            write(sums[2], c)
+            write(sums[3], d)
+            for row in range(4):
+                for k in range(width):
+                    A[m + i + row, first + k] += sums[row, k]
+            i += 4
+        while i < m:
+            a = spread(0.0)
+            for k in range(count):
+                a = fused(spread(rows[k, i]), read(gradients[k, block]), a)
+            write(sums[0], a)
+            for k in range(width):
+                A[m + i, first + k] += sums[0, k]
+            i += 1
+
+
 class Derivatives(NamedTuple):
     """Rates f (N, d) at N states, and their derivatives to the states and to a parameter.
 
@@ -192,7 +245,9 @@ def _fill_derivatives(t, x, s, r, laws, workspace, found):
     load, load_p, shifts = workspace.load, workspace.load_p, workspace.shifts
     force, rates, partial = workspace.force, workspace.rates, workspace.partial
     node_force, node_force_p = workspace.node_force, workspace.node_force_p
-    stiffening, memory = workspace.stiffening, workspace.memory
+    stiffening, memory, pushed = workspace.stiffening, workspace.memory, workspace.pushed
+    gradients = workspace.gradients
+    padded = gradients.reshape((len(gradients), gradients.shape[1] * WIDTH))
     f, J, P = found.f, found.J, found.P
     n, d, m = s.rows.shape
     states = len(rates)
@@ -219,6 +274,7 @@ def _fill_derivatives(t, x, s, r, laws, workspace, found):
                 P[c, :m] = 0.0
             else:
                 put(load_p, P[c, m : 2 * m])
+        count = 0
         for j in range(n):
             z = memory_of(j, y, s)
             node = node_gradients(j, node_motion(j, y, s), moved, z, s, force, rates, partial)
@@ -242,8 +298,13 @@ def _fill_derivatives(t, x, s, r, laws, workspace, found):
                     for tangent in range(d - 1):
                         P[c, first + k] += (rates[k, slip_entry(tangent, states)]
                                             * shifts[d + 2 * tangent])
-            if node.normal != 0.0:
+            if node.normal != 0.0 and m < _MANY_MODES:
                 _add_contact(j, node_force, s, partial, workspace.gradient, out, A)
+            elif node.normal != 0.0:
+                _keep_contact(count, j, node_force, s, partial, pushed, padded, out)
+                count += d
+        if count > 0:
+            _add_products(count, pushed, gradients, workspace.sums, A)
 
 
 @kernel
@@ -257,12 +318,14 @@ def batch_derivatives(
     h is the step of differences in it, for laws; P is (0, 0) where no derivative to a parameter is
     wanted.
     """
-    _, d, m = s.rows.shape
+    n, d, m = s.rows.shape
     step = h if len(P) > 0 else 0.0
     force, rates = force_workspace(s)
     offset_force, offset_rates = force_workspace(s)
+    blocks = (2 * m + WIDTH - 1) // WIDTH
     workspace = DerivativesWorkspace(
         np.empty(m), np.empty(m), force, rates, np.empty((d + 1, 2 * d)), np.empty(d),
-        np.empty((d, 2 * m)), np.empty_like(s.polynomial_rows), offset_force, offset_rates,
+        np.empty((d, 2 * m)), np.empty((n * d, m)), np.zeros((n * d, blocks, WIDTH)),
+        np.empty((4, WIDTH)), np.empty_like(s.polynomial_rows), offset_force, offset_rates,
         np.empty(most_memory(s)), np.empty(2 * d), np.empty(d))
     _fill_derivatives(t, x, s, r, offset_laws(s, r, step), workspace, Derivatives(f, J, P))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fecontact.core.compiled import helper
-from fecontact.core.records import Matrix, Vector
+from fecontact.core.records import Block, Matrix, Vector
 from fecontact.core.types import Array
 from fecontact.laws.signatures import ground_at, signal_at, surface_at
 from fecontact.system.node_forces import (
@@ -195,10 +195,12 @@ class DerivativesWorkspace(NamedTuple):
     Modal forces ``load`` (m,) and their derivatives to the parameter, ``load_p``; of a node
     ``force``, ``rates`` and ``partial`` as :func:`fecontact.system.node_forces.node_gradients`
     fills them, its forces ``node_force`` (d,) along the axes and their ``gradient`` (d, 2 m) to q
-    and q'; ``stiffening`` (D, m) is of :mod:`fecontact.system.polynomial_forces`. For the
-    parameter: results of the friction law beside it, ``offset_force`` and ``offset_rates``; what
-    its own parameters add to the rates of the internal variables, ``memory`` (s,); ``shifts``
-    (2 d,) of :func:`set_shifts`; and the derivatives ``node_force_p`` (d,) of the forces.
+    and q'. Rows ``pushed`` (n d, m) and ``gradients`` (n d, blocks, 8), padded by zeros, of all
+    nodes with forces where there are many modes, and ``sums`` (4, 8) of their products.
+    ``stiffening`` (D, m) is of :mod:`fecontact.system.polynomial_forces`. For the parameter:
+    results of the friction law beside it, ``offset_force`` and ``offset_rates``; what its own
+    parameters add to the rates of the internal variables, ``memory`` (s,); ``shifts`` (2 d,) of
+    :func:`set_shifts`; and the derivatives ``node_force_p`` (d,) of the forces.
     """
 
     load: Vector
@@ -208,6 +210,9 @@ class DerivativesWorkspace(NamedTuple):
     partial: Matrix
     node_force: Vector
     gradient: Matrix
+    pushed: Matrix
+    gradients: Block
+    sums: Matrix
     stiffening: Matrix
     offset_force: Vector
     offset_rates: Matrix

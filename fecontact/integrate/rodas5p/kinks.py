@@ -12,18 +12,26 @@ from fecontact.core.simd.functions import copysign
 from fecontact.core.simd.vectors import select, somewhere
 from fecontact.integrate.rodas5p import dynamics
 from fecontact.integrate.rodas5p.state import CAUTIOUS
+from fecontact.integrate.rodas5p.step_length import LAST_STEP, REJECTED_LAST
 from fecontact.system import nodes
 from fecontact.system.node_forces import normal_force
 
 # Accelerations are compared over this part of the time that is looked ahead.
 _PART = 1e-3
-# Steps end rather a little too far than too short. Where even that is too far, as with stiff
-# contacts, they end too early by a part of the time that is looked ahead, which is more than the
-# estimate errs by; a short step then leads over the kink.
+# Steps end rather a little too far than too short. Where the time of a kink is in doubt by more
+# than a part of the time that is looked ahead, or a step that ended beyond it has been too far, as
+# with stiff contacts, they end too early: by a part of that time, and by so many times the doubt.
+# What is left is then known better, and a short step leads over the kink.
 _BEYOND, _SHORT = 1.00001, 1e-3
+_LARGEST_DOUBT, _DOUBTS = 1e-5, 2.0
+# A step that failed though it ended at a kink is not tried again; its kink lies beyond this part.
+_BEFORE = 0.99
 # Nearer kinks, as parts of the step that failed, would shrink the steps without end: they are left
 # to the error control. Those that a step has ended before may be so near.
 _NEAREST, _VERY_NEAR = 1e-4, 1e-6
+# Where a step fails at such a kink, one of that length leads over it, but only where the failed one
+# and the last one that was taken were longer by this factor.
+_LONGER = 10.0
 # Times are improved by less than this part of them.
 _LARGEST_CHANGE = 0.5
 # Forces are looked at before they end, while this part of the time is left, then its square.
@@ -42,16 +50,23 @@ def up_to_kink(t, target, stop, smallest, moved, problem, progress, workspace):
     """
     caution = progress.numbers[CAUTIOUS]
     if somewhere(caution != 0.0):
-        limit = abs(caution)
+        numbers = progress.numbers
+        limit, failed = abs(caution), numbers[REJECTED_LAST] != 0.0
         reach = max(target - t, limit)
-        kink = _next_kink(t, stop, reach, caution > 0.0, moved, problem, progress, workspace)
-        short = (caution < 0.0) & (kink > 2.0 * _SHORT * reach)
-        length = select(short, kink - _SHORT * reach, _BEYOND * kink)
+        kink, doubt = _next_kink(t, stop, reach, caution > 0.0, moved, problem, progress, workspace)
+        least, too_far = _SHORT * reach, (caution < 0.0) & failed
+        short = (too_far | (doubt > _LARGEST_DOUBT * reach)) & (kink > 2.0 * least)
+        gap = min(max(least, _DOUBTS * doubt), 0.5 * kink)
+        length = select(short, kink - gap, _BEYOND * kink)
         nearest = min(limit, target - t) * select(caution < 0.0, _VERY_NEAR, _NEAREST)
-        cut = (limit > 0.0) & (kink < 0.9 * reach) & (length > max(nearest, 100.0 * smallest))
+        nearest = max(nearest, 100.0 * smallest)
+        over = (length <= nearest) & failed & (
+            _LONGER * nearest < min(limit, numbers[LAST_STEP]))
+        cut = (limit > 0.0) & (kink < _BEFORE * reach) & (over | (length > nearest))
+        length = select(over, nearest, length)
         target = select(cut, min(t + length, stop), target)
-        caution = select(cut, select(short, -limit, limit), 0.0)
-        progress.numbers[CAUTIOUS] = 0.0
+        caution = select(cut, select(short | too_far, -limit, limit), 0.0)
+        numbers[CAUTIOUS] = 0.0
     return target, caution
 
 
@@ -64,10 +79,11 @@ def caution_after_failure(step):
 
 @routine
 def _next_kink(t, stop, within, slips, moved, problem, progress, workspace):
-    """Time until the forces of a node change their character, or ``within`` if later.
+    """Time until the forces of a node change their character, or ``within``, and its doubt.
 
-    Where it seems to be earlier, it is looked for anew with the rates of the accelerations.
-    ``slips`` says if those of friction count.
+    Where it seems to be earlier than ``within``, it is looked for anew with the rates of the
+    accelerations. If these change the time by a part, what is left out changes it by about the
+    square of that. ``slips`` says if forces of friction count.
     """
     blocks, w, between = problem.blocks, workspace.nodes, workspace.between
     dynamics.project(blocks, progress.state, w[0], w[1])
@@ -75,11 +91,13 @@ def _next_kink(t, stop, within, slips, moved, problem, progress, workspace):
     for k in range(between.shape[1]):
         between[1, k] = 0.0
     first = _first_of_nodes(within, slips, moved, False, problem, workspace)
+    better = first
     if somewhere(first < within):
         _set_rate_of_rate(min(t + _PART * within, stop), t, problem, progress, workspace)
         dynamics.project(blocks, workspace.base, between[0], between[1])
-        first = _first_of_nodes(within, slips, moved, True, problem, workspace)
-    return first
+        better = _first_of_nodes(within, slips, moved, True, problem, workspace)
+    change = better - first
+    return better, change * change / better
 
 
 @routine

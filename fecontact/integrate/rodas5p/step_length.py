@@ -58,11 +58,15 @@ def length_beyond(caution, h, root, longest, numbers):
     """Length of the step after an accepted one that may have been cut at a kink of the forces.
 
     A cut step is followed by what its error alone allows, up to |``caution``|, its length before
-    it was cut; that is zero for other steps. Cut steps begin no trend.
+    it was cut; that is zero for other steps. Cut steps begin no trend. Where one allows all growth
+    it tells nothing, as it may be as short as a kink is near: the step before it counts then.
     """
+    before = numbers[LAST_STEP]
     usual, cut = next_length(h, root, longest, numbers), caution != 0.0
     numbers[LAST_ROOT] = select(cut, _NO_TREND, numbers[LAST_ROOT])
-    return select(cut, min(h * growth(root), abs(caution)), usual)
+    factor = growth(root)
+    length = select(factor < _LARGEST_FACTOR, h * factor, max(h * factor, before))
+    return select(cut, min(length, abs(caution)), usual)
 
 
 @helper

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from fecontact.core.compiled import helper
-from fecontact.core.simd.vectors import select
+from fecontact.core.simd.vectors import everywhere, select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import Bound, NormalLaw, NotNegative, PerNode, Positive
@@ -33,6 +33,8 @@ def bed_of_asperities(v, p, compression, bearing, density):
 @normal_law
 def uniform(u, v, p):
     """Density 1."""
+    if everywhere(u <= 0.0):
+        return 0.0, 0.0, 0.0
     s = select(u <= 0.0, 0.0, u / p[1])
     partly = s < 1.0
     return bed_of_asperities(v, p, select(partly, 0.5 * s * s, s - 0.5),
@@ -42,6 +44,8 @@ def uniform(u, v, p):
 @normal_law
 def parabolic(u, v, p):
     """Density 6 s (1 - s)."""
+    if everywhere(u <= 0.0):
+        return 0.0, 0.0, 0.0
     s = select(u <= 0.0, 0.0, u / p[1])
     partly = s < 1.0
     return bed_of_asperities(v, p, select(partly, s * s * s * (1.0 - 0.5 * s), s - 0.5),
