@@ -15,6 +15,7 @@ from fecontact.bifurcation import (
     orbit_branch,
     vector_field,
 )
+from fecontact.bifurcation.orbits import collocation
 from fecontact.bifurcation.orbits.collocation import Intervals
 from fecontact.bifurcation.orbits.curves import codim2_forms
 from fecontact.bifurcation.orbits.mesh import rule
@@ -113,7 +114,7 @@ def driven_branch(gap, **method):
                         method=Collocation(16, **method), options=ContinuationOptions(points=1))
 
 
-def test_error_of_an_orbit_without_rates_between_its_points():
+def test_error_of_an_orbit_without_rates_between_its_points(monkeypatch):
     """One of the Gauss points of half an interval lies where the field has no value."""
     whole, = driven_branch(-1.0).points
     problem, u, _ = restored(driven_field(-1.0), whole)
@@ -132,12 +133,20 @@ def test_error_of_an_orbit_without_rates_between_its_points():
             "the parameter 1 without bound, as the field is not finite between the Gauss points or "
             "the equations about the orbit are singular: allow more than "
             "most_intervals = 16.")
-    branch = driven_branch(gap, most_intervals=16)
-    assert branch.message == said
-    # On a finer mesh the points are others.
-    branch = driven_branch(gap)
-    assert branch.message == ""
-    assert branch.points[0].values["state_error"] < 1e-5
+    with monkeypatch.context() as patched:
+        patched.setattr(collocation, "_WORTH", 0.0)
+        assert driven_branch(gap, most_intervals=16).message == said
+    # Of as many intervals one other mesh is tried, if all have such points.
+    tried = []
+    with monkeypatch.context() as patched:
+        patched.setattr(collocation, "_error_of", lambda point: tried.append(point) or np.inf)
+        assert len(driven_branch(gap, most_intervals=16).points) == 1
+    assert len(tried) < 12
+    # On a finer mesh the points are others, and on another one of as many intervals.
+    for most in (16, 800):
+        branch = driven_branch(gap, most_intervals=most)
+        assert branch.message == ""
+        assert branch.points[0].values["state_error"] < 1e-5
     # So they are where a branch goes on from such an orbit.
     poor, = driven_branch(gap, state_tolerance=None).points
     on = orbit_branch(driven_field(gap), poor, method=Collocation(8), bounds=(0.5, 2.0),

@@ -48,6 +48,8 @@ _CALM = 10
 _AT_ONCE = 8
 # Part to which another distribution of as many intervals has to reduce the error to be made again.
 _WORTH = 0.5
+# In place of an error without bound: no other mesh is tried where that is met once more.
+_WITHOUT_BOUND = np.finfo(float).max
 
 
 @dataclass(frozen=True)
@@ -301,7 +303,7 @@ class CollocationProblem(FloquetTests, CollocationEquations, Problem):
                               else np.array([u, tangent]))
         problem = replace(self, mesh=mesh, age=0, reference=self._nodes_on(mesh, moved[0]),
                           predictor=self.predictor.moved(moved[: len(known)]), calm=0,
-                          misfit=error)
+                          misfit=min(error, _WITHOUT_BOUND))
         return problem, moved[0], moved[1]
 
     def _grown(self, u: Array) -> Array:
