@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fecontact.bifurcation import Collocation, orbit_branch, vector_field
+from fecontact.bifurcation import Collocation, HarmonicBalance, orbit_branch, vector_field
 from fecontact.io import read_branch, write_branch
 
 
@@ -52,3 +52,18 @@ def test_folds_of_driven_orbits():
                           bounds=(-0.3, 0.3), scales=np.ones(2))
     assert [fold.coefficient for fold in branch.of_kind("fold")] == pytest.approx(
         [6.0 * np.pi * np.sqrt(0.1)] * 2, rel=1e-8)
+
+
+def test_harmonic_balance_gives_no_coefficients():
+    method = HarmonicBalance(9, 64, stability="transitions")
+    field = vector_field(forced, {"p": 0.2, "q": 0.3}, 2, period=lambda p: 2.0 * np.pi)
+    t = np.linspace(0.0, 2.0 * np.pi, 401)
+    x = np.roots([1.0, 0.0, -0.3, -0.2]).real.max()
+    motion = np.stack([np.full(401, x), (np.cos(t) + np.sin(t)) / 2.0], axis=1)
+    branch = orbit_branch(field, (t, motion), "p", method=method, direction=-1.0,
+                          bounds=(-0.3, 0.3), scales=np.ones(2))
+    assert len(branch.of_kind("fold")) == 2
+    for fold in branch.of_kind("fold"):
+        assert fold.coefficient is None
+        assert fold.coefficient_error is None
+        assert fold.criticality is None

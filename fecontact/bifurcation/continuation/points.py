@@ -22,14 +22,16 @@ class _NormalForm(BranchPoint):
     """Points of orbits whose normal form says where others begin."""
 
     @property
-    def coefficient(self) -> float:
-        """Coefficient of the normal form; of orbits by collocation."""
-        return float(self._detail("coefficient"))
+    def coefficient(self) -> float | None:
+        """Coefficient of the normal form; None where it is not known, as by other methods."""
+        found = self._details.get("coefficient")
+        return None if found is None else float(found)
 
     @property
-    def coefficient_error(self) -> float:
-        """Error of the coefficient; of orbits by collocation."""
-        return float(self._detail("coefficient_error"))
+    def coefficient_error(self) -> float | None:
+        """Error of the coefficient, of orbits by collocation; None where it is not known."""
+        found = self._details.get("coefficient_error")
+        return None if found is None else float(found)
 
 
 class FoldPoint(_NormalForm):
@@ -41,13 +43,13 @@ class FoldPoint(_NormalForm):
         return np.asarray(self._detail("null_vector"))
 
     @property
-    def coefficient(self) -> float:
-        """Quadratic coefficient b of the normal form y' = b y^2.
+    def coefficient(self) -> float | None:
+        """Quadratic coefficient b of the normal form y' = b y^2; None of orbits by other methods.
 
         Of orbits by collocation |b| with time in periods, y the amplitude of an eigenfunction of
         unit mean square in the scales of the branch.
         """
-        return float(self._detail("coefficient"))
+        return super().coefficient
 
 
 class HopfPoint(BranchPoint):

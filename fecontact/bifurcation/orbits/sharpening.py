@@ -31,7 +31,7 @@ from fecontact.bifurcation.continuation.rounding import FLAT
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.mesh import equidistributed
 from fecontact.bifurcation.orbits.normal_forms import verdict
-from fecontact.core.errors import FecontactError
+from fecontact.core.errors import AnalysisError, FecontactError
 from fecontact.core.types import Array
 
 # Problem, unknowns and tangent of an orbit.
@@ -284,7 +284,10 @@ def _judged(located: _Located, found: BranchPoint | None) -> dict[str, Any] | No
 def _normal_form(point: BranchPoint) -> tuple[float, float]:
     """Coefficient of the normal form on one mesh, and its error there."""
     assert isinstance(point, PeriodDoublingPoint | NeimarkSackerPoint)
-    return point.coefficient, point.coefficient_error
+    coefficient, error = point.coefficient, point.coefficient_error
+    if coefficient is None or error is None:
+        raise AnalysisError(f"{point.place} has no coefficient of its normal form.")
+    return coefficient, error
 
 
 def _with_twice_the_intervals(problem: CollocationProblem, u: Array, tangent: Array) -> Place:
