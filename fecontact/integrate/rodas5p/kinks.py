@@ -21,7 +21,7 @@ _PART = 1e-3
 # Steps end rather a little too far than too short. Where the time of a kink is in doubt by more
 # than a part of the time that is looked ahead, or a step that ended beyond it has been too far, as
 # with stiff contacts, they end too early: by a part of that time, and by so many times the doubt.
-# What is left is then known better, and a short step leads over the kink.
+# The rest is then known better, and a short step leads over the kink.
 _BEYOND, _SHORT = 1.00001, 1e-3
 _LARGEST_DOUBT, _DOUBTS = 1e-5, 2.0
 # A step that failed though it ended at a kink is not tried again; its kink lies beyond this part.
