@@ -104,7 +104,7 @@ def test_the_way_to_a_touch_is_known_up_to_the_third_power_of_time(height):
 
 def test_a_kink_that_is_too_near_to_end_at_is_passed_by_a_short_step():
     system, state, touch = falling(1e-8, 2.0)
-    reach = 1e4 * touch
+    reach = 3e4 * touch
     (end,) = ends_of_steps(system, state, reach, before=reach)
     assert end == pytest.approx(_NEAREST * reach, rel=1e-12)
     # The next one may be as long as the one before the kink, not only eight times as long.
@@ -118,7 +118,7 @@ def test_a_kink_that_is_too_near_to_end_at_is_passed_by_a_short_step():
 
 def test_only_a_step_that_was_longer_is_followed_by_such_a_short_one():
     system, state, touch = falling(1e-8, 2.0)
-    reach = 1e4 * touch
+    reach = 3e4 * touch
     assert ends_of_steps(system, state, reach, before=5.0 * _NEAREST * reach) != [_NEAREST * reach]
     assert ends_of_steps(system, state, reach, before=reach, failed=False) != [_NEAREST * reach]
 
