@@ -133,7 +133,8 @@ class Step(NamedTuple):
         Motion of the ground just after its begin.
     caution : float
         Length of the step before, which failed, if this one is cut to end at a kink of the
-        forces; negative if it ends before that, as the kink itself was too far; else zero.
+        forces; negative if it ends before that, as the time of the kink is in doubt or the kink
+        itself was too far; else zero.
     at_break : bool
         Whether it ends at a break.
     """
