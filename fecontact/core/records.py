@@ -14,6 +14,7 @@ functions take records by reference and read fields by name, see :mod:`fecontact
 Springs(array(float64, 1d, C), array(int64, 2d, C), float64)
 """
 
+import math
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -29,8 +30,9 @@ from numba.extending import typeof_impl
 from numpy.typing import NDArray
 from typing_extensions import TypeAliasType
 
+from fecontact.core.cache_lines import lines, zeros_in_lines
 from fecontact.core.references import Reference, reference_to
-from fecontact.core.simd.kinds import WIDTH, has_eight, lane_array, lanes, zeros_of_eight
+from fecontact.core.simd.kinds import WIDTH, has_eight, lane_array, lanes
 from fecontact.core.types import Array, ComplexArray, Integers
 
 Record = TypeVar("Record", bound=tuple[Any, ...])
@@ -201,33 +203,57 @@ def allocate(record: type[Record], sizes: Mapping[Size, int], **given: Any) -> R
     unknown = given.keys() - _fields(record).keys()
     if unknown:
         raise TypeError(f"{record.__name__} has no {', '.join(sorted(unknown))}")
-    return record(*(given[name] if name in given else make()
-                    for name, make in _makers(record, frozenset(sizes.items())).items()))
+    layout = _layout(record, frozenset(sizes.items()))
+    room = zeros_in_lines(layout.length, np.uint8)
+    return record(*(given[name] if name in given else make(room)
+                    for name, make in layout.makers.items()))
+
+
+class _Layout(NamedTuple):
+    """Functions that make a record's fields, given room for its arrays; length of that [bytes]."""
+
+    makers: Mapping[str, Callable[[Array], Any]]
+    length: int
 
 
 @cache
-def _makers(record: Any, sizes: frozenset[tuple[Size, int]]) -> dict[str, Callable[[], Any]]:
-    """Function of each field that returns its zeros."""
-    return {name: _maker(record, name, kind, dict(sizes))
-            for name, kind in _fields(record).items()}
+def _layout(record: Any, sizes: frozenset[tuple[Size, int]]) -> _Layout:
+    known, length = dict(sizes), 0
+    makers: dict[str, Callable[[Array], Any]] = {}
+    for name, kind in _fields(record).items():
+        if is_record(kind):
+            makers[name] = partial(_within, kind, known)
+        elif get_origin(kind) is not Annotated:
+            makers[name] = partial(_zero, kind)
+        else:
+            entries, axes = _entries_and_axes(kind)
+            lengths = [_length(axis, known) for axis in axes]
+            shape = tuple(one for one in lengths if one is not None)
+            if len(shape) < len(axes):
+                makers[name] = partial(_refuse, f"the shape {axes} of {record.__name__}.{name} "
+                                                f"does not follow from sizes")
+                continue
+            if entries is Eights:
+                entries, shape = Array, (*shape, WIDTH)
+            stored = np.dtype(_ENTRIES[entries].name)
+            makers[name] = partial(_part, shape, stored, length)
+            length += lines(math.prod(shape) * stored.itemsize)
+    return _Layout(makers, length)
 
 
-def _maker(record: Any, name: str, kind: Any, sizes: Mapping[Size, int]) -> Callable[[], Any]:
-    if is_record(kind):
-        return partial(allocate, kind, sizes)
-    if get_origin(kind) is not Annotated:
-        return partial(kind)
-    entries, axes = _entries_and_axes(kind)
-    shape = [_length(axis, sizes) for axis in axes]
-    if None in shape:
-        return partial(_refuse, f"the shape {axes} of {record.__name__}.{name} does not follow "
-                                f"from sizes")
-    if entries is Eights:
-        return partial(zeros_of_eight, *(length for length in shape if length is not None))
-    return partial(np.zeros, shape, _ENTRIES[entries].name)
+def _within(kind: Any, sizes: Mapping[Size, int], room: Array) -> Any:
+    return allocate(kind, sizes)
 
 
-def _refuse(why: str) -> None:
+def _zero(kind: Any, room: Array) -> Any:
+    return kind()
+
+
+def _part(shape: tuple[int, ...], stored: Any, first: int, room: Array) -> Array:
+    return np.ndarray(shape, stored, room, first)
+
+
+def _refuse(why: str, room: Array) -> None:
     raise TypeError(why)
 
 

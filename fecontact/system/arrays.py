@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from fecontact.core.cache_lines import in_lines
 from fecontact.core.checks import whole_number
 from fecontact.core.compiled import CompiledLaw
 from fecontact.core.errors import InputError, choices, nearest
@@ -55,8 +56,8 @@ def system_arrays(
     return SystemArrays(
         **drive_arrays(basis, drive),
         **load_arrays(basis, load),
-        modal_damping=basis.damping.copy(),
-        rows=rows[:, [0, 2, 1] if d == 3 else [0, 1]].copy(),
+        modal_damping=in_lines(basis.damping),
+        rows=in_lines(rows[:, [0, 2, 1] if d == 3 else [0, 1]]),
         places=(basis.contact_places[:, :2].copy() if d == 3
                 else np.array(basis.contact_x)[:, None]),
         gap=np.array(np.broadcast_to(gap, n)),
@@ -106,7 +107,7 @@ def drive_arrays(basis: ModalBasis, drive: Drive) -> dict[str, Any]:
     """Entries of :class:`SystemArrays` that depend on the drive, by name."""
     d = basis.dimension
     B = basis.T[0, :d]
-    stiffness, damping = np.array(basis.stiffness_matrix), basis.damping.copy()
+    stiffness, damping = in_lines(basis.stiffness_matrix), in_lines(basis.damping)
     for row, c, b in zip(B, drive.stiffness, drive.damping, strict=False):
         stiffness += c * np.outer(row, row)
         damping += b * np.outer(row, row)

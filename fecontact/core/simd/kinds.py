@@ -1,15 +1,11 @@
 """Numba's types of eight numbers and of eight truth values, and of arrays of such numbers."""
 
-import math
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core.datamodel.models import PrimitiveModel
 from numba.extending import register_model
-
-from fecontact.core.types import Array
 
 WIDTH = 8
 VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
@@ -49,11 +45,3 @@ def lane_array(axes: int, layout: str = "C") -> Any:
 def has_eight(kind: Any) -> bool:
     """Whether a type is that of eight numbers or of an array of them."""
     return kind == lanes or (isinstance(kind, types.Array) and kind.dtype == lanes)
-
-
-def zeros_of_eight(*shape: int) -> Array:
-    """Zeros (*shape, 8) at an address of which each eight numbers are in one line of the cache."""
-    size, line = WIDTH * math.prod(shape), WIDTH * 8
-    room = np.zeros(size + WIDTH)
-    first = -room.ctypes.data % line // 8
-    return room[first : first + size].reshape(*shape, WIDTH)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from fecontact.core.cache_lines import in_lines
 from fecontact.core.compiled import helper
 from fecontact.core.records import IntegerBlock, IntegerMatrix, IntegerVector, Matrix
 from fecontact.core.types import Array, Integers
@@ -91,7 +92,7 @@ def blocks_of(basis: ModalBasis, arrays: SystemArrays) -> Blocks:
     joined = coupled_by_polynomial(arrays)
     coupled = own | own.T | (moved.T.astype(int) @ moved.astype(int) > 0) | np.array(
         [[joined[slice(*i), slice(*k)].any() for k in modes] for i in modes])
-    shapes = arrays.rows.swapaxes(0, 1).reshape(-1, m).T.copy()
+    shapes = in_lines(arrays.rows.swapaxes(0, 1).reshape(-1, m).T)
     if coupled.all():
         return one_block(shapes, n)
     return _blocks(shapes, modes, nodes, moved, own, coupled)
@@ -114,7 +115,7 @@ def near_blocks(blocks: Blocks) -> Blocks:
     if len(blocks.nodes) <= FEW:
         return blocks
     return blocks._replace(**{
-        name: getattr(blocks, name).copy()
+        name: in_lines(getattr(blocks, name))
         for name in ("nodes", "used", "shapes", "parts", "tiles", "pairs")})
 
 

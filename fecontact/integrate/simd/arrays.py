@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 
+from fecontact.core.cache_lines import zeros_in_lines
 from fecontact.core.records import (
     ANY,
     Eights,
@@ -19,7 +20,7 @@ from fecontact.core.records import (
     of_eight,
     reader,
 )
-from fecontact.core.simd.kinds import WIDTH, zeros_of_eight
+from fecontact.core.simd.kinds import WIDTH
 from fecontact.core.types import Array, Integers
 from fecontact.integrate.rodas5p.stage_solver import Reduced
 from fecontact.integrate.rodas5p.state import NUMBERS, Problem, Progress, Workspace
@@ -163,13 +164,13 @@ def lanes_for(problem: Problem, eight: Problem, starts: int) -> Lanes:
     sizes = {MODES: modes, NODES: nodes, AXES: axes, COMBINATIONS: 0,
              MEMORY: len(problem.control.memory_scale) // nodes}
     column = column_of(problem)
-    parameters, start = zeros_of_eight(len(column)), zeros_of_eight(starts)
+    parameters, start = (zeros_in_lines((count, WIDTH)) for count in (len(column), starts))
     parameters[:] = column[:, np.newaxis]
     limits, numbers, state, extremes = np.split(
         start, np.cumsum([LIMITS, NUMBERS, starts - LIMITS - NUMBERS - modes]))
     made = seen_in(parameters, eight)
     progress = allocate(EightProgress, sizes, numbers=numbers, state=state, extremes=extremes)
-    reduced = allocate(of_eight(Reduced), sizes, solver=zeros_of_eight(modes, 2 * modes))
+    reduced = allocate(of_eight(Reduced), sizes, solver=zeros_in_lines((modes, 2 * modes, WIDTH)))
     workspace = allocate(EightWorkspace, sizes, near=made.blocks, reduced=reduced)
     return Lanes(parameters, start, column, made, progress, workspace, limits,
                  np.zeros((2, WIDTH), dtype=np.int64), np.full(WIDTH, -1, dtype=np.int64),
