@@ -143,8 +143,9 @@ def modes_may_switch(
             shift = s.gap[j] + levels[level, j]
             first, last = ends[0, n + j] + shift - f, nodes[0, n + j] + shift - g
             low, high = min(first, last) - reach, max(first, last) + reach
-            some |= (low < 0.0 and high > 0.0) or low < 2.0 * min(min(first, last), 0.0)
-            touching |= low < 0.0 or level > 0
+            # Without branches, which cannot be predicted here.
+            some |= ((low < 0.0) & (high > 0.0)) | (low < 2.0 * min(min(first, last), 0.0))
+            touching |= (low < 0.0) | (level > 0)
         if s.rows.shape[1] > 2:
             continue
         factor = s.sliding[j, 0, 0]
@@ -152,9 +153,9 @@ def modes_may_switch(
         part = quicken + abs(factor) * bounds[QUICKEST] * h
         low, high = min(first, last) - part, max(first, last) + part
         largest = max(-low, high)
-        mixed = low < 0.0 and high > 0.0 and largest > control.slip_scale[j]
+        mixed = (low < 0.0) & (high > 0.0) & (largest > control.slip_scale[j])
         at_ends = 2.0 * max(max(abs(first), abs(last)), control.slip_scale[j])
-        some |= touching and (mixed or largest > at_ends)
+        some |= touching & (mixed | (largest > at_ends))
     return some
 
 

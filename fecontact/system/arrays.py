@@ -53,11 +53,11 @@ def system_arrays(
     scale, surface = ground.friction_scale_kernel, ground.surface_kernel
     first, second = motion.motions[0], motion.motions[-1]
     rows = basis.contact_T
-    return SystemArrays(
+    made = SystemArrays(
         **drive_arrays(basis, drive),
         **load_arrays(basis, load),
-        modal_damping=in_lines(basis.damping),
-        rows=in_lines(rows[:, [0, 2, 1] if d == 3 else [0, 1]]),
+        modal_damping=basis.damping,
+        rows=rows[:, [0, 2, 1] if d == 3 else [0, 1]],
         places=(basis.contact_places[:, :2].copy() if d == 3
                 else np.array(basis.contact_x)[:, None]),
         gap=np.array(np.broadcast_to(gap, n)),
@@ -84,6 +84,7 @@ def system_arrays(
         second_motion=0 if second is first else second.motion_kernel.address,
         follows_surface=int(ground.normal == "surface"),
     )
+    return SystemArrays(*(in_lines(one) if isinstance(one, np.ndarray) else one for one in made))
 
 
 def _polynomial_arrays(basis: ModalBasis) -> dict[str, Any]:

@@ -86,9 +86,9 @@ def set_signs(forces, signs):
 @routine
 def switches(places, nodes, forces, signs):
     """True if one of so many normal forces has another sign than at the start of the step."""
-    n, some = len(signs), False
-    for at in range(places):
-        some = some | (sign_of(forces[n + at]) != signs[nodes[at]])
+    some, pressing = False, forces[len(signs) :]
+    for at in range(np.uint64(places)):
+        some = some | (sign_of(pressing[at]) != signs[np.uint64(nodes[at])])
     return some
 
 

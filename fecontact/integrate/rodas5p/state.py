@@ -261,7 +261,7 @@ def progress_for(
     """A run that is about to start."""
     states = (len(state) - 2 * modes) // max(nodes, 1)
     made = allocate(Progress, {MODES: modes, NODES: nodes, MEMORY: states, AXES: dimension,
-                               COMBINATIONS: combinations},
-                    state=np.array(state, dtype=float))
+                               COMBINATIONS: combinations})
+    made.state[:] = state
     made.numbers[TIME], made.numbers[STEP] = time, step
     return made
