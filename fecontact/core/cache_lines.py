@@ -15,8 +15,8 @@ from fecontact.core.types import Array
 
 Stored = TypeVar("Stored", bound=NDArray[Any])
 
-# Bytes of a line.
-_LINE = 64
+# Bytes of a line, and of an array so small that it may as well begin anywhere.
+_LINE, FEW = 64, 512
 
 
 def lines(length: int) -> int:
@@ -36,11 +36,13 @@ def zeros_in_lines(shape: int | tuple[int, ...], kind: Any = np.float64) -> Arra
 
 
 def in_lines(array: Stored) -> Stored:
-    """Copy of an array from the begin of a line on.
+    """Copy of an array from the begin of a line on, unless it is small.
 
     >>> in_lines(np.eye(2)).tolist()
     [[1.0, 0.0], [0.0, 1.0]]
     """
+    if array.nbytes <= FEW:
+        return array.copy()
     copy: Any = zeros_in_lines(array.shape, array.dtype)
     copy[...] = array
     return cast(Stored, copy)

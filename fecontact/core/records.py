@@ -30,7 +30,7 @@ from numba.extending import typeof_impl
 from numpy.typing import NDArray
 from typing_extensions import TypeAliasType
 
-from fecontact.core.cache_lines import lines, zeros_in_lines
+from fecontact.core.cache_lines import FEW, lines, zeros_in_lines
 from fecontact.core.references import Reference, reference_to
 from fecontact.core.simd.kinds import WIDTH, has_eight, lane_array, lanes
 from fecontact.core.types import Array, ComplexArray, Integers
@@ -233,11 +233,16 @@ def _layout(record: Any, sizes: frozenset[tuple[Size, int]]) -> _Layout:
                 makers[name] = partial(_refuse, f"the shape {axes} of {record.__name__}.{name} "
                                                 f"does not follow from sizes")
                 continue
-            if entries is Eights:
-                entries, shape = Array, (*shape, WIDTH)
-            stored = np.dtype(_ENTRIES[entries].name)
-            makers[name] = partial(_part, shape, stored, length)
-            length += lines(math.prod(shape) * stored.itemsize)
+            eight = entries is Eights
+            stored = np.dtype(_ENTRIES[Array if eight else entries].name)
+            if eight:
+                shape = (*shape, WIDTH)
+            size = math.prod(shape) * stored.itemsize
+            if size <= FEW and not eight:
+                makers[name] = partial(_zeros, shape, stored)
+            else:
+                makers[name] = partial(_part, shape, stored, length)
+                length += lines(size)
     return _Layout(makers, length)
 
 
@@ -247,6 +252,10 @@ def _within(kind: Any, sizes: Mapping[Size, int], room: Array) -> Any:
 
 def _zero(kind: Any, room: Array) -> Any:
     return kind()
+
+
+def _zeros(shape: tuple[int, ...], stored: Any, room: Array) -> Array:
+    return np.zeros(shape, stored)
 
 
 def _part(shape: tuple[int, ...], stored: Any, first: int, room: Array) -> Array:

@@ -84,7 +84,9 @@ def system_arrays(
         second_motion=0 if second is first else second.motion_kernel.address,
         follows_surface=int(ground.normal == "surface"),
     )
-    return SystemArrays(*(in_lines(one) if isinstance(one, np.ndarray) else one for one in made))
+    values: Iterator[Any] = (
+        in_lines(one) if isinstance(one, np.ndarray) else one for one in made)
+    return SystemArrays(*values)
 
 
 def _polynomial_arrays(basis: ModalBasis) -> dict[str, Any]:

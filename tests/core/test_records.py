@@ -5,6 +5,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import pytest
 
+from fecontact.core.cache_lines import in_lines
 from fecontact.core.records import ANY, allocate, of_eight, reader
 from fecontact.core.types import Array, Integers
 
@@ -36,6 +37,32 @@ def test_eight_numbers_lie_in_one_line_of_the_cache(repetition):
         assert not array.any()
     assert made.matrix.shape == (3, 2, 8)
     assert made.places.shape == (3,)
+
+
+def test_large_arrays_begin_at_a_line_of_the_cache():
+    made = allocate(Outer, {ANY: 101})
+    for array in (made.inner.weights, made.places, made.matrix):
+        assert array.ctypes.data % 64 == 0
+        assert array.flags.c_contiguous
+        assert array.flags.aligned
+        assert not array.any()
+    assert made.places.dtype == np.int64
+    # They lie side by side, and none reaches into another.
+    for array in (made.places, made.matrix):
+        array[...] = 7
+        assert not (made.inner.weights == 7).any()
+    assert (made.places == 7).all()
+    assert (made.matrix == 7).all()
+
+
+def test_a_copy_in_lines_is_that_array_at_a_line_of_the_cache():
+    array = np.arange(600.0).reshape(20, 30).T
+    copy = in_lines(array)
+    assert copy.ctypes.data % 64 == 0
+    assert copy.flags.c_contiguous
+    np.testing.assert_array_equal(copy, array)
+    array[0, 0] = 5.0
+    assert copy[0, 0] == 0.0
 
 
 def test_numbers_are_read_in_the_order_of_the_fields():

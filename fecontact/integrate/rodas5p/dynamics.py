@@ -391,18 +391,16 @@ def add_ground_change(change, s, blocks, g, w, out):
     for at in range(blocks.used[0]):
         j = blocks.nodes[at]
         pressing = 0.0
-        for row in range(d + 1):
-            rate = 0.0
-            for tangent in range(d - 1):
-                axis = 2 * tangent
-                rate -= (nodes.ground_moved(tangent, j, change.travel, change.second_travel, s)
-                         * g.partial[j, row, axis]
-                         + nodes.ground_moved(tangent, j, change.speed, change.second_speed, s)
-                         * g.partial[j, row, d + axis])
-            if row < d:
-                forces[row * n + at] = rate
-            else:
-                pressing = rate
+        for row in range(d):
+            forces[row * n + at] = 0.0
+        for tangent in range(d - 1):
+            place, speed = 2 * tangent, d + 2 * tangent
+            moved = nodes.ground_moved(tangent, j, change.travel, change.second_travel, s)
+            faster = nodes.ground_moved(tangent, j, change.speed, change.second_speed, s)
+            for row in range(d):
+                forces[row * n + at] -= (moved * g.partial[j, row, place]
+                                         + faster * g.partial[j, row, speed])
+            pressing -= moved * g.partial[j, d, place] + faster * g.partial[j, d, speed]
         for k in range(s.memory[j]):
             rate = g.rates[j, k, 2] * pressing
             for tangent in range(d - 1):

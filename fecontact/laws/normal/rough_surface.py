@@ -25,6 +25,8 @@ def bed_of_asperities(v, p, compression, bearing, density):
     stiffness, height, damping = p[0], p[1], p[2]
     force = stiffness * height * compression + damping * bearing * v
     away = force <= 0.0
+    if everywhere(away):
+        return 0.0, 0.0, 0.0
     return (select(away, 0.0, force),
             select(away, 0.0, stiffness * bearing + damping * density / height * v),
             select(away, 0.0, damping * bearing))
