@@ -31,7 +31,7 @@ from numba.core.registry import CPUDispatcher
 
 from fecontact.core.addresses import contract_signature
 from fecontact.core.errors import InputError
-from fecontact.core.kernel_parts import BorrowingCompiler, PartCompiler, kernel_compiler, part
+from fecontact.core.kernel_parts import LawCompiler, PartCompiler, kernel_compiler, part
 from fecontact.core.progress import said_if_slow
 from fecontact.core.records import is_record, read_from_python, signature_of
 from fecontact.core.stored_code import (
@@ -303,7 +303,7 @@ class CompiledLaw:
                              f"parameters in __post_init__ of the law's class, and return a "
                              f"finite value everywhere.")
         law = CFunc(function, sigutils.normalize_signature(self.signature), {},
-                    {"error_model": "numpy"}, BorrowingCompiler)
+                    {"error_model": "numpy"}, LawCompiler)
         # Functions typed into a console have no file beside which they could be stored.
         if Path(inspect.getfile(function)).is_file():
             keep_on_disk(law, (source_digest(function), function.__module__), function.__module__)

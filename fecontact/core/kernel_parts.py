@@ -10,6 +10,7 @@ from itertools import product
 from typing import Any
 
 from llvmlite.binding import Linkage, parse_assembly
+from llvmlite.ir import CallInstr
 from numba import types
 from numba.core import ir, sigutils
 from numba.core.codegen import JITCodeLibrary
@@ -110,6 +111,29 @@ class _KernelLibrary(_Library):
                 function.name += ".inner"
 
 
+class _LawLibrary(JITCodeLibrary):
+    """Code of a law, which becomes part of its entry, as it raises no exceptions.
+
+    Numba's entries call it instead, and its results go through memory.
+    """
+
+    def add_ir_module(self, module: Any) -> None:
+        """Add intermediate code, in which calls of the law may be replaced by its code."""
+        if module.name == "cfunc_wrapper":
+            for function in module.functions:
+                for block in function.blocks:
+                    for step in block.instructions:
+                        if isinstance(step, CallInstr):
+                            step.attributes.discard("noinline")
+        super().add_ir_module(module)
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if not function.is_declaration and not function.name.startswith("cfunc."):
+                function.linkage = Linkage.internal
+        super()._optimize_final_module()
+
+
 @register_pass(mutates_CFG=False, analysis_only=False)
 class _Borrow(FunctionPass):
     """Arrays and records that a kernel is given are borrowed from who calls it."""
@@ -183,6 +207,17 @@ class BorrowingCompiler(_PlainCompiler):
         passes.add_pass_after(_Borrow, FixupArgs)
         passes.finalize()
         return [passes]
+
+
+class LawCompiler(BorrowingCompiler):
+    """A compiler of laws."""
+
+    def define_pipelines(self) -> Any:
+        """Numba's passes, for such a library."""
+        state = self.state
+        state.library = _LawLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return super().define_pipelines()
 
 
 def kernel_compiler(constants: str) -> Any:

@@ -1,6 +1,7 @@
 """References to named tuples in kernels, and parts of kernels."""
 
 import gc
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -11,10 +12,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from numba import types
+from numba.core import sigutils
+from numba.core.ccallback import CFunc
 from numba.core.compiler import Flags
 
 from fecontact.core import kernel_parts
-from fecontact.core.addresses import function_at
+from fecontact.core.addresses import contract_signature, function_at
 from fecontact.core.compiled import compile_law, helper, kernel, routine
 from fecontact.core.constants import constants
 from fecontact.core.records import (
@@ -30,6 +33,7 @@ from fecontact.core.records import (
     signature_of,
 )
 from fecontact.core.references import Reference
+from fecontact.laws.signatures import NORMAL, normal_at
 
 
 class Inner(NamedTuple):
@@ -359,3 +363,27 @@ def test_a_part_is_compiled_once_for_constants_and_other_numbers():
 
     summed.__annotations__ = {"x": float, "return": float}
     assert kernel(summed)(1.5) == 2.0 * (2 + 3) * 1.5
+
+
+def test_the_entry_of_a_law_holds_its_code():
+    """It calls nothing, for laws that call nothing, and returns what they do."""
+
+    def bed(u, v, p):
+        force = p[0] * u + p[1] * v
+        if force <= 0.0:
+            return 0.0, 0.0, 0.0
+        for k in range(2, len(p)):
+            force += p[k] * u * u
+        return force, p[0], p[1]
+
+    law = CFunc(bed, sigutils.normalize_signature(contract_signature(NORMAL)), {},
+                {"error_model": "numpy"}, kernel_parts.LawCompiler)
+    law.compile()
+    assert re.findall(r"\tcallq?\t", law._library.get_asm_str()) == []
+
+    def at(address, p):
+        return normal_at(address)(0.5, 2.0, p)
+
+    at.__annotations__ = {"address": int, "p": Vector, "return": tuple[float, float, float]}
+    assert kernel(at)(law.address, np.array([3.0, 1.0, 4.0])) == (4.5, 3.0, 1.0)
+    assert kernel(at)(law.address, np.array([3.0, -1.0, 0.0])) == (0.0, 0.0, 0.0)
