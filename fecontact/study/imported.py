@@ -257,6 +257,7 @@ class Imported:
             if not any(self._rotation(body) for body in bodies):
                 found.notes.append(f"Centrifugal force on {name} is left out: this force must act "
                                    f"on all cells.")
+        found.notes += distributed.notes
         for what in dict.fromkeys(distributed.unread):
             found.notes.append(f"{what} is left out: only {distributed.kinds} are read.")
         return found

@@ -373,6 +373,69 @@ def test_bad_loads_of_nastran_and_ansys(file, load, message, tmp_path):
         read_mesh(path)
 
 
+# Local axes of nodes: supports, then forces of 6 along the local x and 2 along z of a node ------
+
+
+@pytest.mark.parametrize(("transform", "held", "fixed", "forces"), [
+    ("TYPE=R\n0., 1., 0., -1., 0., 0.", "1, 1", "y", {"y": 6.0, "z": 2.0}),
+    ("TYPE=R\n0., 1., 0., 0., 0., 1.", "2, 3", "xz", {"y": 6.0, "x": 2.0}),
+    ("TYPE=R\n3., 4., 0., -4., 3., 0.", "1, 2", "xy", {"x": 3.6, "y": 4.8, "z": 2.0}),
+    ("TYPE=R\n3., 4., 0., -4., 3., 0.", "1, 3", "xyz", {"x": 3.6, "y": 4.8, "z": 2.0}),
+    # The tip lies at the radius (0.1, 0.05) of the axis.
+    ("TYPE=C\n.1, .05, 0., .1, .05, 1.", "3, 3", "z",
+     {"x": 12.0 / 5.0**0.5, "y": 6.0 / 5.0**0.5, "z": 2.0}),
+])
+def test_supports_and_forces_of_decks_act_along_transforms(transform, held, fixed, forces,
+                                                           tmp_path):
+    text = deck(f"*CLOAD\n{TIP}, 1, 6.\n{TIP}, 3, 2.\n").replace("HELD, 1, 3", f"HELD, {held}")
+    before = f"*NSET, NSET=LOCAL\nHELD, {TIP}\n*TRANSFORM, NSET=LOCAL, {transform}\n*BOUNDARY\n"
+    (tmp_path / "a.inp").write_text(text.replace("*BOUNDARY\n", before))
+    study = Study.from_toml(imported(tmp_path / "a.inp").toml(tmp_path), tmp_path / "a.toml")
+    assert study.body.fixed == {"HELD": fixed}
+    found = {one.component: one.signal.value for one in study.load.forces}
+    assert found == pytest.approx(forces)
+
+
+def test_supports_along_axes_that_are_not_those_of_the_coordinates_are_named(tmp_path):
+    text = deck("").replace("*BOUNDARY\nHELD, 1, 3", "*TRANSFORM, NSET=HELD\n3., 4., 0., -4., 3., "
+                            "0.\n*BOUNDARY\nHELD, 1, 1\nHELD, 3, 3")
+    (tmp_path / "a.inp").write_text(text)
+    found = imported(tmp_path / "a.inp").toml(tmp_path)
+    assert ("The support of HELD in x, z of its local axes is held in z of the coordinates alone: "
+            in found)
+    assert Study.from_toml(found, tmp_path / "a.toml").body.fixed == {"HELD": "z"}
+
+
+@pytest.mark.parametrize(("angles", "fixed", "forces"), [
+    ((90.0, 0.0, 0.0), "y", {"y": 6.0, "z": 2.0}),
+    ((0.0, 90.0, 0.0), "x", {"x": 6.0, "y": -2.0}),
+    ((0.0, 0.0, 90.0), "z", {"z": -6.0, "x": 2.0}),
+    ((90.0, 90.0, 0.0), "y", {"y": 6.0, "x": 2.0}),
+    ((90.0, 90.0, 90.0), "x", {"x": -6.0, "y": 2.0}),
+])
+def test_supports_and_forces_of_archives_act_along_rotated_axes(angles, fixed, forces, tmp_path):
+    nodes = np.column_stack([MESH.nodes, np.tile(angles, (len(MESH.nodes), 1))])
+    held = "".join(f"D,{node:8d},UX  ,  0.00000000    ,  0.00000000    \n" for node in HELD)
+    path = archive(tmp_path / "a.cdb", 185, nodes, MESH.cells + 1,
+                   f"{material(EX=2.1e11, NUXY=0.3, DENS=7850.0)}\n{held}F,{TIP},FX,6.\n"
+                   f"F,{TIP},FZ,2.")
+    study = Study.from_toml(imported(path).toml(tmp_path), tmp_path / "a.toml")
+    assert study.body.fixed == {"D UX": fixed}
+    found = {one.component: one.signal.value for one in study.load.forces}
+    assert found == pytest.approx(forces)
+
+
+@pytest.mark.parametrize(("options", "fixed"), [
+    (", OP=NEW", {"TIP": "xy"}), (", OP=MOD", {"HELD": "xyz", "TIP": "xy"})])
+def test_new_supports_of_the_first_step_replace_those_before(options, fixed, tmp_path):
+    """OP=NEW counts in the first *BOUNDARY of the step; the second one adds to it."""
+    (tmp_path / "a.inp").write_text(deck(
+        f"*NSET, NSET=TIP\n{TIP}, {HIGH}\n*BOUNDARY{options}\nTIP, 1\n"
+        f"*BOUNDARY, OP=NEW\nTIP, 2\n"))
+    study = Study.from_toml(imported(tmp_path / "a.inp").toml(tmp_path), tmp_path / "a.toml")
+    assert study.body.fixed == fixed
+
+
 # Studies --------------------------------------------------------------------------------------
 
 

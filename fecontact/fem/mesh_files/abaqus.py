@@ -6,7 +6,7 @@ sets named on *ELEMENT, surfaces, local coordinate systems, displaced instances 
 
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -184,6 +184,29 @@ def read_inp(path: Path) -> RawMesh:
     return joined
 
 
+def local_axes(path: Path) -> Callable[[str], Array]:
+    """Function that gives the local axes (k, 3, 3), by rows, of the k nodes of a set or of a node.
+
+    They are those of ``*TRANSFORM``, or else those of the coordinates.
+
+    Raises
+    ------
+    MeshError
+        As in :func:`read_inp`.
+    """
+    raw = read_inp(path)
+    groups = {name.upper(): nodes for name, nodes in raw.nodes.items()}
+
+    def axes_of(word: str) -> Array:
+        # Sets of an instance alone are without its name.
+        names = (word.upper(), f"NODE {word}", word.upper().rpartition(".")[2])
+        nodes = next((groups[name] for name in names if name in groups), np.empty(0, np.int64))
+        found = [raw.axes.get(node, np.eye(3)) for node in nodes.tolist()]
+        return np.array(found).reshape(-1, 3, 3)
+
+    return axes_of
+
+
 def _integration(bodies: list["_Instance"]) -> Integration | dict[str, Integration]:
     """Rules of quadrature of the types of elements.
 
@@ -262,6 +285,7 @@ def _constrained(
             joined.attachments += attachments_of(keyword, options, lines, elements, names)
     joined.sections = list(sections_of(assembly.constraints, names))
     joined.temperature, without = temperature_of(assembly.temperatures, names)
+    joined.axes = names.axes
     joined.apart = bool(joined.constraints or joined.sections)
     joined.separate &= not _connected(joined, joined.constraints, first[: len(bodies)])
     return joined, unread, without

@@ -10,8 +10,12 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from fecontact.core.errors import MeshError
-from fecontact.fem.mesh_files.deck_contents import COMPONENTS, DeckContents
+from fecontact.core.extras import optional
+from fecontact.core.types import Array
+from fecontact.fem.mesh_files.deck_contents import COMPONENTS, DeckContents, along_coordinates
 from fecontact.fem.mesh_files.distributed_loads import DistributedLoads
 
 # Node, label and value; element, face, label, and its values on this line or after R5.0.
@@ -158,6 +162,8 @@ def thicknesses(text: str) -> tuple[float, ...]:
 def archive_contents(path: Path) -> DeckContents:
     """Loads and supports of an archive as those of a deck.
 
+    F and D act along the axes of their nodes, which the angles of NBLOCK turn.
+
     Raises
     ------
     MeshError
@@ -165,7 +171,7 @@ def archive_contents(path: Path) -> DeckContents:
     """
     text = path.read_text(encoding="utf-8", errors="replace")
     found = archive_loads(text)
-    return DeckContents(
+    contents = DeckContents(
         found.counts, supports=tuple(
             (name, " ".join(COMPONENTS[_LABELS["D"].index(label)] for label in name.split()[1:]))
             for name in found.supports),
@@ -174,6 +180,30 @@ def archive_contents(path: Path) -> DeckContents:
         distributed=found.distributed, planes=tuple(sorted({
             "strain" if state in _STRAIN else "stress" for state in plane_states(text)})),
         thicknesses=thicknesses(text))
+    read = optional("mapdl_archive", "Reading Ansys archives").Archive(str(path), parse_vtk=False)
+    if not read.node_angles.any():
+        return contents
+    angles = dict(zip(read.nnum.tolist(), read.node_angles, strict=True))
+
+    def axes_of(name: str) -> Array:
+        nodes = found.supports.get(name) or [int(name.removeprefix("node "))]
+        return _turned_axes(np.array([angles.get(node, np.zeros(3)) for node in nodes]))
+
+    return along_coordinates(contents, axes_of)
+
+
+def _turned_axes(angles: Array) -> Array:
+    """Axes (k, 3, 3), by rows, of nodes with the angles (k, 3) THXY, THYZ, THZX [degrees].
+
+    These turn about z, then about the turned x, then about the turned y.
+    """
+    axes = np.tile(np.eye(3), (len(angles), 1, 1))
+    for k, column in zip((2, 0, 1), np.radians(angles).T, strict=True):
+        cosine, sine = np.cos(column)[:, None], np.sin(column)[:, None]
+        first, second = axes[:, (k + 1) % 3].copy(), axes[:, (k + 2) % 3].copy()
+        axes[:, (k + 1) % 3] = cosine * first + sine * second
+        axes[:, (k + 2) % 3] = cosine * second - sine * first
+    return axes
 
 
 def _numbers(command: str, text: str) -> list[float]:

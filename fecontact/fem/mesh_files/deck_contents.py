@@ -1,11 +1,15 @@
 """Contents of a deck beside its mesh: loads and supports, keywords, and element types."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from fecontact.core.checks import whole_number
+from fecontact.core.types import Array
+from fecontact.fem.mesh_files.abaqus import local_axes
 from fecontact.fem.mesh_files.abaqus_attachments import TYPES
 from fecontact.fem.mesh_files.abaqus_constraints import READ
 from fecontact.fem.mesh_files.abaqus_keywords import Deck
@@ -99,6 +103,7 @@ def deck_contents(path: Path) -> DeckContents:
     single: dict[str, str] = {}
     distributed = DistributedLoads()
     thicknesses: list[float] = []
+    held_before = False  # true up to the first *BOUNDARY of a step, which OP=NEW concerns
     for keyword, options, lines in deck.blocks():
         rows = [[word.strip() for word in line.split(",")] for line in lines] if (
             keyword in ("CONTACT PAIR", "BOUNDARY", "CLOAD", "NSET")
@@ -113,7 +118,12 @@ def deck_contents(path: Path) -> DeckContents:
                 single.setdefault(words[0], options["NSET"])
         elif keyword == "CONTACT PAIR":
             pairs += [(row[0], row[1]) for row in rows if len(row) > 1]
+        elif keyword == "STEP":
+            held_before = True
         elif keyword == "BOUNDARY" and not deck.keywords["END STEP"]:
+            if held_before and options.get("OP", "").upper() == "NEW":
+                supports.clear()
+            held_before = False
             if any(len(row) > 3 and float(row[3] or 0.0) for row in rows):
                 distributed.unread.append("*BOUNDARY with displacements other than zero")
             distributed.unread += _of_time(keyword, options)
@@ -132,13 +142,75 @@ def deck_contents(path: Path) -> DeckContents:
             forces += [(name, COMPONENTS[dof - 1], float(value)) for name, word, value, *_ in (
                 (*row, "", "")[: max(len(row), 3)] for row in rows)
                 if (dof := whole_number(word) or 0) in range(1, 7) and float(value or 0.0)]
-    return DeckContents(
+    found = DeckContents(
         deck.keywords, elements, tuple(pairs),
         tuple((name, " ".join(COMPONENTS[dof - 1] for dof in sorted(held)))
               for name, held in supports.items() if held), tuple(forces), single,
         distributed,
         tuple(sorted({"stress" if name.startswith("CPS") else "strain" for name in elements
                       if name.startswith(("CPS", "CPE"))})), tuple(dict.fromkeys(thicknesses)))
+    if not deck.keywords["TRANSFORM"]:
+        return found
+    axes_of = local_axes(path)
+    return along_coordinates(found, lambda word: axes_of(single.get(word, word)))
+
+
+def along_coordinates(contents: DeckContents, axes_of: Callable[[str], Array]) -> DeckContents:
+    """Contents of a file whose supports and forces act along local axes of their nodes.
+
+    A force becomes its components along the coordinates. Supports hold those coordinates whose unit
+    vectors e fulfil P e = e, where P = sum of n n^T over the local directions n that are held.
+    Parts of supports along other directions, and forces on nodes with different axes, are left out
+    and listed in ``distributed.notes``.
+
+    Parameters
+    ----------
+    contents : DeckContents
+        Supports and forces with components along local axes.
+    axes_of : callable
+        Local axes (k, 3, 3), by rows, of the k nodes of a set or a node.
+    """
+    notes = contents.distributed.notes
+    supports: list[tuple[str, str]] = []
+    for given, components in contents.supports:
+        held: list[str] = []
+        lost: list[str] = []
+        for names in (COMPONENTS[:3], COMPONENTS[3:]):
+            which = [k for k, name in enumerate(names) if name in components.split()]
+            if len(which) == 3:
+                held += names
+                continue
+            directions = axes_of(given)[:, which]
+            if not len(directions):  # the file does not hold the nodes
+                held += [names[k] for k in which]
+                continue
+            P = np.einsum("kia,kib->kab", directions, directions)
+            along = [name for k, name in enumerate(names)
+                     if np.abs(P[:, k] - np.eye(3)[k]).max() < _SAME_DIRECTION]
+            held += along
+            lost += [names[k] for k in which] * (len(along) < len(which))
+        if held:
+            supports.append((given, " ".join(held)))
+        if lost:
+            kept = f"held in {', '.join(held)} of the coordinates alone" if held else "left out"
+            notes.append(f"The support of {given} in {', '.join(lost)} of its local axes is "
+                         f"{kept}: a study holds displacements along the coordinates; give the "
+                         f"nodes axes along these, or hold x, y and z.")
+    forces: list[tuple[str, str, float]] = []
+    for given, component, value in contents.forces:
+        first = 3 * (COMPONENTS.index(component) // 3)
+        vectors = axes_of(given)[:, COMPONENTS.index(component) - first]
+        if not len(vectors):  # the file does not hold the nodes
+            forces.append((given, component, value))
+            continue
+        if np.ptp(vectors, axis=0).max() > _SAME_DIRECTION:
+            notes.append(f"The force on {given} is left out: local axes differ between its nodes; "
+                         f"give each node its own force.")
+            continue
+        forces += [(given, name, value * part) for name, part in zip(
+            COMPONENTS[first:first + 3], vectors[0].tolist(), strict=True)
+            if abs(part) > _SAME_DIRECTION]
+    return replace(contents, supports=tuple(supports), forces=tuple(forces))
 
 
 def _of_time(keyword: str, options: Mapping[str, str]) -> list[str]:
@@ -155,6 +227,7 @@ def _thickness(lines: list[str]) -> float:
         return 1.0
 
 
+_SAME_DIRECTION = 1e-6  # of a unit vector: files round coordinates and angles
 COMPONENTS = ("x", "y", "z", "phi_x", "phi_y", "phi_z")
 # Degrees of freedom that names hold.
 _NAMED = {"ENCASTRE": range(1, 7), "PINNED": range(1, 4), "XSYMM": (1, 5, 6), "YSYMM": (2, 4, 6),

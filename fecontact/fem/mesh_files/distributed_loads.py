@@ -21,6 +21,8 @@ class DistributedLoads:
         Loads of other kinds.
     kinds : str
         Kinds of loads that are read, for messages.
+    notes : list of str
+        Sentences on supports and forces that are left out.
     """
 
     pressures: list[tuple[str, float]] = field(default_factory=list)
@@ -28,6 +30,7 @@ class DistributedLoads:
     rotations: list[tuple[str, float, Vector, Vector]] = field(default_factory=list)
     unread: list[str] = field(default_factory=list)
     kinds: str = ""
+    notes: list[str] = field(default_factory=list)
     _sides: dict[float, str] = field(default_factory=dict)
 
     def surface_of(self, pressure: float, keyword: str) -> str:

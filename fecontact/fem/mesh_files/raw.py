@@ -85,6 +85,8 @@ class RawMesh:
         Changes of temperature at the nodes.
     numbers : (n,) integer array, optional
         Numbers that the first n points, those of cells among them, have in the file.
+    axes : mapping of int to (3, 3) array
+        Local axes, by rows, of nodes with some, by their rows in ``points``.
     """
 
     points: Array
@@ -106,6 +108,7 @@ class RawMesh:
     integration: Integration | dict[str, Integration] = "exact"
     temperature: Array | None = None
     numbers: Integers | None = None
+    axes: dict[int, Array] = field(default_factory=dict)
 
     def part(self, name: str | None) -> "RawMesh":
         """The elements of one part, with the groups of the file; all elements for None.
