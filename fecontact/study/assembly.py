@@ -60,8 +60,8 @@ class Described(Protocol):
         """Loads."""
 
     @property
-    def gap(self) -> float | tuple[float, ...] | Crown | HeightMap:
-        """Initial gap."""
+    def gap(self) -> float | tuple[float, ...] | Crown | HeightMap | None:
+        """Initial gap; None for that of the mesh."""
 
 
 LAWS = ("normal", "friction")
@@ -111,9 +111,10 @@ def contact_system(study: Described, reduced: Reduced, title: str) -> ContactSys
     for load in study.load.boundaries:
         with located(f"{title}: [load.boundaries]:"):
             basis.boundary_row(load.boundary)
+    gap: Any = None
     if several:
         gap = _gaps(study, reduced, title)
-    else:
+    elif study.gap is not None:
         of_table = isinstance(study.gap, Crown | HeightMap)
         with located(f"{title}: [gap]:" if of_table else f"{title}:", "Crown", "gap"):
             gap = gap_values(study.gap, basis.contact_places)
@@ -144,7 +145,7 @@ def _has_friction(study: Described, basis: ModalBasis) -> bool:
 
 def _gaps(study: Described, reduced: Reduced, title: str) -> Any:
     """Gaps of the geometry and those added to single interfaces."""
-    if study.gap != 0.0:
+    if study.gap is not None:
         raise InputError(f"{title}: gap = {shown(plain(study.gap))} is for a single body; give it "
                          f"in [interfaces.NAME].")
     gaps, first = np.array(reduced.gaps), 0

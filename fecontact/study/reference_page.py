@@ -93,7 +93,8 @@ def _parts() -> Iterator[tuple[str, str]]:
     hints = get_type_hints(Study)
     yield "gap", ("## `gap`\n\nInitial distance of the contact nodes from flat ground [m]. The key "
                   "stands above all sections. It is a number, a list with one number per node, or "
-                  "a table.\n\nTable for a face that is an arc:\n\n" + _table(Crown)
+                  "a table. By default it is that of the mesh, whose lowest contact node touches "
+                  "the ground.\n\nTable for a face that is an arc:\n\n" + _table(Crown)
                   + "\n\nTable for measured heights of a solid's face:\n\n"
                   + _table(HeightMap) + "\n")
     shapes = [_table(cls, f'`shape = "{name}"`: {_summary(cls)}') for name, cls in SHAPES.items()]

@@ -130,7 +130,8 @@ class Study(Summarised, StudyModels):
         all others use ``[normal]`` and ``[friction]``. Of several bodies also their faces.
     gap : float, (n,) tuple, Crown or HeightMap
         Initial distance of the contact nodes from flat ground [m], or ``{radius, centre}`` for a
-        face in the shape of an arc; written above all sections.
+        face in the shape of an arc; written above all sections. By default that of the mesh, whose
+        lowest contact node touches the ground.
     preload : PreloadSettings or None
         ``[preload]``: quasi-static loading; see :func:`fecontact.load_history`.
     simulation : SimulationSettings
@@ -175,7 +176,7 @@ class Study(Summarised, StudyModels):
     ground: Ground = field(default_factory=Ground)
     drive: Drive = field(default_factory=Drive)
     load: Load = field(default_factory=Load)
-    gap: Gap = 0.0
+    gap: Gap | None = None
     simulation: SimulationSettings = field(default_factory=SimulationSettings)
     wear: WearSettings = field(default_factory=WearSettings)
     branch: BranchSettings = field(default_factory=BranchSettings)
@@ -285,7 +286,7 @@ class Study(Summarised, StudyModels):
             if "bodies" not in tables else None,
             bodies=bodies_from_tables(tables["bodies"], title) if "bodies" in tables else {},
             links=links_from_tables(tables.get("links", {}), title),
-            gap=_gap(tables.get("gap", 0.0), title),
+            gap=_gap(tables["gap"], title) if "gap" in tables else None,
             interfaces=convert(tables.get("interfaces", {}), Mapping[str, InterfaceSettings], title,
                                "interfaces"),
             path=path, _keys=key_tree(tables),
@@ -345,7 +346,7 @@ class Study(Summarised, StudyModels):
         for name in _OPTIONAL:
             if getattr(self, name) is not None:
                 sections[name] = to_table(getattr(self, name), defaults=defaults)
-        gap = {} if self.gap == 0.0 and not defaults else {"gap": plain(self.gap)}
+        gap = {} if self.gap is None else {"gap": plain(self.gap)}
         return {**gap, **first, **interfaces,
                 **{name: table for name, table in sections.items()
                    if table or defaults or name in LAWS}}

@@ -22,6 +22,7 @@ from fecontact.laws.friction.stribeck import ConstantFriction
 from fecontact.laws.friction_contact import separated
 from fecontact.laws.ground.ground import Ground
 from fecontact.laws.normal.linear import PrescribedForce
+from fecontact.reduction.assembly.contact_faces import several_bodies
 from fecontact.reduction.assembly.links import Links
 from fecontact.reduction.basis_parameters import basis_parameter, with_basis_parameters
 from fecontact.reduction.modal_basis import ModalBasis
@@ -108,7 +109,8 @@ class ContactSystem(Summarised):
         Loads at C and other points.
     gap : float, (n,) sequence, Crown, HeightMap or function of x
         Initial distance g_j of the contact nodes from flat ground, zero or above [m]; stored as
-        numbers.
+        numbers. By default that of the mesh, whose lowest contact node touches the ground; with
+        interfaces that of their faces.
     sliding : mapping of interface to SlidingTranslation or SlidingRotation
         Prescribed motion of the other sides of interfaces.
     bodies : mapping of name to ModalBasis, optional
@@ -137,7 +139,7 @@ class ContactSystem(Summarised):
     ground: Ground = field(default_factory=Ground)
     drive: Drive = field(default_factory=Drive)
     load: Load = field(default_factory=Load)
-    gap: Gap = 0.0
+    gap: Gap | None = None
     sliding: Mapping[str, Sliding] = field(default_factory=dict)
     bodies: InitVar[Mapping[str, ModalBasis] | None] = None
     interfaces: InitVar[Sequence[Interface] | None] = None
@@ -180,8 +182,9 @@ class ContactSystem(Summarised):
             require_laws("ContactSystem", name, law, given, "interface", names)
             if isinstance(given, Mapping):
                 object.__setattr__(self, name, MappingProxyType(dict(given)))
-        object.__setattr__(self, "gap", gap_values(
-            self.gap, self.basis.contact_places))
+        # Faces of interfaces have gaps of their own, see system_fields.
+        gap = 0.0 if self.gap is None and several_bodies(self.basis) else self.gap
+        object.__setattr__(self, "gap", gap_values(gap, self.basis.contact_places))
         object.__setattr__(self, "sliding", checked_sliding(self.basis, self.ground, self.sliding))
         _ = self.prescribed_motion
         for part in (self.law_groups("normal"), self.law_groups("friction")):

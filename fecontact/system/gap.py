@@ -74,6 +74,18 @@ class Crown:
 Gap = float | Sequence[float] | Crown | HeightMap | Callable[..., Array]
 
 
+# Heights of a face that differ by less than this part of its extent are those of a flat one.
+_FLAT = 1e-9
+
+
+def _of_face(places: Array) -> float | Array:
+    """Heights (n,) of the places (n, d) of contact nodes above the lowest one; 0 if it is flat."""
+    if not places.size:
+        return 0.0
+    above = places[:, -1] - places[:, -1].min()
+    return above if above.max() > _FLAT * np.ptp(places, axis=0).max() else 0.0
+
+
 def _below(heights: HeightMap, places: Array) -> Array:
     """Distance (n,) of measured heights at places (n, 3) from the highest of them [m].
 
@@ -98,14 +110,17 @@ def _below(heights: HeightMap, places: Array) -> Array:
     return np.asarray(z.max() - z)
 
 
-def gap_values(gap: Gap, places: Array) -> float | tuple[float, ...]:
+def gap_values(gap: Gap | None, places: Array) -> float | tuple[float, ...]:
     """One gap for all contact nodes, or one for each.
 
-    ``places`` (n, d) are those of the nodes, or (n,) their abscissae. Functions take x (n,), of
+    ``places`` (n, d) are those of the nodes, or (n,) their abscissae. None stands for the heights
+    of places above the lowest one, which touches the ground. Functions take x (n,), of
     solids x and y. A HeightMap holds heights of the surface of a solid out of it, which move with
     the body; the highest contact node has the gap zero. InputError for a wrong number of values, or
     a value that is negative or not finite.
     """
+    if gap is None:
+        gap = np.asarray(_of_face(places)).tolist()
     if isinstance(gap, HeightMap):
         gap = _below(gap, places).tolist()
     at = (places,) if places.ndim == 1 else tuple(places.T[:-1])

@@ -225,7 +225,7 @@ def test_a_body_bounces_on_many_nodes_as_on_one_spring():
     basis = fc.basis_from_matrices([[mass]], [[0.0]], {"contact": rows, "C": rows[0]},
                                    contact_places=np.column_stack([np.linspace(0, 1, nodes)] * 2),
                                    tributary=np.full(nodes, 1.0 / nodes), damping=0.0)
-    moving = fc.ContactSystem(basis, LinearContact(stiffness, 0.0), load=fc.Load(force))
+    moving = fc.ContactSystem(basis, LinearContact(stiffness, 0.0), load=fc.Load(force), gap=0.0)
     w = np.sqrt(stiffness / mass)
     run = fc.simulate(moving, 6.0 / w, initial=[0.0, 0.0], outputs=50, rtol=1e-9,
                       solver=Rodas5P())

@@ -4,14 +4,21 @@ import numpy as np
 import pytest
 
 from fecontact import (
+    Beam,
     ContactSystem,
     Crown,
+    ElasticBody,
     InputError,
     Load,
+    Material,
+    Mesh,
     basis_from_matrices,
     equilibrium,
+    generate,
+    modal_basis,
 )
-from fecontact.laws import RoughSurface
+from fecontact.fem import Cylinder, SphereSegment, pair_faces
+from fecontact.laws import Frictionless, LinearContact, RoughSurface
 from fecontact.system.gap import gap_values
 
 
@@ -101,3 +108,66 @@ def test_crown_of_a_solid_is_a_part_of_a_sphere():
         gap_values((1.0, 2.0), places)
     with pytest.raises(InputError, match="centre"):
         Crown(0.5, (0.1, 0.2, 0.3))
+
+
+def pressed(basis, gap):
+    system = ContactSystem(basis, normal=LinearContact(1e10), friction=Frictionless(),
+                           load=Load(normal=1e4), gap=gap)
+    return equilibrium(system).normal_force
+
+
+@pytest.mark.parametrize("shape", [
+    Cylinder(0.02, 0.01, contact_angle=40.0, element_size=0.004),
+    SphereSegment(radius=0.05, base_radius=0.02, height=0.02, contact_radius=0.01)])
+def test_a_curved_face_on_the_ground_touches_it_where_it_is_lowest(shape):
+    body = ElasticBody(generate(shape), Material.named("steel"))
+    basis = modal_basis(body, 4, contact_nodes="all", C="top" if "top" in body.mesh.boundaries
+                        else "C")
+    heights = basis.contact_places[:, 2]
+    system = ContactSystem(basis, normal=LinearContact(1e10), friction=Frictionless())
+    np.testing.assert_allclose(system.gap, heights - heights.min(), rtol=0.0, atol=1e-17)
+    assert max(system.gap) > 4e-4
+    force = pressed(basis, None)
+    assert force.sum() == pytest.approx(1e4)
+    assert np.count_nonzero(force) <= len(force) / 2
+    assert force[np.argmin(heights)] > 0.0
+    # As the same body with the ground as an interface, whose height counts from z = 0.
+    paired = pair_faces({"body": body}, "body.contact", "ground", nodes="all")
+    np.testing.assert_allclose(np.sort(paired.gaps - paired.gaps.min()), np.sort(system.gap),
+                               atol=1e-9)
+    # All nodes touch where that is asked for.
+    assert np.count_nonzero(pressed(basis, 0.0)) == len(force)
+
+
+def arc(radius, count, rows=3):
+    """Block over an arc, whose lowest place lies at the height of 3 m."""
+    turn = np.linspace(-0.6, 0.6, count + 1)
+    x, bottom = radius * np.sin(turn), radius * (1.0 - np.cos(turn))
+    part = np.linspace(0.0, 1.0, rows + 1)[:, None]
+    y = 3.0 + bottom + part * (radius - bottom)
+    first = np.arange(rows)[:, None] * (count + 1) + np.arange(count)
+    cells = np.stack([first, first + 1, first + count + 2, first + count + 1], axis=-1)
+    ends = np.arange(count)
+    top = rows * (count + 1) + ends
+    return Mesh(np.stack([np.broadcast_to(x, y.shape), y], axis=-1).reshape(-1, 2),
+                cells.reshape(-1, 4), {"contact": np.stack([ends, ends + 1], axis=1),
+                                       "top": np.stack([top + 1, top], axis=1)})
+
+
+def test_plane_faces_have_the_gap_of_their_arc():
+    radius = 0.02
+    body = ElasticBody(arc(radius, 24), thickness=0.01)
+    basis = modal_basis(body, 4, contact_nodes="all", C="top")
+    system = ContactSystem(basis, normal=LinearContact(1e10), friction=Frictionless())
+    x = np.asarray(basis.contact_places)[:, 0]
+    circle = radius - np.sqrt(radius**2 - x**2)
+    # Contact nodes lie on chords.
+    np.testing.assert_allclose(system.gap, circle, atol=1.2 * (1.2 * radius / 24) ** 2 / radius)
+    assert min(system.gap) == 0.0
+    assert np.count_nonzero(pressed(basis, None)) < 10
+
+
+def test_flat_faces_have_no_gap():
+    flat = modal_basis(ElasticBody(generate(Beam(0.04, 0.02, element_size=0.005)),
+                                   thickness=0.01), 4, contact_nodes="all")
+    assert ContactSystem(flat, normal=LinearContact(1e10), friction=Frictionless()).gap == 0.0

@@ -17,7 +17,7 @@ def random_system(rng, modes, dimension, friction):
     basis = ModalBasis(w, np.diag(0.1 * w), T, rng.normal(size=(NODES + 2, dimension)),
                        np.ones(NODES))
     return ContactSystem(basis, normal=LinearContact(10.0, 2.0), friction=friction,
-                         ground=Ground(speed=0.3))
+                         ground=Ground(speed=0.3), gap=0.0)
 
 
 @pytest.mark.parametrize("friction", [ConstantFriction(0.5, 3.0), DahlFriction(0.5, 10.0)])

@@ -89,7 +89,7 @@ class ContactPoints:
 
 def ground_points(
     body: ElasticBody, boundaries: str | Sequence[str], counts: Count | Sequence[Count],
-    normal: NormalLaws | None, friction: FrictionLaws | None, gap: Gap,
+    normal: NormalLaws | None, friction: FrictionLaws | None, gap: Gap | None,
 ) -> list[ContactPoints]:
     """Contact points of boundaries above flat ground, none without boundaries.
 

@@ -141,7 +141,8 @@ def deflection_path(
     body: ElasticBody, load: Load | Sequence[Load], *, points: Mapping[str, Place] | None = None,
     time: float = 0.0, follower: bool = False, steps: DeflectionSteps | None = None,
     contact: str | Sequence[str] = (), contact_nodes: Count | Sequence[Count] = "all",
-    normal: NormalLaws | None = None, friction: FrictionLaws | None = None, gap: Gap = 0.0,
+    normal: NormalLaws | None = None, friction: FrictionLaws | None = None,
+    gap: Gap | None = None,
     interfaces: Sequence[Interface] = (),
 ) -> DeflectionPath: ...
 
@@ -166,7 +167,7 @@ def deflection_path(
     contact_nodes: Count | Sequence[Count] = "all",
     normal: NormalLaws | None = None,
     friction: FrictionLaws | None = None,
-    gap: Gap = 0.0,
+    gap: Gap | None = None,
     interfaces: Sequence[Interface] = (),
 ) -> DeflectionPath | dict[str, DeflectionPath]:
     r"""Equilibria of bodies with large deflections, from no load to the whole load.
@@ -193,7 +194,8 @@ def deflection_path(
     normal, friction : laws, or mappings of boundary to law, optional
         Of the ground; the normal law is required with contact.
     gap : float, (n,) sequence, Crown, HeightMap or function of x
-        Initial distance from the ground [m].
+        Initial distance from the ground [m]; by default that of the mesh, as of
+        :class:`~fecontact.ContactSystem`.
     interfaces : sequence of Interface
         Faces paired by :func:`~fecontact.fem.pair_faces`, and their laws.
 
