@@ -1,5 +1,6 @@
 """The key numbers of a run: frequency, amplitudes, forces, friction power, and steady motion."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -9,9 +10,9 @@ from fecontact.analysis.histories import point_name, usual_point
 from fecontact.analysis.periodicity import Steadiness, drive_period, steadiness
 from fecontact.analysis.sampling import alias_message
 from fecontact.analysis.spectra import FEWEST_PERIODS
-from fecontact.analysis.summaries import RUN_SUMMARIES, Point
+from fecontact.analysis.summaries import RUN_SUMMARIES, Point, coarse_note
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, ModelWarning
 from fecontact.core.units import quantity
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.assembly.contact_faces import contact_faces
@@ -37,6 +38,9 @@ class KeyNumbers:
         Names for display, also of frequencies that the interval is too short to resolve.
     drive_period : float or None
         Period of the drive [s].
+    note : str
+        Where outputs are too few for the numbers, and nothing is known between them, what that may
+        do to them; else empty.
     """
 
     values: Mapping[str, float]
@@ -44,6 +48,7 @@ class KeyNumbers:
     interval: tuple[float, float]
     titles: Mapping[str, str]
     drive_period: float | None = None
+    note: str = ""
 
     def unit(self, name: str) -> str:
         """SI unit of a value."""
@@ -54,7 +59,8 @@ class KeyNumbers:
         return [("steady", self.motion), *(
             (title, quantity(self.values[name], self.unit(name), 4) if name in self.values
              else f"fewer than {FEWEST_PERIODS:g} periods; run for longer")
-            for name, title in self.titles.items())]
+            for name, title in self.titles.items()), *(
+            [("outputs", self.note)] if self.note else [])]
 
     @property
     def motion(self) -> str:
@@ -112,7 +118,10 @@ def key_numbers(
     def take(name: str, title: str, **options: Point) -> None:
         bare = name.partition("@")[0]
         try:
-            value = float(RUN_SUMMARIES[bare].function(late, **options))
+            with warnings.catch_warnings():
+                # The note says so once.
+                warnings.simplefilter("ignore", ModelWarning)
+                value = float(RUN_SUMMARIES[bare].function(late, **options))
         except InputError:
             if bare == "dominant_frequency":  # uneven or too few output times
                 return
@@ -151,7 +160,7 @@ def key_numbers(
         if rubbing:
             take("friction_power", "mean friction power")
     return KeyNumbers(values, found, (float(late.time[0]), float(late.time[-1])), titles,
-                      _drive_period(trajectory))
+                      _drive_period(trajectory), coarse_note(late))
 
 
 def _drive_period(trajectory: Trajectory) -> float | None:

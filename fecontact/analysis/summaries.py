@@ -1,8 +1,11 @@
 """Scalar functions of a run: amplitudes, forces, powers, frequencies, shares of contact states.
 
-Sweeps, key numbers and comparisons take them from :data:`RUN_SUMMARIES` by name.
+Sweeps, key numbers and comparisons take them from :data:`RUN_SUMMARIES` by name. They are those of
+the motion between the outputs too, as far as the run has kept it; where it has not, and straight
+lines between outputs may cut off peaks, a ModelWarning says so.
 """
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.analysis.histories import usual_point
+from fecontact.analysis.resolved import resolved
 from fecontact.analysis.sampling import warn_of_aliases
 from fecontact.core.docstrings import summary
-from fecontact.core.errors import InputError, choices
+from fecontact.core.errors import InputError, ModelWarning, choices
 from fecontact.core.types import Array
 from fecontact.integrate.trajectory import Trajectory
 from fecontact.reduction.assembly.contact_faces import contact_faces
@@ -21,6 +25,10 @@ from fecontact.system.columns import POWERS
 from fecontact.system.contact_quantities import ContactState
 
 Point = str | int
+
+# Part of the time in which straight lines between outputs may cut off peaks, beyond which numbers
+# come with a warning.
+_COARSE = 0.1
 
 
 @dataclass(frozen=True)
@@ -41,6 +49,19 @@ def duration(trajectory: Trajectory) -> float:
     return float(trajectory.time[-1] - trajectory.time[0])
 
 
+def coarse_note(trajectory: Trajectory) -> str:
+    """What outputs too far apart do to numbers of a run; empty if it has kept enough."""
+    found = resolved(trajectory)
+    return found.note if found.coarse > _COARSE else ""
+
+
+def _fine(trajectory: Trajectory) -> Trajectory:
+    """The run with what it has kept between outputs that are too far apart."""
+    if note := coarse_note(trajectory):
+        warnings.warn(f"In this run there are {note}.", ModelWarning, stacklevel=3)
+    return resolved(trajectory).trajectory
+
+
 def _mean(trajectory: Trajectory, values: NDArray[Any]) -> float:
     return float(np.trapezoid(values, trajectory.time)) / duration(trajectory)
 
@@ -50,14 +71,15 @@ def _part(trajectory: Trajectory, state: ContactState) -> float:
     lengths = np.where(basis.spring_nodes, 0.0, basis.tributary)
     if not lengths.any():
         return float("nan")
-    return float((trajectory.contact_state == state).mean(axis=0) @ lengths / lengths.sum())
+    fine = _fine(trajectory)
+    return _mean(fine, (fine.contact_state == state) @ lengths) / float(lengths.sum())
 
 
 def largest_displacement(trajectory: Trajectory) -> float:
     """Largest displacement of B, C, the contact nodes and other named points at any time."""
     basis = trajectory.basis
     rows = basis.T[basis.moving_points, : basis.dimension]
-    moved = np.einsum("pkm,tm->tpk", rows, trajectory.modal_coordinates)
+    moved = np.einsum("pkm,tm->tpk", rows, _fine(trajectory).modal_coordinates)
     if basis.dimension == 3:
         return float(np.linalg.norm(moved, axis=-1).max(initial=0.0))
     return float(np.hypot(moved[..., 0], moved[..., 1]).max(initial=0.0))
@@ -82,7 +104,8 @@ def amplitude_z(trajectory: Trajectory, point: Point | None = None) -> float:
 
 def rms_velocity(trajectory: Trajectory, point: Point | None = None) -> float:
     """Root mean square of the velocity of a point, of all directions together."""
-    return float(np.sqrt(_mean(trajectory, (_velocity(trajectory, point) ** 2).sum(axis=1))))
+    fine = _fine(trajectory)
+    return float(np.sqrt(_mean(fine, (_velocity(fine, point) ** 2).sum(axis=1))))
 
 
 def _velocity(trajectory: Trajectory, point: Point | None) -> Array:
@@ -92,7 +115,8 @@ def _velocity(trajectory: Trajectory, point: Point | None) -> Array:
 
 
 def _of_point(trajectory: Trajectory, point: Point | None) -> Array:
-    return trajectory.displacement(usual_point(trajectory.basis) if point is None else point)
+    return _fine(trajectory).displacement(
+        usual_point(trajectory.basis) if point is None else point)
 
 
 def stick_fraction(trajectory: Trajectory) -> float:
@@ -113,24 +137,24 @@ def open_fraction(trajectory: Trajectory) -> float:
 def mean_normal_force(trajectory: Trajectory, face: str | None = None) -> float:
     """Mean over time of the sum of the normal forces, without those of nonlinear springs."""
     nodes = _nodes(trajectory, face)
-    touching = ~trajectory.basis.spring_nodes[nodes]
-    return _mean(trajectory, trajectory.normal_force[:, nodes][:, touching].sum(axis=1))
+    touching, fine = ~trajectory.basis.spring_nodes[nodes], _fine(trajectory)
+    return _mean(fine, fine.normal_force[:, nodes][:, touching].sum(axis=1))
 
 
 def peak_normal_force(trajectory: Trajectory, face: str | None = None) -> float:
     """Largest sum of the normal forces."""
-    return float(trajectory.normal_force[:, _nodes(trajectory, face)].sum(axis=1).max())
+    return float(_fine(trajectory).normal_force[:, _nodes(trajectory, face)].sum(axis=1).max())
 
 
 def mean_friction_force(trajectory: Trajectory, face: str | None = None) -> float:
     """Mean over time of the sum of the friction forces; on the body they act in -x."""
-    nodes = _nodes(trajectory, face)
-    return _mean(trajectory, trajectory.friction_force[:, nodes].sum(axis=1))
+    nodes, fine = _nodes(trajectory, face), _fine(trajectory)
+    return _mean(fine, fine.friction_force[:, nodes].sum(axis=1))
 
 
 def peak_friction_force(trajectory: Trajectory, face: str | None = None) -> float:
     """Largest magnitude of the sum of the friction forces, of solids of both directions."""
-    total = trajectory.friction_forces[:, _nodes(trajectory, face)].sum(axis=1)
+    total = _fine(trajectory).friction_forces[:, _nodes(trajectory, face)].sum(axis=1)
     return float(np.linalg.norm(total, axis=1).max())
 
 
@@ -147,12 +171,12 @@ def _nodes(trajectory: Trajectory, face: str | None) -> slice:
 
 def peak_line_load(trajectory: Trajectory) -> float:
     """Largest normal force per length of the contact face."""
-    return float(trajectory.line_load.max())
+    return float(_fine(trajectory).line_load.max())
 
 
 def peak_pressure(trajectory: Trajectory) -> float:
     """Largest normal force per area of the contact face."""
-    return float(trajectory.pressure.max())
+    return float(_fine(trajectory).pressure.max())
 
 
 def friction_power(trajectory: Trajectory) -> float:

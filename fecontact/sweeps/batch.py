@@ -137,7 +137,9 @@ def _row(batch: Batch, base: Study, case: SweepCase, summaries: dict[Any, Functi
         if known not in summaries:
             summaries[known] = functions_for(
                 batch.summaries, study.folder, wear=known[0], thickness=known[1])
-        values = summarise(trajectory, summaries[known], batch.t_start)
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", ModelWarning)
+            values = summarise(trajectory, summaries[known], batch.t_start)
     except UnwritableError:
         raise
     except FecontactError as error:
@@ -149,8 +151,10 @@ def _row(batch: Batch, base: Study, case: SweepCase, summaries: dict[Any, Functi
     if batch.files is not None:
         _write(batch, case, study, trajectory)
     row = Row(case=case.key, values=values, reason="")
-    if trajectory.limits_exceeded:
-        row["warning"] = " ".join(f"In this run {one}" for one in trajectory.limits_exceeded)
+    said = [*(f"In this run {one}" for one in trajectory.limits_exceeded),
+            *(str(one.message) for one in told if issubclass(one.category, ModelWarning))]
+    if said:
+        row["warning"] = " ".join(dict.fromkeys(said))
     return row
 
 
@@ -159,7 +163,7 @@ def _run(batch: Batch, base: Study, case: SweepCase) -> tuple[Trajectory, Study]
     with warnings.catch_warnings():
         # Warnings go into the row of the case.
         warnings.simplefilter("ignore", ModelWarning)
-        trajectory = study.run(keep_steps=False)
+        trajectory = study.run()
     if trajectory.status is Status.INTERRUPTED:
         raise KeyboardInterrupt
     if trajectory.status not in (Status.FINISHED, Status.EVENT):

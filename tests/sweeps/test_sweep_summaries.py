@@ -10,7 +10,16 @@ import synthetic
 from joined_bodies import stack_run
 from systems import impact_oscillator
 
-from fecontact import ContactSystem, Ground, InputError, RigidStart, Study, Trajectory, simulate
+from fecontact import (
+    ContactSystem,
+    Ground,
+    InputError,
+    ModelWarning,
+    RigidStart,
+    Study,
+    Trajectory,
+    simulate,
+)
 from fecontact.cli.templates import template
 from fecontact.laws import ConstantFriction, EnergyWear, RoughSurface
 from fecontact.sweeps.summaries import SUMMARIES, functions_for, summarise, unit_of
@@ -55,6 +64,24 @@ def test_displacements_and_velocities(run):
     assert found["dominant_frequency"] == pytest.approx(400.0, rel=1e-3)
 
 
+@pytest.mark.parametrize("outputs", [11, 40, 4001])
+def test_numbers_of_a_run_do_not_depend_on_its_outputs(outputs):
+    """A pendulum that strikes a stop; few outputs miss its impacts."""
+    system = impact_oscillator()
+    names = ("amplitude_y", "largest_displacement", "peak_normal_force", "mean_normal_force",
+             "rms_velocity", "open_fraction")
+    found = values(simulate(system, 0.5, outputs=outputs, rtol=1e-8), *names, t_start=0.1)
+    fine = values(simulate(system, 0.5, outputs=100001, rtol=1e-8), *names, t_start=0.1)
+    for name in names:
+        assert found[name] == pytest.approx(fine[name], rel=1e-2), name
+
+
+def test_numbers_of_outputs_alone_come_with_a_warning():
+    run = simulate(impact_oscillator(), 0.5, outputs=11, keep_steps=False)
+    with pytest.warns(ModelWarning, match="which may cut peaks.*give it more outputs"):
+        values(run, "amplitude_y")
+
+
 def test_contact(run):
     found = values(run, "open_fraction", "slip_fraction", "stick_fraction", "mean_normal_force",
                    "peak_normal_force", "peak_line_load", "peak_pressure", "peak_friction_force",
@@ -77,7 +104,7 @@ def test_contact(run):
 
 def test_forces_of_one_of_several_interfaces():
     """Forces of both interfaces add up to the force of the whole system."""
-    stack = stack_run()
+    stack = stack_run(times=801)
     found = values(stack, *(f"{kind}_{force}_force{at}" for kind in ("mean", "peak")
                             for force in ("normal", "friction") for at in ("", "@shoe", "@foot")))
     for force in ("normal", "friction"):
