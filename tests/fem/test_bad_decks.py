@@ -34,6 +34,36 @@ def test_shells_and_beams_are_refused_with_the_way_round(tmp_path, kind, nodes, 
         read_mesh(written(tmp_path, "a.inp", text))
 
 
+@pytest.mark.parametrize(("text", "named"), [
+    ("*NONSTRUCTURAL MASS, ELSET=EALL, UNITS=TOTAL MASS\n1.0\n", r"1 \*NONSTRUCTURAL MASS"),
+    ("*STEP\n*STATIC\n*FOUNDATION\nEALL, F1, 0.1\n*END STEP\n", r"1 \*FOUNDATION"),
+    ("*STEP\n*STATIC\n*MODEL CHANGE, REMOVE\nEALL\n*END STEP\n", r"1 \*MODEL CHANGE"),
+    ("*IMPERFECTION, SYSTEM=R\n1, 0.1, 0.\n", r"1 \*IMPERFECTION"),
+    ("*INITIAL CONDITIONS, TYPE=STRESS\nEALL, 1., 0., 0., 0., 0., 0.\n",
+     r"1 \*INITIAL CONDITIONS of type STRESS"),
+    ("*ELEMENT, TYPE=USER, ELSET=EU\n2, 1, 7\n3, 2, 7\n", r"2 \*ELEMENT of type USER"),
+])
+def test_keywords_that_act_on_bodies_are_named(tmp_path, text, named):
+    path = written(tmp_path, "a.inp", f"{NODES}{BRICK}{STEEL}{text}")
+    with pytest.warns(ModelWarning, match=f"holds {named}, which act on bodies and are not read"):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize("held", ["ELSET=BARS", "ELSET=BARS, GENERATE"])
+def test_trusses_are_refused_with_a_section_alone(tmp_path, held):
+    bars = f"{NODES}{BRICK}*ELEMENT, TYPE=T3D2\n2, 1, 7\n*ELSET, {held}\n2, 2\n{STEEL}"
+    assert read_mesh(written(tmp_path, "a.inp", bars)).dimension == 3
+    section = "*SOLID SECTION, ELSET=BARS, MATERIAL=STEEL\n1.\n"
+    with pytest.raises(MeshError, match=r"trusses \(T3D2 with \*SOLID SECTION of 'BARS'\).*SPRING"):
+        read_mesh(written(tmp_path, "a.inp", f"{bars}{section}"))
+
+
+def test_unknown_numbers_of_nodes_are_named_before_their_sets(tmp_path):
+    text = f"{NODES}{BRICK}{STEEL}".replace("C3D8", "C3D88")
+    with pytest.raises(MeshError, match="unknown type C3D88, that are not read; correct the"):
+        read_mesh(written(tmp_path, "a.inp", text))
+
+
 @pytest.mark.parametrize(("kind", "nodes"), [("S4", "1, 2, 3, 4"), ("CPS3", "1, 2, 3")])
 def test_elements_without_a_section_name_faces(tmp_path, kind, nodes):
     """Groups as meshers write them; a triangle on a brick is no face of it, but names its nodes."""

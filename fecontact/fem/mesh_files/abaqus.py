@@ -6,6 +6,7 @@ sets named on *ELEMENT, surfaces, local coordinate systems, displaced instances 
 
 import re
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -71,6 +72,9 @@ _FACES: dict[int, tuple[tuple[int, ...], ...]] = {
 _UNREAD = ("DISTRIBUTING COUPLING", "SHELL TO SOLID COUPLING", "EMBEDDED ELEMENT",
            "FASTENER", "CONNECTOR SECTION", "JOINT", "USER ELEMENT", "SUBSTRUCTURE PROPERTY",
            "MATRIX ASSEMBLE")
+# Keywords that change stiffness, mass or shape of bodies, and are left out with a warning.
+_LEFT_OUT = ("FOUNDATION", "NONSTRUCTURAL MASS", "MASS ADJUST", "MODEL CHANGE", "IMPERFECTION")
+_TRUSSES = ("T2D", "T3D")
 # Sections of elements that bend or stretch outside of the solids that they are joined to.
 _STRUCTURAL = ("SHELL SECTION", "SHELL GENERAL SECTION", "MEMBRANE SECTION", "BEAM SECTION",
                "BEAM GENERAL SECTION", "FRAME SECTION")
@@ -170,6 +174,11 @@ def read_inp(path: Path) -> RawMesh:
         warnings.warn(f"{path}: the file holds {', '.join(unread)}, which are not read; the mesh "
                       f"has none of their stiffness or mass, so give supports, links and welds "
                       f"beside it.", ModelWarning, stacklevel=4)
+    left_out = [f"{deck.keywords[name]} *{name}" for name in _LEFT_OUT if deck.keywords[name]]
+    left_out += [f"{number} {what}" for what, number in assembly.left_out.items()]
+    if left_out:
+        warnings.warn(f"{path}: the file holds {', '.join(left_out)}, which act on bodies and are "
+                      f"not read; results are those without them.", ModelWarning, stacklevel=4)
     if without:
         warnings.warn(f"{path}: the file holds {without}, which is not read, so that no "
                       f"temperature of the file is taken; give it beside the mesh.", ModelWarning,
@@ -490,6 +499,8 @@ class _Assembly:
         self.materials: dict[str, dict[str, Given]] = {}
         self.orientations: dict[str, Given] = {}
         self.distributions: dict[str, list[str]] = {}
+        # Number of elements and blocks that are left out with a warning.
+        self.left_out: Counter[str] = Counter()
 
     def add(self, keyword: str, options: Options, lines: list[str]) -> None:
         part = self.current
@@ -498,8 +509,11 @@ class _Assembly:
                 (part or self.own.part).add_nodes(options, lines)
             case "ELEMENT" if part is not None:
                 part.add_elements(options, lines)
+                self._count_left_out(options["TYPE"].upper(), lines)
             case "ELEMENT" if is_point_element(options["TYPE"].upper()):
                 self.own.part.add_elements(options, lines)
+            case "ELEMENT":
+                self._count_left_out(options["TYPE"].upper(), lines)
             case "SYSTEM" if part is not None:
                 part.system = _local_system(lines)
             case "NSET" | "ELSET":
@@ -543,6 +557,8 @@ class _Assembly:
                 self.materials[next(reversed(self.materials))][keyword] = options, lines
             case _ if is_temperature(keyword, options):
                 self.temperatures.append((keyword, options, lines))
+            case "INITIAL CONDITIONS":
+                self.left_out[f"*INITIAL CONDITIONS of type {options['TYPE'].upper()}"] += 1
             case _ if keyword in READ:
                 self.constraints.append((keyword, options, lines))
             case _ if keyword in TYPES:
@@ -551,6 +567,30 @@ class _Assembly:
                 raise MeshError(f"The file makes nodes or elements by *{keyword}, which is not "
                                 f"read; write all nodes and elements as data of *NODE and "
                                 f"*ELEMENT.")
+
+    def _count_left_out(self, kind: str, lines: list[str]) -> None:
+        """Count elements of a type that is neither read nor given a meaning elsewhere."""
+        # Gaps are contact, which a study gives.
+        if _kind(kind) is None and not is_point_element(kind) and not kind.startswith("GAP"):
+            self.left_out[f"*ELEMENT of type {kind}"] += len(lines)
+
+    def _require_no_trusses(
+        self, part: "_Part | None", name: str, bodies: "list[_Instance]"
+    ) -> None:
+        """MeshError if the element set of a section holds trusses."""
+        for one in bodies:
+            if part is not None and one.part is not part and (
+                    self.parts.get(one.source) is not part):
+                continue
+            for kind, blocks in one.part.element_types.items():
+                if kind.startswith(_TRUSSES) and any(
+                        np.isin(numbers, np.asarray(member)).any() for numbers in blocks
+                        for member in one.find("elements", name) or ()
+                        if not isinstance(member, _NodesOf)):
+                    raise MeshError(f"The file holds trusses ({kind} with *SOLID SECTION of "
+                                    f"'{name}'), which are not read; give springs (SPRINGA) in "
+                                    f"their place, or leave out elements and section if they "
+                                    f"stiffen nothing.")
 
     def bodies(self) -> list["_Instance"]:
         """Return the meshes of the file.
@@ -597,6 +637,7 @@ class _Assembly:
                 raise MeshError(f"A line *SOLID SECTION names the element set '{name}', which the "
                                 f"file does not hold{nearest(name, sets.values())}; its element "
                                 f"sets are: {choices(sets.values())}.")
+            self._require_no_trusses(part, name, bodies)
             if wanted.upper() not in self.materials:
                 raise MeshError(f"The section of '{name}' names the material '{wanted}', which the "
                                 f"file does not hold{nearest(wanted.upper(), self.materials)}; its "
@@ -802,7 +843,7 @@ class _Part:
 
     def add_elements(self, options: Options, lines: list[str]) -> None:
         kind = _kind(options["TYPE"].upper())
-        if kind in (None, "solid"):
+        if kind is None:
             for line in lines:
                 number, *nodes = _words(line)
                 self.other_elements.append(int(number))
@@ -816,9 +857,6 @@ class _Part:
                 self.sets.elements.setdefault(options["ELSET"], []).append(
                     np.array([one.number for one in made], np.int64))
         if kind is None:
-            return
-        if kind == "solid":
-            self.element_blocks.append((kind, np.zeros(1, np.int64), np.zeros((1, 0), np.int64)))
             return
         count = 1 + NODES[kind]
         numbers = np.fromiter((int(word) for line in lines for word in line.split(",")
@@ -936,7 +974,7 @@ class _Instance:
         faces = {name: [blocks[count] for count in (3, 4) if count in blocks]
                  for name, blocks in sides.items()}
         parts = {name: [(kind, rows) for kind, rows in cells
-                        if not kind.startswith(("line", "solid"))] for name, cells in held.items()}
+                        if not kind.startswith("line")] for name, cells in held.items()}
         return RawMesh(
             self.placed(mesh.places),
             [(kind, rows) for kind, rows in mesh.cells.items() if not kind.startswith("line")],
@@ -1075,7 +1113,11 @@ def _kind(name: str) -> str | None:
         if not _VARIANT.match(name[match.end():]):
             raise MeshError(f"The file holds elements of the unknown type {name}; correct the "
                             f"type, such as C3D{match[1]}.")
-        return _SOLID_KINDS.get(int(match[1]), "solid")
+        if int(match[1]) not in _SOLID_KINDS:
+            known = choices(f"C3D{size}" for size in _SOLID_KINDS)
+            raise MeshError(f"The file holds elements of the unknown type {name}, that are not "
+                            f"read; correct the type, solids are {known}.")
+        return _SOLID_KINDS[int(match[1])]
     if match := _LINE.match(name):
         return _LINE_KINDS[match[1], match[2]]
     if match := _PLANE.match(name):
