@@ -119,17 +119,15 @@ class Imported:
         import tomli_w
 
         file = _relative(self.path, folder)
-        touching = {face.partition(".")[0] for pair in self.interfaces for face in pair}
-        bodies = [name for name in self.meshes if name in touching]
+        bodies = self._bodies if self.interfaces else []
+        loads = self._loads(self._bodies)
         if not bodies:
-            name = max(self.meshes, key=lambda one: len(self.meshes[one].cells))
-            loads = self._loads([name])
+            name, = self._bodies
             tables = {"geometry": self._geometry(file, name),
                       "body": self._body(name),
                       "basis": {"modes": 20, "contact": [],
                                 **_loaded(loads.named[name], self.meshes[name])}}
         else:
-            loads = self._loads(bodies)
             tables = {"bodies": {_name(name): {
                 "geometry": self._geometry(file, name), "body": self._body(name),
                 "basis": {"modes": 10, "damping": 0.01,
@@ -144,7 +142,7 @@ class Imported:
         comments = [f"Written by fecontact import {self.path.name}. Units are SI: m, kg, s, N.",
                     *([f"Bodies without an interface are left out: {listed(left, len(left))}."]
                       if left else []),
-                    *self.notes, *loads.notes,
+                    *self.notes,
                     *([f"Loads and supports of the deck: {', '.join(self.contents.loads)}. This "
                        f"study takes supports at zero, forces at single points, pressure, and "
                        f"gravity and rotation of whole bodies. Add others as fixed in [body] and "
@@ -156,6 +154,18 @@ class Imported:
                        "[friction]."])]
         head = "".join(f"# {line}\n" for text in comments for line in text.splitlines())
         return f"{head}\n{tomli_w.dumps(tables)}"
+
+    @property
+    def _bodies(self) -> list[str]:
+        """Bodies of the study: all with interfaces, or else the largest one."""
+        if not self.interfaces:
+            return [max(self.meshes, key=lambda one: len(self.meshes[one].cells))]
+        touching = {face.partition(".")[0] for pair in self.interfaces for face in pair}
+        return [name for name in self.meshes if name in touching]
+
+    def lost_loads(self) -> list[str]:
+        """Sentences on loads and supports of the file that the study does not hold."""
+        return self._loads(self._bodies).notes
 
     def contradictions(self, name: str, who: str) -> Iterator[str]:
         """Sentences on constraints of a body that do not fit together, or to its supports."""
@@ -359,7 +369,7 @@ def imported(path: str | Path, scale: float = 1.0) -> Imported:
         for name, body in bodies.items():
             notes += [f"{sentence[:1].upper()}{sentence[1:]}"
                       for sentence in implausible_body(who[name], body)]
-    if contents.elements:
+    if contents.elements or contents.properties:
         notes += [f"The deck gives {who[name]} no material. The study takes steel: correct [body]."
                   for name, mesh in meshes.items() if not mesh.materials]
     notes += [f"{number} {sentence.format(kind)}" for kind, number in contents.elements.items()
@@ -379,6 +389,7 @@ def imported(path: str | Path, scale: float = 1.0) -> Imported:
     found = Imported(path, scale, meshes, contents, tuple(interfaces), has_parts=has_parts)
     for name in meshes:
         notes += found.contradictions(name, who[name])
+    notes += found.lost_loads()
     return replace(found, notes=tuple(dict.fromkeys(notes)))
 
 

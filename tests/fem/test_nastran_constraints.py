@@ -120,6 +120,16 @@ def test_bad_cards(tmp_path, cards, message):
         read_mesh(tmp_path / "a.bdf")
 
 
+def test_the_case_control_chooses_the_set_of_equations(tmp_path):
+    sets = "".join(f"MPC,{number},{END[0]},3,1.0,{FOOT[0]},3,-{number}.0\n" for number in (9, 10))
+    (tmp_path / "a.bdf").write_text("MPC = 9\n" + bulk(sets))
+    (one,) = read_mesh(tmp_path / "a.bdf").constraints
+    assert [term.displacement for term in one.terms] == [(0.0, 0.0, 1.0), (0.0, 0.0, -9.0)]
+    (tmp_path / "a.bdf").write_text("MPC = 8\n" + bulk(sets))
+    with pytest.raises(MeshError, match="set 8 of MPC, but the file has the sets '10', '9'"):
+        read_mesh(tmp_path / "a.bdf")
+
+
 def test_a_node_of_two_couplings_is_named_by_its_number(tmp_path):
     """Both couplings are named too; those of Abaqus without names of their own as another one."""
     twice = (f"RBE2,77,{HUB_AT},123456,{FOLLOW}\nRBE2,78,{FOOT[0]},123,{END[0]}\n",

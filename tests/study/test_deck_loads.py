@@ -470,6 +470,24 @@ def test_what_is_not_taken_is_named(tmp_path):
     assert (study.load.gravity, study.load.boundaries, study.body.rotation) == (None, (), None)
 
 
+@pytest.mark.parametrize(("line", "sentence"), [
+    ("HELDD, 1, 3", "The support of HELDD is left out: HELDD is not a group of the bodies"),
+    ("HELD, 1, 3, 0.1", "*BOUNDARY with displacements other than zero is left out: only supports "),
+])
+def test_lost_supports_are_among_the_notes(line, sentence, tmp_path):
+    """Without a study too, and once in its comments."""
+    (tmp_path / "a.inp").write_text(deck("").replace("HELD, 1, 3", line))
+    found = imported(tmp_path / "a.inp")
+    assert [sentence in note for note in found.notes].count(True) == 1
+    assert found.toml(tmp_path).count(sentence) == 1
+
+
+def test_materials_that_properties_name_in_vain_are_told(tmp_path):
+    (tmp_path / "a.bdf").write_text(bulk("PSOLID,1,4\n"))
+    assert "The deck gives the body no material. The study takes steel: correct [body]." in (
+        imported(tmp_path / "a.bdf").notes)
+
+
 def test_a_sum_of_sets_of_supports_acts(tmp_path):
     (tmp_path / "a.bdf").write_text(
         "SPC = 9\n" + bulk(f"SPC1,4,3,{TIP}\nSPCADD,9,3,4\nSPC1,5,1,{TIP}\n"))

@@ -19,7 +19,7 @@ from fecontact.fem.mesh_files.abaqus_keywords import Options
 from fecontact.fem.mesh_files.distributed_loads import DistributedLoads
 
 LOADS = ("DLOAD", "DSLOAD")
-_KINDS = "P, P1 to P6, GRAV and CENTRIF without other options"
+KINDS = "supports at zero, forces, P, P1 to P6, GRAV and CENTRIF without other options"
 # Options that make values depend on time or on user subroutines, and parts of complex loads.
 _REFUSED = ("AMPLITUDE", "LOAD CASE", "IMAGINARY", "REAL", "CYCLIC MODE", "SECTOR")
 _SIDE = re.compile(r"P([1-6])")
@@ -37,7 +37,6 @@ def add_loads(
     MeshError
         For missing values, and data that are no numbers.
     """
-    loads.kinds = _KINDS
     if given := [option for option in _REFUSED if option in options]:
         loads.unread.append(f"*{keyword} with {given[0]}")
         return {}

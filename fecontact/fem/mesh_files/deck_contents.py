@@ -13,7 +13,7 @@ from fecontact.fem.mesh_files.abaqus import local_axes
 from fecontact.fem.mesh_files.abaqus_attachments import TYPES
 from fecontact.fem.mesh_files.abaqus_constraints import READ
 from fecontact.fem.mesh_files.abaqus_keywords import Deck
-from fecontact.fem.mesh_files.abaqus_loads import LOADS, add_loads, groups_of_nodes
+from fecontact.fem.mesh_files.abaqus_loads import KINDS, LOADS, add_loads, groups_of_nodes
 from fecontact.fem.mesh_files.distributed_loads import DistributedLoads
 
 # Keywords of the mesh and its materials, besides those of constraints.
@@ -53,6 +53,8 @@ class DeckContents:
         States of the plane elements, 'stress', 'strain' or both; empty where nothing tells.
     thicknesses : tuple of float
         Thicknesses of the sections of plane elements, each once, in units of the file.
+    properties : bool
+        True if properties of elements, of a file of Nastran, name materials.
 
     Files of Nastran and Ansys give supports, forces and distributed loads alike.
     """
@@ -66,6 +68,7 @@ class DeckContents:
     distributed: DistributedLoads = field(default_factory=DistributedLoads)
     planes: tuple[str, ...] = ()
     thicknesses: tuple[float, ...] = ()
+    properties: bool = False
 
     @property
     def loads(self) -> dict[str, int]:
@@ -101,7 +104,7 @@ def deck_contents(path: Path) -> DeckContents:
     supports: dict[str, set[int]] = {}
     forces: list[tuple[str, str, float]] = []
     single: dict[str, str] = {}
-    distributed = DistributedLoads()
+    distributed = DistributedLoads(kinds=KINDS)
     thicknesses: list[float] = []
     held_before = False  # true up to the first *BOUNDARY of a step, which OP=NEW concerns
     for keyword, options, lines in deck.blocks():

@@ -198,6 +198,11 @@ class BulkData:
             raise MeshError(f"The card {card} of line {line} names {what}; correct its numbers.")
         return np.array([self.row[point] for point in found], np.int64)
 
+    def of_case(self, key: str) -> str | None:
+        """Number of the first set of a key in the case control, if there is one."""
+        found = re.search(rf"^\s*{key}\s*=\s*(\d+)", self.case, re.MULTILINE)
+        return found[1] if found else None
+
     def require_basic(self, card: str, rows: Integers, components: str) -> None:
         """MeshError for points of which some displacements count along axes of their own."""
         if {*"123"} <= {*components} or not {*"123"} & {*components}:

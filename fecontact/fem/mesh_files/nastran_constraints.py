@@ -83,10 +83,13 @@ def _means(bulk: BulkData, raw: RawMesh) -> Iterator[Constraint]:
 
 
 def _equations(bulk: BulkData, raw: RawMesh) -> Iterator[Constraint]:
+    wanted = bulk.of_case("MPC")
     sets: dict[str, Line] = {}
     for line, fields in bulk.cards["MPC"]:
         name = f"MPC of line {line}"
         sets.setdefault(fields[0], line)
+        if fields[0] != (wanted or fields[0]):
+            continue
         words = [word for k in range(0, len(fields), 8) for word in fields[k + 1 : k + 7]]
         terms = []
         for point, component, factor in zip(*(words[k::3] for k in range(3)), strict=False):
@@ -102,6 +105,9 @@ def _equations(bulk: BulkData, raw: RawMesh) -> Iterator[Constraint]:
                 _reference(bulk, line, point, raw, name)
             terms.append(Term(node, tuple(value[:3]), tuple(value[3:]) if way > 2 else ()))
         yield LinearEquation(tuple(terms), name)
-    if len(sets) > 1:
-        raise MeshError(f"The file has the sets {choices(sets)} of MPC; leave those out that do "
-                        f"not act.")
+    if wanted is not None and sets and wanted not in sets:
+        raise MeshError(f"The case control names the set {wanted} of MPC, but the file has the "
+                        f"sets {choices(sets)}; correct MPC =.")
+    if wanted is None and len(sets) > 1:
+        raise MeshError(f"The file has the sets {choices(sets)} of MPC; name the one that acts by "
+                        f"MPC = in the case control, or leave those out that do not act.")

@@ -9,7 +9,6 @@ The first ``LOAD =`` and ``SPC =`` of the case control choose the set that acts,
 without them. A card LOAD adds sets up with factors.
 """
 
-import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -71,7 +70,8 @@ def nastran_contents(path: Path) -> DeckContents:
         distributed=found.distributed,
         planes=tuple(sorted(bulk.planes | ({"stress"} if bulk.cards["PSHELL"] else set()))),
         thicknesses=tuple(dict.fromkeys(thickness for line, fields in shells if fields[2] and (
-            thickness := real(line, fields[2])))))
+            thickness := real(line, fields[2])))),
+        properties=bool(shells or bulk.cards["PSOLID"]))
 
 
 class _Loads:
@@ -123,7 +123,7 @@ class _Loads:
                                for factor, of in zip(fields[2::2], fields[3::2], strict=False)
                                if of}
         held = {fields[0] for name in _READ for _, fields in self._bulk.cards[name]}
-        wanted = _of_case(self._bulk.case, "LOAD") or (
+        wanted = self._bulk.of_case("LOAD") or (
             next(iter(sums or held)) if len(sums or held) == 1 else None)
         if wanted is None and held:
             self.distributed.unread.append(
@@ -185,7 +185,7 @@ class _Loads:
                 self._bulk.require_basic(f"SPC of line {line}", held, components)
                 nodes.setdefault(fields[0], {}).setdefault(components, set()).update(
                     held.tolist())
-        wanted = _of_case(self._bulk.case, "SPC") or (
+        wanted = self._bulk.of_case("SPC") or (
             next(iter(nodes)) if len(nodes) == 1 else None)
         acting: set[str | None] = {of for _, (number, *sets) in self._bulk.cards["SPCADD"]
                   for of in sets if number == wanted} or {wanted}
@@ -205,12 +205,6 @@ class _Loads:
                 self._bulk.require_basic("GRID", np.array(points), components)
                 found[f"PS {components}"] = {*points}, _digits(components)
         return found
-
-
-def _of_case(case: str, key: str) -> str | None:
-    """Number of the first set of a key in the case control, if there is one."""
-    found = re.search(rf"^\s*{key}\s*=\s*(\d+)", case, re.MULTILINE)
-    return found[1] if found else None
 
 
 def _digits(components: str) -> str:
