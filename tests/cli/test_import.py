@@ -163,6 +163,16 @@ def test_the_force_of_a_bolt(place):
     assert (study.body.fixed, study.basis.loads) == ({"HELD": "xyz"}, ("BOLT",))
 
 
+def test_next_commands_can_be_copied_with_paths_that_hold_spaces(cli, place):
+    write_mesh(rectangle(0.1, 0.04, 4, 2), "a part.msh")
+    for words, wanted in (
+            (("init", "a study.toml"), "next: fecontact run 'a study.toml'"),
+            (("import", "a part.msh"), "next: fecontact import 'a part.msh' -o study.toml"),
+            (("import", "a part.msh", "-o", "b c.toml"), "next: fecontact mesh 'b c.toml'")):
+        code, out, _ = cli(*words)
+        assert (code, wanted in " ".join(out.split())) == (0, True), out
+
+
 def test_a_single_body_and_units(cli, place):
     """A file in mm: the sizes look wrong; its study has no contact and runs."""
     mesh = rectangle(100.0, 40.0, 4, 2)

@@ -35,7 +35,8 @@ def init(
     following = {"mesh": "put your mesh beside it as part.msh, or change its name there; then: "
                          "fecontact mesh", "sweep": "next: fecontact sweep",
                  "response": "next: fecontact response"}
-    echo(f"{file} is written; {following.get(shape, 'next: fecontact run')} {file}")
+    command = following.get(shape, "next: fecontact run")
+    echo(f"{file} is written; {command} {shlex.quote(str(file))}")
 
 
 def _require_new(file: Path, force: bool) -> None:
@@ -83,10 +84,10 @@ def import_(
         note(f"note: {sentence}")
     if output is None:
         option = "" if scale == 1.0 else f" --scale {scale:g}"
-        echo(f"next: fecontact import {file}{option} -o study.toml")
+        echo(f"next: fecontact import {shlex.quote(str(file))}{option} -o study.toml")
         return
     write_text(output, found.toml(output.parent))
-    echo(f"{output} is written; next: fecontact mesh {output}")
+    echo(f"{output} is written; next: fecontact mesh {shlex.quote(str(output))}")
 
 
 def mesh(study: StudyFile, /, *, set_: Changes = None, output: Folder = None) -> None:
