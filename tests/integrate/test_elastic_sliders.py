@@ -7,6 +7,7 @@ from scipy.optimize import brentq
 from systems import TURN
 
 import fecontact as fc
+from fecontact.integrate import Rodas5P, Scipy
 from fecontact.laws import (
     BilateralPolynomial,
     FourParameterIwanFriction,
@@ -407,3 +408,22 @@ def test_normal_force_that_jumps_at_touch():
     assert run.states[:, 2] == pytest.approx(np.array(z), abs=1e-5 * max(z))
     assert forces[1] > 0.1 * max(forces)
     assert z[-1] > 0.1 * max(z)
+
+
+def test_runs_of_scipy_pass_contacts_that_close_with_a_stretched_element():
+    """The element slides from the touch on; the step there began at its own end for ever."""
+    rows = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+    basis = fc.basis_from_matrices(2.0 * np.eye(2), np.diag([500.0, 0.0]),
+                                   {"contact": rows[None], "B": rows, "C": rows})
+    system = fc.ContactSystem(
+        basis, normal=LinearContact(1e5, 200.0), friction=JenkinsFriction(2e4, 0.5),
+        drive=fc.Drive(stiffness_x=2e3, amplitude_x=0.01, frequency_hz=1.6),
+        load=fc.Load(20.0, (fc.PointLoad("C", "y", signal=Harmonic(30.0, 4.3)),)))
+    run, other = (fc.simulate(system, 0.2, outputs=41, rtol=rtol, solver=solver)
+                  for solver, rtol in ((Scipy("LSODA"), 1e-6), (Rodas5P(), 1e-8)))
+    force = other.normal_force[:, 0]
+    assert force[0] > 0.0
+    assert force.min() == 0.0
+    assert force[-5:].max() > 0.0
+    assert run.modal_coordinates == pytest.approx(other.modal_coordinates, abs=1e-6)
+    assert abs(run.energies.imbalance) < 1e-5

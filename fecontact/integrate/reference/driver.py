@@ -106,7 +106,7 @@ def integrate(
     kept = GrowingRows(workspace_for_rows(task.keep_steps, size + extra))
     done, y = pass_break(system, float(times[0]), pieces[0].begin, times, 0, result,
                          np.concatenate([state, np.zeros(extra)]))
-    t, status = pieces[0].begin, Status.FINISHED
+    t, status, stuck = pieces[0].begin, Status.FINISHED, -np.inf
     watched = Watched(task, t, y[:size]) if task.events else None
     try:
         for piece in pieces:
@@ -122,7 +122,10 @@ def integrate(
                 counts["steps"] += 1
                 # A step within which slip of an element ends is left there.
                 left = _end_of_slip(system, sliders, steps) if sliders.any() else None
+                if left is not None and left[0] <= stuck:
+                    left = None  # It began at that time.
                 t, y = (steps.t, steps.y) if left is None else left
+                stuck = stuck if left is None else t
                 if watched is not None:
                     stop = watched.look(steps.begin, t, latest, steps.dense)
                     if stop is not None:
