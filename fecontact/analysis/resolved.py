@@ -3,14 +3,13 @@
 Sparse outputs may miss an impact or distort a closed curve.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecontact.core.types import Array
-from fecontact.integrate.kept_steps import KeptSteps
 from fecontact.integrate.trajectory import Trajectory
 
 Flags = NDArray[np.bool_]
@@ -80,7 +79,7 @@ def _resolved(run: Trajectory) -> Resolved:
         between = np.searchsorted(run.time, kept.time) - 1
         rows = flags[np.clip(between, 0, len(flags) - 1)]
         if rows.any():
-            run = _joined(run, kept.part(rows))
+            run = run.joined(kept.part(rows))
         reason = "it was too long to keep more between them; give it more outputs"
     if flags.any():
         flags = _coarse(run, _TOLD_ERROR)
@@ -151,23 +150,3 @@ def _ranges(moved: Array, rates: Array, spacing: float) -> tuple[Array, Array]:
         return np.full_like(ranges, np.inf), np.full_like(speeds, np.inf)
     return (np.maximum(ranges, _SMALL * ranges.max(initial=0.0)),
             np.maximum(speeds, _SMALL_RATE * speeds.max(initial=0.0)))
-
-
-def _joined(run: Trajectory, kept: KeptSteps) -> Trajectory:
-    """Insert the rows of what was kept into the run."""
-    time = np.concatenate([run.time, kept.time])
-    order = np.argsort(time, kind="stable")
-    m = run.basis.modes
-    states, counted = kept.states, ("node_friction_work", "node_creep_work")
-    added = {"modal_coordinates": states[:, :m], "modal_velocities": states[:, m : 2 * m],
-             "memory": states[:, 2 * m :], "work": kept.work,
-             "held_normal_force": kept.normal_force, "held_friction_force": kept.friction_force}
-    columns: dict[str, Any] = {
-        name: np.concatenate([values, added[name]])[order] for name in added
-        if (values := getattr(run, name)) is not None}
-    for name in counted:
-        if (values := getattr(run, name)) is not None:
-            columns[name] = np.array([np.interp(time[order], run.time, column)
-                                      for column in values.T]).reshape(-1, len(time)).T
-    recorded = None if run.recorded is None else run.recorded.merged(kept, order)
-    return run.with_rows(time=time[order], kept=None, recorded=recorded, **columns)

@@ -128,9 +128,16 @@ class ContactWorks(ContactQuantities):
         elif thickness is None:
             raise InputError("wear_depth: give thickness, that of the plane body's face [m].")
         require_positive("wear_depth", thickness=thickness)
-        slips = self.contact_state == ContactState.SLIP
-        power = self.slip_power - self._bristles[1]
-        pressed = np.abs(self.normal_force) * np.linalg.norm(self.slip_velocities, axis=-1)
-        volume = law.volume(self.slip_work, np.where(slips, power, 0.0),
-                            np.where(slips, pressed, 0.0))
-        return volume / (self.basis.tributary * thickness)
+        fine = self._finest
+        slips = fine.contact_state == ContactState.SLIP
+        power = fine.slip_power - fine._bristles[1]
+        pressed = np.abs(fine.normal_force) * np.linalg.norm(fine.slip_velocities, axis=-1)
+        outputs = np.searchsorted(fine.time, self.time)
+        lost, rubbed = (fine._summed(np.where(slips, one, 0.0))[outputs]
+                        for one in (power, pressed))
+        return law.volume(self.slip_work, lost, rubbed) / (self.basis.tributary * thickness)
+
+    @property
+    def _finest(self) -> "ContactWorks":
+        """The run with all times at which its motion is known."""
+        return self

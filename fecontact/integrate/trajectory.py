@@ -362,6 +362,32 @@ class Trajectory(ContactWorks, Summarised):
             steps = steps.part(rows, self.work[chosen.start])
         return self.with_rows(**kept, **counted, events=events, kept=steps, recorded=recorded)
 
+    def joined(self, kept: KeptSteps) -> "Trajectory":
+        """The run with rows of what it has kept between its outputs.
+
+        Friction work of the nodes is interpolated between outputs.
+        """
+        time = np.concatenate([self.time, kept.time])
+        order = np.argsort(time, kind="stable")
+        m, states = self.basis.modes, kept.states
+        added = {"modal_coordinates": states[:, :m], "modal_velocities": states[:, m : 2 * m],
+                 "memory": states[:, 2 * m :], "work": kept.work,
+                 "held_normal_force": kept.normal_force,
+                 "held_friction_force": kept.friction_force}
+        columns: dict[str, Any] = {
+            name: np.concatenate([values, added[name]])[order] for name in added
+            if (values := getattr(self, name)) is not None}
+        for name in ("node_friction_work", "node_creep_work"):
+            if (values := getattr(self, name)) is not None:
+                columns[name] = np.array([np.interp(time[order], self.time, column)
+                                          for column in values.T]).reshape(-1, len(time)).T
+        recorded = None if self.recorded is None else self.recorded.merged(kept, order)
+        return self.with_rows(time=time[order], kept=None, recorded=recorded, **columns)
+
+    @property
+    def _finest(self) -> "Trajectory":
+        return self if self.kept is None else self.joined(self.kept)
+
     @cached_property
     def limits_exceeded(self) -> tuple[str, ...]:
         """Messages about states outside the range of validity of the model.

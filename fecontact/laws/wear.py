@@ -23,15 +23,17 @@ class WearLaw(InheritsDocumentation):
         For values outside these ranges.
     """
 
-    def volume(self, slip_work: Array, power: Array, pressed_speed: Array) -> Array:
+    def volume(self, slip_work: Array, lost: Array, rubbed: Array) -> Array:
         """Volume (N, n) worn off since the first time [m3].
 
         Parameters
         ----------
         slip_work : (N, n) array
-            Energy lost by friction in slip since the first time [J].
-        power, pressed_speed : (N, n) arrays
-            Power that friction loses [W], and normal force times slip speed [W], zero but in slip.
+            Energy lost by friction in slip since the first time [J], from the integrator.
+        lost, rubbed : (N, n) arrays
+            Integrals since the first time of the power that friction loses in slip [J], and of
+            normal force times slip speed [N m], by the trapezoidal rule over all known times. Their
+            ratio tells the coefficient of friction between two times.
         """
         raise NotImplementedError
 
@@ -57,7 +59,7 @@ class EnergyWear(WearLaw):
     def __post_init__(self) -> None:
         require_not_negative("EnergyWear", coefficient=self.coefficient)
 
-    def volume(self, slip_work: Array, power: Array, pressed_speed: Array) -> Array:
+    def volume(self, slip_work: Array, lost: Array, rubbed: Array) -> Array:
         """k_w times the energy lost in slip; see :class:`WearLaw`."""
         return self.coefficient * slip_work
 
@@ -67,8 +69,9 @@ class ArchardWear(WearLaw):
     """Archard's law: the volume is proportional to normal force times slip distance.
 
     ``depth' = k |v| p`` in slip, p the pressure; with a constant coefficient of friction mu this is
-    :class:`EnergyWear` with ``k_w = k / mu``. The coefficient of friction is taken at the output
-    times, the energy lost between them from the integrator.
+    :class:`EnergyWear` with ``k_w = k / mu``. The energy lost between two output times is
+    the integrator's; the mean coefficient of friction between them is taken at them and where the
+    run has kept its motion (``keep_steps``), by default often enough.
 
     Parameters
     ----------
@@ -85,12 +88,11 @@ class ArchardWear(WearLaw):
     def __post_init__(self) -> None:
         require_not_negative("ArchardWear", coefficient=self.coefficient)
 
-    def volume(self, slip_work: Array, power: Array, pressed_speed: Array) -> Array:
+    def volume(self, slip_work: Array, lost: Array, rubbed: Array) -> Array:
         """K times the integral of normal force and slip speed; see :class:`WearLaw`."""
-        lost = power[1:] + power[:-1]
-        pressed = pressed_speed[1:] + pressed_speed[:-1]
-        # Slips too short to show at an output time have the mean coefficient of the others.
-        mean = pressed.sum(axis=0) / np.maximum(lost.sum(axis=0), 1e-300)
-        per_energy = np.where(lost > 0.0, pressed / np.maximum(lost, 1e-300), mean)
+        energy, pressed = np.diff(lost, axis=0), np.diff(rubbed, axis=0)
+        # Slips too short to show at a known time have the mean coefficient of the others.
+        mean = pressed.sum(axis=0) / np.maximum(energy.sum(axis=0), 1e-300)
+        per_energy = np.where(energy > 0.0, pressed / np.maximum(energy, 1e-300), mean)
         distance = np.cumsum(np.diff(slip_work, axis=0) * per_energy, axis=0)
-        return self.coefficient * np.vstack([np.zeros(power.shape[1]), distance])
+        return self.coefficient * np.vstack([np.zeros(lost.shape[1]), distance])

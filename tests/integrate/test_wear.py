@@ -85,9 +85,9 @@ def test_archard_counts_pressed_distance_where_friction_falls_with_speed():
     expected = 1e-14 * np.trapezoid(power, fine.time) / 0.02
     assert fine.wear_depth(ArchardWear(1e-14), 0.02)[-1, 0] == pytest.approx(
         expected, rel=2e-3, abs=0.0)
-    coarse = simulate(system, 4.0, outputs=1001, rtol=1e-7)
+    coarse = simulate(system, 4.0, outputs=21, rtol=1e-7)
     depth = coarse.wear_depth(ArchardWear(1e-14), 0.02)[:, 0]
-    assert depth[-1] == pytest.approx(expected, rel=2e-2, abs=0.0)
+    assert depth[-1] == pytest.approx(expected, rel=5e-3, abs=0.0)
     assert (np.diff(depth) >= 0.0).all()
     # It wears only in slip, though it creeps in stick.
     assert coarse.creep_work[-1, 0] > 0.0
