@@ -166,6 +166,11 @@ class _Increments:
             if self._by_force:
                 # The displacement at which the pixels that stick have no slip on average.
                 stuck = self._touching & (np.linalg.norm(q, axis=-1) < _STICKS * self._limit)
+                if not stuck.any():
+                    raise AnalysisError(
+                        f"half_space_friction: forces = {np.linalg.norm(goal):g} N are so close "
+                        f"to sliding, {float(self._limit.sum()):g} N, that no pixel sticks; take "
+                        f"smaller forces, a finer grid, or give displacements.")
                 target = gradient[stuck].mean(axis=0)
             gradient = gradient - target
             step = self._project(q - length * gradient, goal) - q

@@ -185,7 +185,7 @@ def _conjugate_gradients(
         delta = float((g + u)[touching].mean()) if force is not None else float(approach or 0.0)
         residual = g + u - delta
         work = float((residual[touching] ** 2).sum())
-        scale = float(np.abs(u - (u.mean() if force is not None else 0.0)).max()) or 1.0
+        scale = float(np.abs(u).max()) or 1.0
         overlap = float(np.maximum(-residual[~touching], 0.0).max(initial=0.0))
         if max(float(np.abs(residual[touching]).max()), overlap) <= rtol * scale:
             return p, u, delta, step

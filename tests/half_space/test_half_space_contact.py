@@ -5,7 +5,7 @@ import importlib.util
 import numpy as np
 import pytest
 
-from fecontact import Material
+from fecontact import AnalysisError, Material
 from fecontact.core.errors import InputError
 from fecontact.half_space import half_space_contact, half_space_friction
 from fecontact.half_space.influence import (
@@ -126,6 +126,18 @@ def test_round_punch():
     assert found.force == pytest.approx(exact, rel=0.01)
 
 
+def test_square_punch_that_fills_its_grid():
+    """By force and by approach; the stiffness is about ``1.15 E* side``."""
+    gap = np.full((32, 32), 1e-3)
+    found = half_space_contact(gap, 0.1 / 32, STEEL, force=1e3)
+    assert found.touching.all()
+    assert found.force == pytest.approx(1e3)
+    other = half_space_contact(gap, 0.1 / 32, STEEL, approach=found.approach)
+    assert other.force == pytest.approx(1e3, rel=1e-5)
+    stiffness = 1e3 / (found.approach - 1e-3)
+    assert stiffness == pytest.approx(1.15 * modulus(STEEL) * 0.1, rel=0.01)
+
+
 def wavy(part, pixels=128):
     """Contact of a surface ``h (1 - cos(2 pi x / l))`` at a part of the pressure that closes it."""
     length, height = 1e-3, 1e-6
@@ -194,6 +206,12 @@ def test_cattaneo_and_mindlin(material, error):
     assert (np.linalg.norm(found.traction, axis=-1) <= limit * (1.0 + 1e-9)).all()
     back = half_space_friction(contact, MU, displacements=found.displacement[:3])
     assert back.force[:, 0] == pytest.approx(full * parts[:3], rel=1e-5)
+
+
+def test_forces_too_close_to_sliding_for_the_grid_are_an_error():
+    contact, load = sphere(16, STEEL)
+    with pytest.raises(AnalysisError, match=r"no pixel sticks; take smaller forces"):
+        half_space_friction(contact, MU, forces=[((1.0 - 1e-7) * MU * load, 0.0)])
 
 
 def test_gross_slip():
