@@ -20,7 +20,7 @@ from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
 from fecontact.fem.mesh_files import read_bodies
 from fecontact.fem.mesh_files.ansys_loads import archive_contents
-from fecontact.fem.mesh_files.deck_contents import DeckContents, deck_contents
+from fecontact.fem.mesh_files.deck_contents import COMPONENTS, DeckContents, deck_contents
 from fecontact.fem.mesh_files.nastran_loads import nastran_contents
 from fecontact.fem.pairing import pair_faces
 from fecontact.system.model_limits import implausible_body
@@ -194,16 +194,16 @@ class Imported:
         known = {name.upper(): name for name in (*mesh.boundaries, *mesh.points)
                  if not touching & _rows(mesh.boundaries.get(name, np.empty((0, 2), np.int64)))}
         references = _references(mesh)
-        fixed: dict[str, str] = {}
+        held_at: dict[str, set[str]] = {}
         for given, components in self.contents.supports:
             word = self.contents.single.get(given, given)
             name = references.get(word.upper()) or known.get(word.upper())
-            held = " ".join(_in_plane(one) if mesh.dimension == 2 else one
-                            for one in components.split())
-            if name not in references.values():
-                held = "".join(one for one in held.split() if one in "xyz")
-            if name and held.strip():
-                fixed[name] = " ".join(held.split())
+            held = {_in_plane(one) if mesh.dimension == 2 else one for one in components.split()}
+            if name and (held := held - {""} if name in references.values() else held & {*"xyz"}):
+                # A set may be named in several ways.
+                held_at.setdefault(name, set()).update(held)
+        fixed = {name: (" " if name in references.values() else "").join(
+            one for one in (*COMPONENTS, "phi") if one in held) for name, held in held_at.items()}
         return {**({} if mesh.materials else {"material": "steel"}),
                 **(self._plane() if mesh.dimension == 2 else {}),
                 **({"fixed": fixed} if fixed else {}),

@@ -245,3 +245,24 @@ def test_rows_of_nodes_of_any_form_are_read_alike(tmp_path):
                   "1,0,0\n1,0,0\n2,2,0\n3,2,1\n4,0,1\n"):
         read = read_mesh(deck(tmp_path, f"*NODE\n{nodes}{elements}"))
         assert (read.nodes == CORNERS).all()
+
+
+def test_sections_of_parts_with_sets_of_one_name_have_their_own_materials(tmp_path):
+    """Programs write equal names of sets into every part."""
+    parts = "".join(
+        f"*PART, NAME={name}\n*NODE\n{rows(block_mesh((1, 1, 1), size).nodes.tolist())}"
+        f"*ELEMENT, TYPE=C3D8, ELSET=All\n{rows((block_mesh((1, 1, 1), size).cells + 1).tolist())}"
+        f"*SOLID SECTION, ELSET=ALL, MATERIAL={name}\n*END PART\n"
+        for name, size in (("BASE", (2.0, 1.0, 1.0)), ("PAD", (1.0, 1.0, 1.0))))
+    materials = "".join(f"*MATERIAL, NAME={name}\n*ELASTIC\n{modulus}, 0.3\n*DENSITY\n{density}\n"
+                        for name, modulus, density in (("BASE", 2.1e11, 7850.0),
+                                                       ("PAD", 7e10, 2700.0)))
+    path = deck(tmp_path, parts + "*ASSEMBLY, NAME=A\n*INSTANCE, NAME=LOW, PART=BASE\n"
+                "*END INSTANCE\n*INSTANCE, NAME=HIGH, PART=PAD\n0, 0, 1\n*END INSTANCE\n"
+                "*END ASSEMBLY\n" + materials)
+    for name, modulus, mass in (("LOW", 2.1e11, 2.0 * 7850.0), ("HIGH", 7e10, 2700.0)):
+        body = ElasticBody(read_mesh(path, part=name))
+        material, = body.mesh.materials.values()
+        assert material.youngs_modulus == modulus
+        along = np.tile([1.0, 0.0, 0.0], body.mass.shape[0] // 3)
+        assert along @ body.mass @ along == pytest.approx(mass, rel=1e-9)

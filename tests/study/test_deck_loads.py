@@ -506,3 +506,15 @@ def test_bad_loads(load, message, tmp_path):
     (tmp_path / "a.inp").write_text(deck(load))
     with pytest.raises(MeshError, match=message):
         read_mesh(tmp_path / "a.inp")
+
+
+@pytest.mark.parametrize(("sets", "supports", "fixed"), [
+    ("*NSET, NSET=TWICE\nHELD\n", "HELD, 3, 3\nTWICE, 1, 2", {"HELD": "z", "TWICE": "xy"}),
+    ("*NSET, NSET=TWICE\nHELD\n", "TWICE, 1, 2\nHELD, 3, 3", {"HELD": "z", "TWICE": "xy"}),
+    (f"*NSET, NSET=ONE\n{TIP}\n", f"{TIP}, 1, 2\nONE, 3, 3", {"ONE": "xyz", "BOUNDARY 1-2": "xy"}),
+])
+def test_supports_of_a_set_by_several_names_add_up(sets, supports, fixed, tmp_path):
+    text = deck("").replace("*BOUNDARY\nHELD, 1, 3", f"{sets}*BOUNDARY\n{supports}")
+    (tmp_path / "a.inp").write_text(text)
+    study = Study.from_toml(imported(tmp_path / "a.inp").toml(tmp_path), tmp_path / "a.toml")
+    assert study.body.fixed == fixed

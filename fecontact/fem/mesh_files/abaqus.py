@@ -160,6 +160,7 @@ def read_inp(path: Path) -> RawMesh:
                 more = f", as are {len(found) - 1} others" if len(found) > 1 else ""
                 warnings.warn(f"{path}: {what} {found[0]}{of} is given a second time, {last}{more};"
                               f" the last one counts.", ModelWarning, stacklevel=4)
+    assembly.name_sections_apart(bodies)
     integration = _integration(bodies)
     joined, unread, without = _constrained(assembly, bodies)
     count = sum(len(body.numbered.places) for body in bodies)
@@ -579,8 +580,7 @@ class _Assembly:
     ) -> None:
         """MeshError if the element set of a section holds trusses."""
         for one in bodies:
-            if part is not None and one.part is not part and (
-                    self.parts.get(one.source) is not part):
+            if part is not None and not self._is_of(one, part):
                 continue
             for kind, blocks in one.part.element_types.items():
                 if kind.startswith(_TRUSSES) and any(
@@ -610,6 +610,23 @@ class _Assembly:
             for key, one in of_part.items():
                 one.title = self.parts[key].name
         return [one for one in found if one.part.node_blocks and one.part.element_blocks]
+
+    def name_sections_apart(self, bodies: "list[_Instance]") -> None:
+        """Give element sets of sections names of their own, PART.SET, where parts use one name."""
+        owners = {(id(part), options.get("ELSET", "").upper()) for part, options in self.sections}
+        names = Counter(name for _, name in owners)
+        for place, (part, options) in enumerate(self.sections):
+            name = options.get("ELSET", "").upper()
+            if part is None or names[name] == 1:
+                continue
+            own = f"{part.name}.{name}"
+            self.sections[place] = (part, {**options, "ELSET": own})
+            for one in (part, *(body.part for body in bodies if self._is_of(body, part))):
+                if (members := one.find("elements", name)) is not None:
+                    one.sets.elements[own] = members
+
+    def _is_of(self, body: "_Instance", part: "_Part") -> bool:
+        return body.part is part or self.parts.get(body.source) is part
 
     def section_materials(
         self, bodies: "list[_Instance]"
@@ -664,8 +681,7 @@ class _Assembly:
         bodies: "list[_Instance]",
     ) -> AnisotropicMaterial | str:
         """Material of a section in its orientation, placed as its part; or what is not read."""
-        own = [one for one in bodies if part is not None and (
-            one.part is part or self.parts.get(one.source) is part)]
+        own = [one for one in bodies if part is not None and self._is_of(one, part)]
         if wanted:
             axes = orientation(wanted, self.orientations,
                                lambda word: self._directions(word, name, own))

@@ -117,7 +117,8 @@ def deck_contents(path: Path) -> DeckContents:
                 not line.endswith(",") for line in lines)
         elif "NSET" in options and len(rows) == 1 and "GENERATE" not in options:
             words = rows[0][:1] if keyword == "NODE" else [word for word in rows[0] if word]
-            if len(words) == 1:
+            # A name is that of another set, which this one holds.
+            if len(words) == 1 and whole_number(words[0]) is not None:
                 single.setdefault(words[0], options["NSET"])
         elif keyword == "CONTACT PAIR":
             pairs += [(row[0], row[1]) for row in rows if len(row) > 1]
