@@ -50,7 +50,7 @@ def duration(trajectory: Trajectory) -> float:
 
 
 def coarse_note(trajectory: Trajectory) -> str:
-    """What outputs too far apart do to numbers of a run; empty if it has kept enough."""
+    """How outputs too far apart may change numbers of a run; empty if it has kept enough."""
     found = resolved(trajectory)
     return found.note if found.coarse > _COARSE else ""
 

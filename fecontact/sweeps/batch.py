@@ -137,7 +137,7 @@ def _row(batch: Batch, base: Study, case: SweepCase, summaries: dict[Any, Functi
         if known not in summaries:
             summaries[known] = functions_for(
                 batch.summaries, study.folder, wear=known[0], thickness=known[1])
-        with warnings.catch_warnings(record=True) as told:
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ModelWarning)
             values = summarise(trajectory, summaries[known], batch.t_start)
     except UnwritableError:
@@ -152,7 +152,7 @@ def _row(batch: Batch, base: Study, case: SweepCase, summaries: dict[Any, Functi
         _write(batch, case, study, trajectory)
     row = Row(case=case.key, values=values, reason="")
     said = [*(f"In this run {one}" for one in trajectory.limits_exceeded),
-            *(str(one.message) for one in told if issubclass(one.category, ModelWarning))]
+            *(str(one.message) for one in caught if issubclass(one.category, ModelWarning))]
     if said:
         row["warning"] = " ".join(dict.fromkeys(said))
     return row
