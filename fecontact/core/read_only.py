@@ -10,6 +10,8 @@ import numpy as np
 
 _Owner = TypeVar("_Owner", bound=type)
 _PLAIN = (int, float, bool, str)
+# Kinds of values that hold no array; those met most often are told by their type alone.
+_WITHOUT_ARRAYS = frozenset({*_PLAIN, type(None), np.float64, np.bool_})
 
 
 def read_only(value: Any) -> Any:
@@ -18,17 +20,21 @@ def read_only(value: Any) -> Any:
     A sparse matrix by rows, columns or blocks is returned with sorted indices, since SciPy sorts
     them in place. The array itself stays writeable, so that one given by a user is not frozen.
     """
+    if type(value) in _WITHOUT_ARRAYS:
+        return value
     if isinstance(value, np.ndarray):
         if not value.flags.writeable:
             return value
         view = value.view()
         view.flags.writeable = False
         return view
-    if value is None or isinstance(value, str | int | float):
+    if isinstance(value, str | int | float):
         return value
     if type(value) in (dict, MappingProxyType):
-        frozen = {name: read_only(item) for name, item in value.items()}
-        changed = any(frozen[name] is not item for name, item in value.items())
+        frozen, changed = {}, False
+        for name, item in value.items():
+            frozen[name] = read_only(item)
+            changed = changed or frozen[name] is not item
         return type(value)(frozen) if changed else value
     if isinstance(value, tuple | list):
         items = [read_only(item) for item in value]

@@ -27,6 +27,31 @@ _NEAR = 1e-2  # distance of a critical multiplier from the circle at a coarsely 
 # or of 1: where ends of runs are smooth they are to 1e-3, beside a jump anywhere.
 _APART = 0.02
 
+# Relative distance of a multiplier from the conjugate of another one up to which they are a pair.
+_PAIR = 1e-6
+
+
+@kernel
+def sort_multipliers(mu: ComplexVector) -> None:
+    """Sort multipliers as :func:`by_falling_modulus` says."""
+    for i in range(1, len(mu)):
+        value, place = mu[i], i
+        size = abs(value)
+        while place > 0:
+            before = abs(mu[place - 1])
+            if not (before < size or (before == size and mu[place - 1].imag < value.imag)):
+                break
+            mu[place] = mu[place - 1]
+            place -= 1
+        mu[place] = value
+    place = 0
+    while place + 1 < len(mu):
+        one, other = mu[place], mu[place + 1]
+        if one.imag < 0.0 and abs(one - other.conjugate()) <= _PAIR * abs(one):
+            mu[place], mu[place + 1] = other, one
+            place += 1
+        place += 1
+
 
 @read_only_arrays
 @dataclass(frozen=True, eq=False)
@@ -178,17 +203,9 @@ def floquet_of_product(M: Array, autonomous: bool) -> Floquet:
 
 def by_falling_modulus(multipliers: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Multipliers (d,), the largest modulus first; of a pair the one with Im mu > 0 first."""
-    found = multipliers[np.lexsort((-multipliers.imag, -np.abs(multipliers)))]
-    one, other = found[:-1], found[1:]
-    with np.errstate(invalid="ignore"):
-        turned = (one.imag < 0.0) & (np.abs(one - other.conj()) <= _PAIR * np.abs(one))
-    for place in np.flatnonzero(turned).tolist():
-        found[[place, place + 1]] = found[[place + 1, place]]
+    found = np.array(multipliers, dtype=np.complex128)
+    sort_multipliers(found)
     return found
-
-
-# Relative distance of a multiplier from the conjugate of another one up to which they are a pair.
-_PAIR = 1e-6
 
 
 @kernel

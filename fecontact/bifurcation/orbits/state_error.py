@@ -191,12 +191,13 @@ def _solved(defect: Array, J: Array, step: Array, sizes: Array, degree: int) -> 
     count, d = len(step), len(sizes)
     start: Array = np.zeros((count, d))
     most = np.zeros(count)
+    steps = (0.5 * step)[:, None, None, None] * J
+    matrices = (found.slopes[:, None, :, None] * np.eye(d)[:, None, :]) - (
+        steps.reshape(count, 2, degree, d, 1, d) * found.values[:, None, :, None])
+    sides = 0.5 * defect.reshape(count, 2, degree, d)
     for half in range(2):
-        at = slice(half * degree, (half + 1) * degree)
-        change = 0.5 * step[:, None, None, None, None] * (
-            J[:, at, :, None, :] * found.values[None, :, None, :, None])
-        matrix = (found.slopes[:, None, :, None] * np.eye(d)[:, None, :]) - change
-        side = 0.5 * defect[:, at] - (matrix[:, :, :, 0] @ start[:, None, :, None])[..., 0]
+        matrix = matrices[:, half]
+        side = sides[:, half] - (matrix[:, :, :, 0] @ start[:, None, :, None])[..., 0]
         solution = np.linalg.solve(
             matrix[:, :, :, 1:].reshape(count, degree * d, degree * d),
             side.reshape(count, degree * d, 1))
