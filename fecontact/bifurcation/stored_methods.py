@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import asdict, fields
-from typing import Any, cast
+from typing import Any
 
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.orbit_methods import Collocation, Method, Shooting
@@ -16,10 +16,10 @@ _NAMES = {kind: name for name, kind in _BY_NAME.items()}
 
 def method_text(method: Method) -> str:
     """Name and options of a method, but for the wave of a wheel, which its branch has."""
-    options = {entry.name: getattr(method, entry.name) for entry in fields(method)
-               if entry.name != "repeats"}
-    if isinstance(method, Shooting):
-        options["solver"] = {"name": method.solver.name} | asdict(cast(Any, method.solver))
+    options: dict[str, Any] = {entry.name: getattr(method, entry.name) for entry in fields(method)
+                               if entry.name != "repeats"}
+    if "solver" in options:
+        options["solver"] = {"name": options["solver"].name} | asdict(options["solver"])
     return json.dumps({"name": _NAMES[type(method)]} | options, default=int)
 
 

@@ -50,6 +50,21 @@ def test_dry_friction_of_den_hartog():
     assert branch.column("stable").all()
 
 
+def test_a_response_starts_at_the_other_bound_where_nothing_vibrates_at_one():
+    """The force stands still at 0 Hz."""
+    friction = 0.4
+    system = oscillator("x", normal=PrescribedForce(1.0), friction=ConstantFriction(friction))
+    branch = frequency_response(
+        system, (0.0, 0.84 / TURN), FREQUENCY, method=Shooting(1, solver=EventDriven()),
+        options=ContinuationOptions(step=0.1, largest_step=0.3, points=3)).branches[0]
+    r = TURN * branch.parameter
+    assert r[0] == pytest.approx(0.84, rel=1e-12)
+    assert (np.diff(r) < 0.0).all()
+    U = np.sin(np.pi / r) / (r * (1.0 + np.cos(np.pi / r)))
+    exact = np.sqrt((1.0 - r * r)**-2 - (friction * U)**2)
+    assert branch.column("observed_amplitude") == pytest.approx(exact, rel=1e-5)
+
+
 def test_a_stiff_element_stands_for_dry_friction_in_harmonic_balance():
     """With an error of the order of 1 / H, that of any series of a force which jumps."""
     friction, r = 0.4, 0.75

@@ -293,13 +293,17 @@ def two_blocks(friction):
         drive=fc.Drive(stiffness_x=0.5, amplitude_x=1.5, frequency_hz=0.9 / TURN))
 
 
-def test_derivatives_of_the_equations():
+def two_blocks_from_event_to_event():
     system = two_blocks(ConstantFriction(0.3))
     field = contact_field(system, ["ground.speed"])
     motion = periodic_motion(system, solver=FILIPPOV, rtol=1e-10)
-    problem, u = orbit_from(field, field.values, 0, motion.times[0], motion.states[0],
-                            motion.times[-1] - motion.times[0], motion.periods,
-                            widths=np.append(motion.amplitudes, 1.0), rtol=1e-10, solver=FILIPPOV)
+    return orbit_from(field, field.values, 0, motion.times[0], motion.states[0],
+                      motion.times[-1] - motion.times[0], motion.periods,
+                      widths=np.append(motion.amplitudes, 1.0), rtol=1e-10, solver=FILIPPOV)
+
+
+def test_derivatives_of_the_equations():
+    problem, u = two_blocks_from_event_to_event()
     assert problem.count >= 4
     matrix, step = problem.linearise(u).matrix, 1e-4
     for k in range(len(u)):
@@ -308,6 +312,18 @@ def test_derivatives_of_the_equations():
         slope = (problem.linearise(u + away).residual
                  - problem.linearise(u - away).residual) / (2.0 * step)
         assert matrix[:, k] == pytest.approx(slope, abs=1e-5 * (1.0 + np.abs(slope).max()))
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_phases_of_many_periods_are_refused(back):
+    """A far guess of Newton's method may have one that is long, and one that goes back."""
+    problem, u = two_blocks_from_event_to_event()
+    first = problem.count * problem.dimension
+    u[first] += 1e3 * problem.period(u)
+    if back:
+        u[first + 1] -= 0.999 * problem.period(u)
+    with pytest.raises(fc.AnalysisError, match="longer than its period"):
+        problem.linearise(u)
 
 
 def test_multipliers_against_differences_of_runs():

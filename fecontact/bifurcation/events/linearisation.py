@@ -21,6 +21,8 @@ _PLACES = (np.zeros(0), _TWO, _TWO, _FOUR)
 _RANK = 1e-9
 # Smallest rate with which something vanishes, relative to its scale and the period.
 _SLOWEST = 1e-13
+# Periods that no phase takes; a step of Newton's method may ask for thousands.
+_MOST_PERIODS = 2.0
 
 
 def _weights(places: Array, at: float) -> tuple[Array, Array]:
@@ -73,8 +75,13 @@ class EventLinearisation:
     def __init__(self, problem: Any, u: Array) -> None:
         self.problem, self.u = problem, u
         self.begins = problem.begins(u)
-        if not problem.period(u) > 0.0:
+        period = problem.period(u)
+        if not period > 0.0:
             raise AnalysisError("The period became negative.")
+        if problem.forced:
+            period = problem.given_period(problem.parameters(u))
+        if not np.abs(problem.durations(u)).max() <= _MOST_PERIODS * period:
+            raise AnalysisError("A phase of the orbit would last longer than its period.")
 
     @cached_property
     def motion(self) -> Motion:

@@ -65,12 +65,20 @@ class Forced:
         return replace(self, values=values)
 
 
+def values_to_start_at(wanted: Forced, first: float, *, both: bool) -> list[float]:
+    """Values of the parameter at which a branch may start, in the order in which they are tried.
+
+    They are the first value, and the bounds unless the branch goes to both sides.
+    """
+    return [first] if both else [first, *(end for end in wanted.options.bounds if end != first)]
+
+
 def start_of(
     wanted: Forced, first: float, *, both: bool
 ) -> tuple[float, HarmonicProblem, Array]:
     """Value of the parameter, problem and unknowns of the orbit from which a branch starts.
 
-    The first value is tried, and the bounds unless the branch goes to both sides.
+    It is tried at :func:`values_to_start_at`.
 
     Raises
     ------
@@ -78,7 +86,7 @@ def start_of(
         If there is no orbit at any.
     """
     field = wanted.field
-    ends = [first] if both else [first, *(end for end in wanted.options.bounds if end != first)]
+    ends = values_to_start_at(wanted, first, both=both)
     ways: list[Callable[[Forced], tuple[HarmonicProblem, Array]]] = [_from_rest]
     if wanted.level is not None:
         ways.append(_raised)

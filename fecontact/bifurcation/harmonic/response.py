@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from numbers import Integral, Real
 from types import NoneType
 from typing import Any
 
 import numpy as np
 
+from fecontact.bifurcation.continuation.attempts import first_that_goes
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint, as_field
 from fecontact.bifurcation.continuation.points import (
@@ -23,7 +25,12 @@ from fecontact.bifurcation.fields.observed_row import observed_row
 from fecontact.bifurcation.harmonic import branches
 from fecontact.bifurcation.harmonic.engine_order import WaveField
 from fecontact.bifurcation.harmonic.estimates import observed_of_series
-from fecontact.bifurcation.harmonic.forced_starts import Forced, require_period, start_of
+from fecontact.bifurcation.harmonic.forced_starts import (
+    Forced,
+    require_period,
+    start_of,
+    values_to_start_at,
+)
 from fecontact.bifurcation.harmonic.layout import Layout, layout_from, layout_of
 from fecontact.bifurcation.harmonic.method import HarmonicBalance
 from fecontact.bifurcation.harmonic.stalled import stall_reason
@@ -402,12 +409,26 @@ def _by_orbit_method(
 ) -> Branch:
     """The branch at one level by collocation or shooting, from the orbit of harmonic balance.
 
-    Where harmonic balance finds none, it starts from the motion to which a run settles; set-valued
-    orbits from a run by their solver, as harmonic balance knows smoothed laws alone.
+    Where harmonic balance finds none, it starts from the motion to which a run settles, if need be
+    at the other end; set-valued orbits from a run by their solver, as harmonic balance knows
+    smoothed laws alone.
     """
-    field, options, begin = wanted.field, wanted.options, first
+    field, options, solver = wanted.field, wanted.options, wanted.method.solver
     _require_observable(layout_of(field), row)
-    solver = wanted.method.solver
+
+    def followed(begin: float, motion: PeriodicMotion) -> Branch:
+        return orbit_branch(based(field, wanted.at(begin).values), motion, wanted.name,
+                            method=wanted.method, options=options,
+                            direction=_inwards(begin, options), both=both)
+
+    def from_run(begin: float) -> Branch:
+        assert isinstance(field, ContactField)
+        there = wanted.at(begin)
+        require_period(there)
+        period = field.forcing_period(there.values)
+        return followed(begin, periodic_motion(field.system(there.values), longest_period=period,
+                                               solver=solver))
+
     try:
         if not solver.smooth:
             raise AnalysisError("Harmonic balance knows no set-valued laws.")
@@ -415,19 +436,15 @@ def _by_orbit_method(
                                      first, both=both)
         found = problem.linearise(u)
         states = np.vstack([found.states, found.states[:1]])
-        motion = PeriodicMotion(np.linspace(0.0, 1.0, len(states)) * found.period, states,
-                                found.period)
+        attempts = [partial(followed, begin, PeriodicMotion(
+            np.linspace(0.0, 1.0, len(states)) * found.period, states, found.period))]
     except FecontactError:
         if not isinstance(field, ContactField):
             raise
-        require_period(wanted.at(begin))
-        values = wanted.at(begin).values
-        motion = periodic_motion(field.system(values), longest_period=field.forcing_period(values),
-                                 solver=solver)
-    there = based(field, wanted.at(begin).values)
+        attempts = [partial(from_run, begin)
+                    for begin in values_to_start_at(wanted, first, both=both)]
     try:
-        branch = orbit_branch(there, motion, wanted.name, method=wanted.method, options=options,
-                              direction=_inwards(begin, options), both=both)
+        branch = first_that_goes(attempts, lambda attempt: attempt())
     except AnalysisError as error:
         if not layout_of(field).memory:
             raise

@@ -93,17 +93,26 @@ def continued(
 
     Set-valued orbits go from event to event where that is possible, as their branches do.
     """
-    problem, u, tangent = restored_orbit(field, point)
-    if isinstance(problem, ShootingProblem) and not problem.solver.smooth:
-        from fecontact.bifurcation.events.starts import as_shot, orbit_of
+    further = _FURTHER.get(orbit_points_of(point), _along)
+    return further(*restored_orbit(field, point), sign, options)
 
-        found, _ = orbit_of(problem, u)
-        if found is not None:
-            ahead = float(np.copysign(1.0, sign * tangent[-1]))
-            yield from (as_shot(found[0], each) for each in continuation(
-                *found, options, direction=ahead))
-            return
-    yield from continuation(problem, u, options, tangent=sign * tangent)
+
+def _along(
+    problem: Any, u: Array, tangent: Array, sign: float, options: ContinuationOptions
+) -> Iterator[BranchPoint]:
+    return continuation(problem, u, options, tangent=sign * tangent)
+
+
+def _along_runs(
+    problem: ShootingProblem, u: Array, tangent: Array, sign: float, options: ContinuationOptions
+) -> Iterator[BranchPoint]:
+    from fecontact.bifurcation.events.starts import as_shot, orbit_of
+
+    found = None if problem.solver.smooth else orbit_of(problem, u)[0]
+    if found is None:
+        return _along(problem, u, tangent, sign, options)
+    ahead = float(np.copysign(1.0, sign * tangent[-1]))
+    return (as_shot(found[0], each) for each in continuation(*found, options, direction=ahead))
 
 
 def rescaled(problem: P, scales: ArrayLike | None, width: float | None) -> P:
@@ -136,3 +145,4 @@ def over_first(point: BranchPoint, kind: str) -> BranchPoint:
 
 _RESTORED: Mapping[OrbitPoints, Callable[..., tuple[Any, Array, Array]]] = {
     BY_COLLOCATION: restored, BY_SHOOTING: restored_shooting, BY_HARMONICS: restored_balance}
+_FURTHER: Mapping[OrbitPoints, Callable[..., Iterator[BranchPoint]]] = {BY_SHOOTING: _along_runs}
