@@ -20,6 +20,7 @@ from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.mesh import (
     equidistributed,
     extremes,
+    extremes_of_run,
     interpolate,
     node_times,
     rule,
@@ -214,6 +215,19 @@ def test_one_factorisation_an_orbit(landau, monkeypatch):
         radius = np.linalg.norm(problem.nodes(point.u), axis=1)
         assert radius == pytest.approx(np.sqrt(point.parameter), rel=1e-5)
     assert len(made) <= 36
+
+
+def test_extremes_of_runs_are_those_of_cubics():
+    """Cubics turn within the first step, the second one, at a sample, or nowhere."""
+    t = np.array([0.0, 1.0, 2.0])
+    cubics = [np.polynomial.Polynomial(c) for c in (
+        [0.0, 1.0, -1.0, 0.1], [1.0, -3.0, 0.0, 0.5], [0.0, 2.0, -1.0], [0.0, 1.0, 0.0, 1.0],
+        [2.0])]
+    low, high = extremes_of_run(np.stack([p(t) for p in cubics], axis=1),
+                                np.stack([p.deriv()(t) for p in cubics], axis=1))
+    fine = np.linspace(0.0, 2.0, 200001)
+    assert low == pytest.approx([p(fine).min() for p in cubics], abs=1e-9)
+    assert high == pytest.approx([p(fine).max() for p in cubics], abs=1e-9)
 
 
 def test_extremes_lie_between_the_nodes():

@@ -83,6 +83,22 @@ def test_a_stiff_element_stands_for_dry_friction_in_harmonic_balance():
     assert off[2] < 0.6 * off[1] < 0.36 * off[0]
 
 
+def test_extremes_of_a_motion_that_no_event_divides():
+    """Harmonic motion below the stop: V sin and w V cos, which are largest between samples."""
+    loss = 0.1
+    system = oscillator("y", loss, normal=LinearContact(1e6), friction=ConstantFriction(0.0),
+                        gap=5.0)
+    branch = frequency_response(
+        system, (1.6 / TURN, 1.85 / TURN), FREQUENCY, observe=("B", "y"),
+        method=Shooting(1, rtol=1e-11, solver=SetValued(restitution=0.5)),
+        options=ContinuationOptions(points=3)).branches[0]
+    w = TURN * branch.parameter
+    V = 1.0 / np.hypot(1.0 - w * w, loss * w)
+    largest = np.stack([V, w * V], axis=1)
+    assert branch.column("maximum") == pytest.approx(largest, rel=1e-8)
+    assert branch.column("minimum") == pytest.approx(-largest, rel=1e-8)
+
+
 def impacts(w, loss, restitution):
     """Largest displacements of all motions with one impact at -1 in a period of the force."""
     T, decay = TURN / w, 0.5 * loss

@@ -119,10 +119,9 @@ class BorderCurve(Problem):
         """Both parameters, the period, and the extremes of the states."""
         names = list(self.orbit.field.parameters)
         orbit = linearisation.orbit
-        states = orbit.samples
+        low, high = orbit.extremes
         return {names[self.second]: float(u[-2]), names[self.orbit.free]: float(u[-1]),
-                "period": orbit.problem.period(orbit.u), "minimum": states.min(axis=0),
-                "maximum": states.max(axis=0)}
+                "period": orbit.problem.period(orbit.u), "minimum": low, "maximum": high}
 
     def examine(
         self, kind: str, u: Array, linearisation: Any, tangent: Array

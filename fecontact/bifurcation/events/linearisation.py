@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from fecontact.bifurcation.events.conditions import Condition, PhaseSequence, conditions
 from fecontact.bifurcation.events.phases import BRIEF, PERIOD, Motion, Phase, scales_of
 from fecontact.bifurcation.orbits.floquet import Floquet, by_falling_modulus
+from fecontact.bifurcation.orbits.mesh import extremes_of_run
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 
@@ -217,15 +218,19 @@ class EventLinearisation:
                                 - problem.given_period(beside[1])) / (2.0 * change * T)
 
     @cached_property
-    def samples(self) -> Array:
-        """States (K N, d) along the phases, from begin to end of each."""
-        problem, found = self.problem, []
+    def extremes(self) -> tuple[Array, Array]:
+        """Smallest and largest value (d,) of each state, on cubics between samples."""
+        problem, lows, highs = self.problem, [], []
         for phase, begin, start, duration in zip(
                 problem.phases, self.begins, problem.starts(self.u), problem.durations(self.u),
                 strict=False):
             times = np.linspace(0.0, float(duration), _SAMPLES)
-            found.append(self.motion.run(float(begin), times, start, phase)[0])
-        return np.concatenate(found)
+            states = self.motion.run(float(begin), times, start, phase)[0]
+            rates = self.motion.observed(begin + times, states, phase)[1]
+            low, high = extremes_of_run(states, times[1] * rates)
+            lows.append(low)
+            highs.append(high)
+        return np.min(lows, axis=0), np.max(highs, axis=0)
 
     @property
     def residual(self) -> Array:

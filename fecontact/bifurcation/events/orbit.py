@@ -149,7 +149,7 @@ class EventOrbit(FreeParameters, FloquetTests, Problem):
         return MultiplierRounding(float(self.scales[-1]), max(1e-10, self.rtol))
 
     def point(self, u: Array, linearisation: Any, tangent: Array) -> dict[str, Any]:
-        """Period, stability, and the extremes of the states from samples.
+        """Period, stability, and the extremes of the states.
 
         Raises
         ------
@@ -159,9 +159,9 @@ class EventOrbit(FreeParameters, FloquetTests, Problem):
         found = linearisation.floquet
         if linearisation.least.left > _CLEAR:
             self._require_return(u, float(np.abs(found.multipliers).max()))
-        states = linearisation.samples
+        low, high = linearisation.extremes
         return {"period": self.period(u), **found.stored, "mesh": np.array([0.0, 1.0]),
-                "minimum": states.min(axis=0), "maximum": states.max(axis=0)}
+                "minimum": low, "maximum": high}
 
     def _require_return(self, u: Array, growth: float) -> None:
         """Raise AnalysisError unless a run that knows nothing of the phases closes."""

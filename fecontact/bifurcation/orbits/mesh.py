@@ -254,6 +254,28 @@ def extremes(nodes: Array, degree: int) -> tuple[Array, Array]:
     return low, high
 
 
+def extremes_of_run(x: Array, slopes: Array) -> tuple[Array, Array]:
+    """Extremes (d,) of states x (..., N, d) along runs, on cubics from each sample to the next.
+
+    ``slopes`` (..., N, d) are those per step from a sample to the next.
+    """
+    before, after = x[..., :-1, :], x[..., 1:, :]
+    first, last, rise = slopes[..., :-1, :], slopes[..., 1:, :], after - before
+    a, b = first + last - 2.0 * rise, 3.0 * rise - 2.0 * first - last
+    inside = b * b - 3.0 * a * first
+    # Zeros of the slope first + 2 b s + 3 a s^2, without cancellation.
+    half = -(b + np.copysign(np.sqrt(np.maximum(inside, 0.0)), b))
+    low, high = (chosen(x.reshape(-1, x.shape[-1]), axis=0) for chosen in (np.min, np.max))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        places = [half / (3.0 * a), first / half]
+    for s in places:
+        turns = (inside > 0.0) & (s > 0.0) & (s < 1.0)
+        s = np.where(turns, s, 0.0)
+        found = (before + s * (first + s * (b + s * a))).reshape(-1, x.shape[-1])
+        low, high = np.minimum(low, found.min(axis=0)), np.maximum(high, found.max(axis=0))
+    return low, high
+
+
 def node_times(mesh: Array, degree: int) -> Array:
     """Times (N m,) of the nodes, without the last one."""
     return (mesh[:-1, None] + np.diff(mesh)[:, None] * np.arange(degree) / degree).reshape(-1)

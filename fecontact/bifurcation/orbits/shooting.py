@@ -15,14 +15,14 @@ from fecontact.bifurcation.continuation.predictor import BENT, Predictor
 from fecontact.bifurcation.continuation.problem import BranchStatus, Problem, enlarged
 from fecontact.bifurcation.continuation.rounding import Rounding
 from fecontact.bifurcation.fields.contact_field import ContactField
-from fecontact.bifurcation.harmonic.estimates import OBSERVED_SAMPLES, peaks
+from fecontact.bifurcation.harmonic.estimates import OBSERVED_SAMPLES
 from fecontact.bifurcation.harmonic.layout import kept_by, layout_of
 from fecontact.bifurcation.linalg import condensation
 from fecontact.bifurcation.linalg.bordered import Border, Bordered
 from fecontact.bifurcation.orbit_methods import Shooting
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.floquet import Floquet, FloquetTests, floquet_of, require_same
-from fecontact.bifurcation.orbits.mesh import interpolate, require_segments
+from fecontact.bifurcation.orbits.mesh import extremes_of_run, interpolate, require_segments
 from fecontact.bifurcation.orbits.multiplier_rounding import MultiplierRounding
 from fecontact.bifurcation.orbits.same_orbit import (
     HALVES_MEET,
@@ -67,7 +67,8 @@ class ShootingProblem(OrbitUnknowns, FloquetTests, Problem):
     the period of the forcing.
 
     The unknowns are ``u = [x_0 .. x_(K-1) (K d), T if it is unknown, parameter]``. Stored values
-    are those of collocation; minimum and maximum lie on parabolas through 512 samples a period.
+    are those of collocation; minimum and maximum lie on cubics between samples, of which a
+    period has 512.
 
     Attributes
     ----------
@@ -409,13 +410,22 @@ class ShootingLinearisation:
 
     @property
     def extremes(self) -> tuple[Array, Array]:
-        """Smallest and largest value (d,) of each state; of set-valued motions, which jump, those
-        of the samples themselves.
+        """Smallest and largest value (d,) of each state.
+
+        Those of set-valued motions, which jump, and of deflections that an element keeps while it
+        slides are those of the samples themselves.
         """
-        around = self.paths[:, :-1].reshape(-1, self.paths.shape[2])
-        if self.problem.solver.smooth:
-            return peaks(around.T)
-        return around.min(axis=0), around.max(axis=0)
+        problem, paths = self.problem, self.paths
+        low, high = paths.min(axis=(0, 1)), paths.max(axis=(0, 1))
+        if not problem.solver.smooth:
+            return low, high
+        times = np.linspace(self._times[:-1], self._times[1:], paths.shape[1], axis=1)
+        rates = problem.field.rates(times.ravel(), paths.reshape(-1, paths.shape[2]),
+                                    problem.parameters(self.u)).reshape(paths.shape)
+        step = (np.diff(self._times) / (paths.shape[1] - 1))[:, None, None]
+        between = extremes_of_run(paths, step * rates)
+        return (np.where(problem._sliders, low, between[0]),
+                np.where(problem._sliders, high, between[1]))
 
     @cached_property
     def _ends(self) -> Array:
