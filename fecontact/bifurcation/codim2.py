@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fecontact.bifurcation.codim2_nearby import begun
+from fecontact.bifurcation.codim2_nearby import begun, on_its_curve
 from fecontact.bifurcation.codim2_switch import other_curve, tangent_at, widths_of
 from fecontact.bifurcation.continuation.branch import Branch
 from fecontact.bifurcation.continuation.follow import continue_branch
@@ -74,8 +74,8 @@ def codim2_curve(
     field : VectorField
         The system, with both parameters. For equilibria its rates must not depend on time.
     point : FoldPoint, HopfPoint, PeriodDoublingPoint, NeimarkSackerPoint, DiscontinuityPoint
-        A point of a branch over the first parameter, of orbits by collocation or between events; or
-        a point of codimension two, such as 'zero-Hopf', where other curves begin.
+        A point of a branch over the first parameter, of orbits by collocation or between events; a
+        point of a curve, which it continues, or one such as 'zero-Hopf', where other curves begin.
     parameter : str
         The second parameter.
     options : ContinuationOptions, optional
@@ -122,7 +122,9 @@ def codim2_curve(
                          f"another curve; leave one of them out.")
     require_no_family(point)
     given = point
-    if keep == "kind":
+    point = on_its_curve(given, keep, to)
+    goes_on = point is not given
+    if keep == "kind" and not goes_on:
         point = begun(field, point, parameter, to)
     homoclinic = to == "homoclinic" or point.is_homoclinic
     crossing = point.kind in _CROSSINGS
@@ -145,7 +147,7 @@ def codim2_curve(
     ranges = _ranges(names, bounds)
     chosen = options_of(options, ranges.get(names[0]))
     widths = {name: high - low for name, (low, high) in ranges.items() if np.isfinite(high - low)}
-    if point is not given and not given.is_orbit:
+    if goes_on or (point is not given and not given.is_orbit):
         widths = {**widths_of(given), **widths}
     problem: Problem
     grows: Callable[[Array], float] | None = None

@@ -26,6 +26,7 @@ from fecontact.bifurcation.continuation.points import (
     FoldPoint,
     HopfPoint,
     ZeroHopfPoint,
+    over_first,
     special_point,
 )
 from fecontact.bifurcation.continuation.problem import (
@@ -40,7 +41,6 @@ from fecontact.bifurcation.equilibria.normal_forms import hopf
 from fecontact.bifurcation.orbit_methods import Collocation
 from fecontact.bifurcation.orbits.branches import orbit_branch
 from fecontact.bifurcation.orbits.curves.codim2 import orbit_curve
-from fecontact.bifurcation.orbits.restored import over_first
 from fecontact.core.errors import AnalysisError, InputError, choices
 from fecontact.core.ties import first_largest, first_least
 from fecontact.core.types import Array
@@ -321,6 +321,28 @@ BEGIN: Mapping[str, Mapping[str, _Found]] = {
 }
 # Points of which a curve of equilibria is followed without a curve being named.
 _OF_EQUILIBRIA = ("zero-Hopf", "double Hopf", "Bogdanov-Takens")
+
+
+# Curves that any of their points continues.
+_GO_ON = ("fold", "Hopf", "period doubling", "Neimark-Sacker")
+
+
+def on_its_curve(point: BranchPoint, keep: str, to: str | None) -> BranchPoint:
+    """A point of a curve over two parameters as one that starts it again, over the first.
+
+    Points of other branches, and those at which another curve is named or begins by itself, are
+    returned as they are.
+    """
+    known = point.branch.attributes
+    kind = known.get("kind")
+    if "parameters" not in known:
+        return point
+    if keep == "period" and point.is_orbit:
+        return over_first(point, None)
+    begins = point.kind in BEGIN or point.kind in _OF_EQUILIBRIA
+    if keep == "kind" and kind in _GO_ON and to is None and not begins:
+        return over_first(point, str(kind))
+    return point
 
 
 def begun(field: VectorField, point: BranchPoint, parameter: str, to: str | None) -> BranchPoint:

@@ -213,6 +213,25 @@ def special_point(
     return _KINDS.get(kind, BranchPoint)(u, tangent, values, kind, details, header)
 
 
+def over_first(point: BranchPoint, kind: str | None) -> BranchPoint:
+    """A point of a curve over two parameters as one of some kind on a branch over the first."""
+    known = point.branch.attributes
+    second = str(known["parameters"][1])
+    values = np.array(known["parameter_values"], dtype=float)
+    values[list(map(str, known["parameter_names"])).index(second)] = point.u[-2]
+    kept = {name: value for name, value in known.items()
+            if name not in ("parameters", "kind", "limits", "widths")}
+    kept["parameter_values"] = values
+    if "scales" in known:
+        kept["scales"] = np.delete(np.asarray(known["scales"], dtype=float), -2)
+    # Curves of equilibria may have a frequency among their unknowns.
+    states = len(point.values["state"]) if "state" in point.values else len(point.u) - 2
+    places = [*range(states), -1] if "state" in point.values else np.delete(
+        np.arange(len(point.u)), -2)
+    return special_point(point.u[places], point.tangent[places], point.values, kind, {},
+                         BranchHeader(point.branch.parameter_name, kept))
+
+
 def branch_points(
     u: Array, tangents: Array, values: Iterable[Mapping[str, Any]], folds: Iterable[int],
     header: BranchHeader | None,

@@ -6,8 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fecontact.bifurcation.continuation.point import BranchHeader, BranchPoint
-from fecontact.bifurcation.continuation.points import special_point
+from fecontact.bifurcation.continuation.point import BranchPoint
 from fecontact.bifurcation.continuation.problem import ContinuationOptions, sizes_of
 from fecontact.bifurcation.continuation.pseudo_arclength import continuation
 from fecontact.bifurcation.fields.contact_field import ContactField
@@ -126,21 +125,6 @@ def rescaled(problem: P, scales: ArrayLike | None, width: float | None) -> P:
         require_positive("A branch", width=width)
         changed[-1] = width
     return replace(problem, scales=changed)
-
-
-def over_first(point: BranchPoint, kind: str) -> BranchPoint:
-    """A point of a curve of orbits as one of some kind on a branch over the first parameter."""
-    known = point.branch.attributes
-    second = str(known["parameters"][1])
-    values = np.array(known["parameter_values"], dtype=float)
-    values[list(map(str, known["parameter_names"])).index(second)] = point.u[-2]
-    kept = {name: value for name, value in known.items()
-            if name not in ("parameters", "kind", "limits")}
-    scales = np.delete(np.asarray(known["scales"], dtype=float), -2)
-    header = BranchHeader(point.branch.parameter_name,
-                          {**kept, "parameter_values": values, "scales": scales})
-    return special_point(np.delete(point.u, -2), np.delete(point.tangent, -2), point.values, kind,
-                         {}, header)
 
 
 _RESTORED: Mapping[OrbitPoints, Callable[..., tuple[Any, Array, Array]]] = {

@@ -5,13 +5,13 @@ from functools import cached_property
 import numpy as np
 
 from fecontact.bifurcation.continuation.point import BranchPoint
+from fecontact.bifurcation.continuation.points import over_first
 from fecontact.bifurcation.orbits.collocation import CollocationProblem
 from fecontact.bifurcation.orbits.curves.centre_manifold import CentreManifold, Series
 from fecontact.bifurcation.orbits.curves.codim2 import orbit_curve
 from fecontact.bifurcation.orbits.curves.codim2_forms import agreed
 from fecontact.bifurcation.orbits.curves.singularity import of_torus
 from fecontact.bifurcation.orbits.motions import PeriodicMotion
-from fecontact.bifurcation.orbits.restored import over_first
 from fecontact.core.errors import AnalysisError
 from fecontact.core.types import Array
 from fecontact.system.fields.vector_field import VectorField
