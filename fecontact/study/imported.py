@@ -4,6 +4,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from fecontact.fem.attachments import counted_attachments
 from fecontact.fem.constraints import Coupling, LinearEquation, Tie, reference_points
 from fecontact.fem.elastic_body import ElasticBody
 from fecontact.fem.mesh import Mesh
-from fecontact.fem.mesh_files import read_bodies
+from fecontact.fem.mesh_files import read_bodies, single_nodes
 from fecontact.fem.mesh_files.ansys_loads import archive_contents
 from fecontact.fem.mesh_files.deck_contents import COMPONENTS, DeckContents, deck_contents
 from fecontact.fem.mesh_files.nastran_loads import nastran_contents
@@ -32,6 +33,7 @@ _STIFFNESS = 1e13  # of a proposed contact [Pa/m]: a deflection of 0.1 um under 
 _CONSTRAINTS: Mapping[str, type] = {
     "ties": Tie, "couplings": Coupling, "equations": LinearEquation}
 _MOST_NODES = 16  # of a proposed interface
+_COINCIDENT = 1e-6  # distance of a node from the middle of an edge that it is, of the body's size
 # Elements that are read as others, with the effect on frequencies (benchmarks/calculix.py).
 _OTHERWISE = {
     r"C3D8R\w*": "bricks {} (one point) become second-order hexahedra. With degree = 1 in [body] "
@@ -196,7 +198,7 @@ class Imported:
         references = _references(mesh)
         held_at: dict[str, set[str]] = {}
         for given, components in self.contents.supports:
-            word = self.contents.single.get(given, given)
+            word = self._within(given, body)
             name = references.get(word.upper()) or known.get(word.upper())
             held = {_in_plane(one) if mesh.dimension == 2 else one for one in components.split()}
             if name and (held := held - {""} if name in references.values() else held & {*"xyz"}):
@@ -219,13 +221,12 @@ class Imported:
 
     def _loads(self, bodies: Sequence[str]) -> "_Loads":
         """Forces and moments at points, pressure and gravity of the first step."""
-        found = _Loads({body: set() for body in bodies})
+        found = _Loads({body: {} for body in bodies})
         several = len(bodies) > 1 or bool(self.interfaces)
         found.notes += self._lost_supports(bodies)
         for given, component, value in self.contents.forces:
-            word = self.contents.single.get(given, given)
             for body in bodies:
-                mesh = self.meshes[body]
+                mesh, word = self.meshes[body], self._within(given, body)
                 single = {name.upper(): name for name, nodes in mesh.points.items()
                           if len(nodes) == 1}
                 names = single | _references(mesh)
@@ -238,13 +239,20 @@ class Imported:
                         "point": f"{_name(body)}." * several + name, "component": component,
                         "signal": value * (self.scale if moment else 1.0)})
                     break
+                if component and not component.startswith("phi") and (
+                        middle := self._middle(body, {word.upper(), f"NODE {word}"})):
+                    name, place = middle
+                    found.add(body, name, "forces", {
+                        "point": f"{_name(body)}." * several + name, "component": component,
+                        "signal": value}, place)
+                    break
             else:
                 found.notes.append(f"The force on {given} is left out: {given} is not a single "
                                    f"point of the bodies.")
         distributed = self.contents.distributed
         for surface, value in distributed.pressures:
             held = [(body, name) for body in bodies for name in self.meshes[body].boundaries
-                    if name.upper() == surface.upper()]
+                    if name.upper() == self._within(surface, body).upper()]
             for body, name in held:
                 found.add(body, name, "boundaries", {
                     "boundary": f"{_name(body)}." * several + name,
@@ -252,17 +260,21 @@ class Imported:
             if not held:
                 found.notes.append(f"The pressure on {surface} is left out: {surface} is not a "
                                    f"boundary of the bodies.")
-        total = np.zeros(3)
+        totals = {body: np.zeros(3) for body in bodies}
         for name, acceleration in distributed.gravity:
-            if self._whole(name, bodies):
-                total += self.scale * np.array(acceleration)
-            else:
+            whole = [body for body in bodies if self._whole(name, body)]
+            for body in whole:
+                totals[body] += self.scale * np.array(acceleration)
+            if not whole:
                 found.notes.append(f"Gravity on {name} is left out: gravity must act on all cells.")
-        if total.any():
+        total = totals[bodies[0]]
+        if any((one != total).any() for one in totals.values()):
+            found.notes.append("Gravity is left out: it must be the same on all bodies.")
+        elif total.any():
             d = self.meshes[bodies[0]].dimension
             found.table["gravity"] = total[:d].tolist()
             for body in bodies:
-                found.named[body].add("gravity")
+                found.named[body]["gravity"] = "gravity"
         for name, *_ in distributed.rotations:
             if not any(self._rotation(body) for body in bodies):
                 found.notes.append(f"Centrifugal force on {name} is left out: this force must act "
@@ -272,17 +284,42 @@ class Imported:
             found.notes.append(f"{what} is left out: only {distributed.kinds} are read.")
         return found
 
+    @cached_property
+    def _places(self) -> dict[str, Array]:
+        """Places of nodes with a name of their own [m]."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ModelWarning)
+            return single_nodes(self.path, scale=self.scale)
+
+    def _middle(self, body: str, words: set[str]) -> tuple[str, list[float]] | None:
+        """Name and place of a node with one of some names in the middle of an edge of a body.
+
+        Such nodes are no points of a mesh; a body has their displacements all the same.
+        """
+        mesh = self.meshes[body]
+        for name, place in self._places.items():
+            at = place[: mesh.dimension]
+            if name.upper() in words and np.isfinite(at).all() and (
+                    np.linalg.norm(mesh.edge_middles - at, axis=1).min()
+                    <= _COINCIDENT * mesh.extent):
+                return name, at.tolist()
+        return None
+
     def _lost_supports(self, bodies: Sequence[str]) -> Iterator[str]:
         """Sentences on supports that hold displacements, but are fixed on none of the bodies."""
-        bodies_fixed = [self._body(body).get("fixed", {}) for body in bodies]
-        taken = {name.upper() for fixed in bodies_fixed if isinstance(fixed, dict)
-                 for name in fixed}
+        taken: dict[str, set[str]] = {}
+        for body in bodies:
+            fixed = self._body(body).get("fixed", {})
+            taken[body] = {name.upper() for name in fixed} if isinstance(fixed, dict) else set()
         axes = "xyz"[: self.meshes[bodies[0]].dimension]
         for given, components in self.contents.supports:
-            words = {self.contents.single.get(given, given).upper(), f"NODE {given}"}
+            number = given.rpartition(".")[2]
             # Nodes by their numbers are in groups of their own.
-            numbered = given.isdigit() and any(name.startswith("BOUNDARY ") for name in taken)
-            if not words & taken and not numbered and {*components.split()} & {*axes}:
+            numbered = number.isdigit() and any(
+                name.startswith("BOUNDARY ") for names in taken.values() for name in names)
+            held = any({self._within(given, body).upper(), f"NODE {number}"} & names
+                       for body, names in taken.items())
+            if not held and not numbered and {*components.split()} & {*axes}:
                 yield (f"The support of {given} is left out: {given} is not a group of the bodies, "
                        f"or touches a face of an interface.")
 
@@ -290,22 +327,28 @@ class Imported:
         """Table of the rotation of a body by centrifugal force on all its cells."""
         mesh = self.meshes[body]
         for name, square, point, axis in self.contents.distributed.rotations:
-            if square > 0.0 and self._whole(name, [body]) and (
+            if square > 0.0 and self._whole(name, body) and (
                     mesh.dimension == 3 or not any(axis[:2])):
                 return {"speed": float(np.sqrt(square)),
                         "centre": [self.scale * x for x in point[:mesh.dimension]],
                         **({"axis": list(axis)} if mesh.dimension == 3 else {})}
         return None
 
-    def _whole(self, name: str, bodies: Sequence[str]) -> bool:
-        """True if a set of elements, by name or none for all, holds all cells of some bodies."""
-        for body in bodies:
-            mesh = self.meshes[body]
-            groups = {group.upper(): cells for group, cells in mesh.cell_groups.items()}
-            if name and name.upper() != body.upper() and len(
-                    groups.get(name.upper(), ())) < len(mesh.cells):
-                return False
-        return True
+    def _whole(self, name: str, body: str) -> bool:
+        """True if a set of elements, by name or none for all, holds all cells of a body."""
+        mesh, own = self.meshes[body], self._within(name, body).upper()
+        groups = {group.upper(): cells for group, cells in mesh.cell_groups.items()}
+        return not name or own == body.upper() or len(groups.get(own, ())) == len(mesh.cells)
+
+    def _within(self, word: str, body: str) -> str:
+        """Name of a set of the deck within a body; empty for a set of the instance of another."""
+        instance, _, name = word.rpartition(".")
+        names = {instance.upper(), self.contents.instances.get(instance.upper(), "").upper()}
+        own = {one.upper() for one in self.meshes} if self.has_parts else {
+            *self.contents.instances}
+        if not instance or not names & own:
+            return self.contents.single.get(word, word)
+        return name if not self.has_parts or body.upper() in names else ""
 
     def _interface(self, face: str, other: str) -> dict[str, object]:
         body, _, boundary = face.partition(".")
@@ -322,16 +365,23 @@ class Imported:
 
 @dataclass
 class _Loads:
-    """Table of loads, the points and boundaries of bodies that they load, and what is left out."""
+    """Table of loads, the points and boundaries of bodies that they load, and what is left out.
 
-    named: dict[str, set[str]]
+    ``named`` are, for each body, names of places with what a basis calls them: the name of a group,
+    or coordinates.
+    """
+
+    named: dict[str, dict[str, str | list[float]]]
     table: dict[str, Any] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
-    def add(self, body: str, name: str, kind: str, row: dict[str, object]) -> None:
+    def add(
+        self, body: str, name: str, kind: str, row: dict[str, object],
+        place: list[float] | None = None,
+    ) -> None:
         """Add a row to the forces or boundaries of the table, of a named place of a body."""
         self.table.setdefault(kind, []).append(row)
-        self.named[body].add(name)
+        self.named[body][name] = place or name
 
 
 def imported(path: str | Path, scale: float = 1.0) -> Imported:
@@ -428,9 +478,17 @@ def _facing(meshes: Mapping[str, Mesh], contents: DeckContents) -> Iterator[tupl
         used[body] = {row for name in tied & mesh.boundaries.keys()
                       for row in _rows(mesh.boundaries[name])}
     by_end = {key.partition(".")[2].upper(): key for key in named}
+    by_name = {key.upper(): key for key in named}
+
+    def key_of(word: str) -> str | None:
+        """Key of a surface of ``*CONTACT PAIR``, with the name of an instance or of its part."""
+        instance, _, name = word.upper().rpartition(".")
+        part = contents.instances.get(instance, "").upper()
+        return (by_name.get(f"{instance}.{name}") or by_name.get(f"{part}.{name}")
+                or by_end.get(name))
+
     given = [(a, b) for first, second in contents.pairs
-             for a, b in [[by_end.get(word.rpartition(".")[2].upper()) for word in (first, second)]]
-             if a and b]
+             if (a := key_of(first)) and (b := key_of(second))]
     found = []
     for (a, one), (b, two) in combinations(named.items(), 2):
         if pieces[a] & pieces[b]:
@@ -488,12 +546,12 @@ def _references(mesh: Mesh) -> dict[str, str]:
         "NODE "))}
 
 
-def _loaded(places: set[str], mesh: Mesh) -> dict[str, object]:
+def _loaded(places: Mapping[str, str | list[float]], mesh: Mesh) -> dict[str, object]:
     """Keys of a basis with places at which loads act, and with the temperature of the deck."""
     names, found = sorted(places), dict[str, object]()
     if names:
         points = [name for name in names if name not in mesh.boundaries and name != "gravity"]
-        found |= {**({"points": {name: name for name in points}} if points else {}),
+        found |= {**({"points": {name: places[name] for name in points}} if points else {}),
                   "loads": names}
     if mesh.temperature is not None and any(
             getattr(one, "thermal_expansion", 0.0) for one in mesh.materials.values()):

@@ -8,7 +8,7 @@ from bolted_clamp import clamp_deck, clamp_mesh
 from meshes_for_tests import rectangle
 from solid_blocks import block_mesh
 
-from fecontact import Material, Mesh, Study, write_mesh
+from fecontact import Material, Mesh, Study, static_solution, write_mesh
 from fecontact.study.imported import imported
 
 MATERIAL = "*MATERIAL, NAME=M\n*ELASTIC\n2.1e11, 0.3\n*DENSITY\n7850.\n"
@@ -107,6 +107,75 @@ def test_supports_and_loads_at_reference_nodes(cli, place):
     assert study.elastic_body().total_mass == pytest.approx(7850.0 * 8e-5)
     assert cli("run", "study.toml", "--set", "simulation.t_end=1e-5",
                "--set", "body.degree=1")[0] == 0
+
+
+SQUARE = ("*NODE\n1, 0, 0\n2, 1, 0\n3, 1, .5\n4, 0, .5\n5, .5, 0\n6, 1, .25\n7, .5, .5\n"
+          "8, 0, .25\n*ELEMENT, TYPE=CPS8, ELSET=ALL\n1, 1, 2, 3, 4, 5, 6, 7, 8\n"
+          "*NSET, NSET=LEFT\n1, 4, 8\n*NSET, NSET=MIDDLE\n6\n"
+          f"*SOLID SECTION, ELSET=ALL, MATERIAL=M\n.1\n{MATERIAL}"
+          "*BOUNDARY\nLEFT, 1, 1\n1, 2, 2\n")
+
+
+@pytest.mark.parametrize("middle", ["6", "MIDDLE"])
+def test_forces_in_the_middles_of_edges(place, middle):
+    """Consistent forces 1/6, 2/3, 1/6 of a traction stretch a square evenly, by F L / (E A)."""
+    (place / "square.inp").write_text(
+        f"{SQUARE}*STEP\n*STATIC\n*CLOAD\n2, 1, 1e3\n{middle}, 1, 4e3\n3, 1, 1e3\n*END STEP\n")
+    found = imported("square.inp")
+    assert not [note for note in found.notes if "left out" in note]
+    (place / "square.toml").write_text(found.toml(place))
+    study = Study.read("square.toml")
+    body = study.elastic_body()
+    moved = static_solution(body, study.load, points=study.basis.load_points).displacement
+    right = body.nodes[:, 0] == 1.0
+    assert moved[right, 0] == pytest.approx(6e3 / (2.1e11 * 0.05), rel=1e-9)
+
+
+WEIGHT = "*STEP\n*STATIC\n*DLOAD\n{}, GRAV, 9.81, , , -1.\n*END STEP\n"
+
+
+def test_names_with_the_instance_in_front(place):
+    """Both parts have the sets and surfaces of equal names; gravity acts on one after the other."""
+    steps = ("*CONTACT PAIR, INTERACTION=I\nB-1.contact, A-1.top\n*BOUNDARY\nA-1.LOW, 1, 3\n"
+             "B-1.2, 2, 2\n*STEP\n*STATIC\n*CLOAD\nB-1.20, 3, -5.\n*DSLOAD\nA-1.left, P, 7.\n"
+             "*DLOAD\nA-1.A-ALL, GRAV, 9.81, 0., 0., -1.\nB-1.B-ALL, GRAV, 9.81, 0., 0., -1.\n"
+             "*END STEP\n")
+    sets = "*NSET, NSET=LOW\n1, 2, 3\n*END PART"
+    (place / "a.inp").write_text(deck(*STACK, more=steps).replace("*END PART", sets))
+    found = imported("a.inp")
+    assert found.interfaces == (("B.contact", "A.top"),)
+    assert not [note for note in found.notes if "left out" in note or "interface" in note]
+    study = Study.from_toml(found.toml(place), place / "study.toml")
+    assert study.bodies["A"].body.fixed == {"LOW": "xyz"}
+    assert study.bodies["B"].body.fixed == {"BOUNDARY 2": "y"}
+    assert [(one.point, one.signal.value) for one in study.load.forces] == [("B.node 20", -5.0)]
+    assert [(one.boundary, one.pressure) for one in study.load.boundaries] == [("A.left", 7.0)]
+    assert study.load.gravity == pytest.approx((0.0, 0.0, -9.81))
+
+
+@pytest.mark.parametrize(("weight", "gravity", "note"), [
+    ("", (0.0, 0.0, -9.81), None),
+    ("A-1.A-ALL", None, "Gravity is left out: it must be the same on all bodies."),
+])
+def test_gravity_of_the_whole_model_and_of_a_part(place, weight, gravity, note):
+    (place / "a.inp").write_text(deck(*STACK, more=WEIGHT.format(weight)))
+    found = imported("a.inp")
+    assert [one for one in found.notes if "ravity" in one] == ([note] if note else [])
+    study = Study.from_toml(found.toml(place), place / "study.toml")
+    assert study.load.gravity == gravity
+
+
+def test_exponents_of_fortran_and_words_in_place_of_numbers(cli, place):
+    double = SQUARE.replace("7850.", "7.85D+03").replace("2.1e11", "2.1d11").replace(
+        "2, 1, 0\n", "2, 1.0D0, 0\n")
+    (place / "square.inp").write_text(double)
+    mesh, = imported("square.inp").meshes.values()
+    assert mesh.materials["ALL"].youngs_modulus == 2.1e11
+    assert (mesh.materials["ALL"].density, mesh.nodes[1, 0]) == (7850.0, 1.0)
+    (place / "square.inp").write_text(SQUARE.replace("2.1e11", "210.x"))
+    code, _, err = cli("import", "square.inp")
+    assert code == 1
+    assert "*ELASTIC holds '210.x' in place of a number" in err
 
 
 def test_an_existing_study_is_kept(cli, place):

@@ -24,7 +24,7 @@ from fecontact.core.errors import (
 )
 from fecontact.core.files.atomic_write import replaced
 from fecontact.core.resources.memory import available_memory, shown_memory
-from fecontact.core.types import Coordinates, Integers
+from fecontact.core.types import Array, Coordinates, Integers
 from fecontact.fem.attachments import counted_attachments
 from fecontact.fem.constraints import counted
 from fecontact.fem.mesh import Mesh
@@ -164,6 +164,26 @@ def read_bodies(path: str | Path, *, scale: float = 1.0) -> dict[str, Mesh]:
         raw = _raw(path)
         names = list(raw.parts) if raw.separate else [""]
         return {name: _mesh(raw.part(name or None), scale, {}, {}) for name in names}
+
+
+def single_nodes(path: str | Path, *, scale: float = 1.0) -> dict[str, Array]:
+    """Places [m] of the groups of a file that hold one node, in the middle of an edge or anywhere.
+
+    Parameters
+    ----------
+    path, scale
+        See :func:`read_mesh`.
+
+    Raises
+    ------
+    InputError, MeshError
+        As in :func:`read_mesh`.
+    """
+    path = as_path(path, "a mesh")
+    with _located(path, scale):
+        raw = _raw(path)
+    return {name: scale * np.asarray(raw.points[nodes[0]], dtype=float)
+            for name, nodes in raw.nodes.items() if len(nodes) == 1}
 
 
 def _require_scale(owner: str, scale: float) -> None:

@@ -45,7 +45,7 @@ from fecontact.fem.mesh_files.abaqus_constraints import (
     constraints_of,
     sections_of,
 )
-from fecontact.fem.mesh_files.abaqus_keywords import Deck, Options
+from fecontact.fem.mesh_files.abaqus_keywords import Deck, Options, as_number
 from fecontact.fem.mesh_files.abaqus_loads import LOADS, add_loads, groups_of_nodes
 from fecontact.fem.mesh_files.abaqus_materials import Given, material, orientation
 from fecontact.fem.mesh_files.abaqus_temperatures import is_temperature, temperature_of
@@ -376,7 +376,7 @@ def _words(line: str) -> list[str]:
 
 
 def _values(line: str) -> list[float]:
-    return [float(word or 0) for word in _words(line.rstrip(", "))]
+    return [as_number(word) for word in _words(line.rstrip(", "))]
 
 
 def _place(values: list[float]) -> Array:
@@ -524,9 +524,11 @@ class _Assembly:
             case _ if keyword in LOADS and not self.first_step_ended:
                 for name, sides in add_loads(self.loads, keyword, options, lines).items():
                     self._add_surface(name, [f"{word}, S{side}" for word, side in sides])
-            case "BOUNDARY" | "CLOAD" if part is not None and not self.first_step_ended:
-                for name, node in groups_of_nodes(keyword, lines):
-                    self._add_set("NSET", {"NSET": name}, [node])
+            case "BOUNDARY" | "CLOAD" if not self.first_step_ended:
+                for name, node, instance in groups_of_nodes(keyword, lines):
+                    if part is not None or instance:
+                        within = {"INSTANCE": instance} if instance else {}
+                        self._add_set("NSET", {"NSET": name, **within}, [node])
             case "END STEP":
                 self.first_step_ended = True
             case "SURFACE" if options["TYPE"].upper() == "NODE":
@@ -667,7 +669,7 @@ class _Assembly:
                                 f"are: {choices(self.orientations)}.")
             try:
                 made = material(wanted, self.materials[wanted.upper()])
-            except (InputError, ValueError) as error:
+            except (InputError, MeshError) as error:
                 raise MeshError(f"The material '{wanted}' cannot be read: {error}") from None
             if isinstance(made, AnisotropicMaterial):
                 made = self._oriented(made, part, turned, name, bodies)
@@ -893,7 +895,7 @@ def _numbered_places(lines: list[str]) -> tuple[Integers, Array]:
     try:
         rows = np.loadtxt(lines, delimiter=",", ndmin=2, comments=None)
     except ValueError:  # rows of different lengths, or with empty fields
-        rows = np.array([[float(number), *_place([float(word or 0) for word in place])]
+        rows = np.array([[float(number), *_place([as_number(word) for word in place])]
                          for number, *place in map(_words, lines)]).reshape(-1, 4)
     numbers = rows[:, 0].astype(np.int64)
     if (rows[:, 0] != numbers).any():

@@ -9,7 +9,7 @@ from fecontact.core.checks import whole_number
 from fecontact.core.errors import MeshError, shown
 from fecontact.core.types import Array, Integers
 from fecontact.fem.constraints import Constraint, Coupling, LinearEquation, Term, Tie
-from fecontact.fem.mesh_files.abaqus_keywords import Options
+from fecontact.fem.mesh_files.abaqus_keywords import Options, as_number
 
 Block = tuple[str, Options, list[str]]
 # Keywords that constrain displacements, and those that go on with the one before.
@@ -173,7 +173,7 @@ def words_of(line: str) -> list[str]:
 def number_of(word: str, where: str) -> float:
     """Number that a word is; MeshError, with ``where`` in front, if it is none."""
     try:
-        return float(word)
+        return as_number(word)
     except ValueError:
         raise MeshError(f"{where} holds {shown(word)} in place of a number.") from None
 

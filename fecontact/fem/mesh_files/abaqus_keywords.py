@@ -12,6 +12,13 @@ _ENCLOSED = ("PART", "INSTANCE", "ASSEMBLY")  # each closed by *END PART and so 
 _WITH_DATA = ("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE")
 
 Options = dict[str, str]
+# Exponents of double precision, as Fortran writes them.
+_DOUBLE = re.compile(r"[dD](?=[+-]?\d+$)")
+
+
+def as_number(word: str) -> float:
+    """Number that a word of a data line is, zero if it is empty; ValueError for other words."""
+    return float(_DOUBLE.sub("e", word.strip()) or 0.0)
 
 
 class Deck:

@@ -42,9 +42,10 @@ def add_loads(
         return {}
     found: dict[str, list[tuple[str, int]]] = {}
     for line in lines:
-        name, label, *words = [*words_of(line), "", ""]
+        # An empty name means all elements, an empty value zero.
+        name, label, *words = [*(word.strip() for word in line.rstrip(", ").split(",")), ""]
         label = label.upper()
-        values = [number_of(word, f"*{keyword}") for word in words if word]
+        values = [number_of(word, f"*{keyword}") for word in words[:-1]] if words else []
         least = {"GRAV": 4, "CENTRIF": 7}.get(label, 1)
         if len(values) < least and (keyword == "DSLOAD" or label in ("GRAV", "CENTRIF")
                                     or _SIDE.fullmatch(label)):
@@ -52,7 +53,7 @@ def add_loads(
                             f"{label or 'it'} needs {least}.")
         if keyword == "DSLOAD" and label == "P":
             loads.pressures.append((name, values[0]))
-        elif keyword == "DLOAD" and (side := _SIDE.fullmatch(label)):
+        elif keyword == "DLOAD" and name and (side := _SIDE.fullmatch(label)):
             found.setdefault(loads.surface_of(values[0], keyword), []).append(
                 (name, int(side[1])))
         elif keyword == "DLOAD" and label == "GRAV":
@@ -67,14 +68,23 @@ def add_loads(
     return found
 
 
-def groups_of_nodes(keyword: str, lines: Sequence[str]) -> Iterator[tuple[str, str]]:
+def node_of(word: str) -> tuple[str, str] | None:
+    """Instance, perhaps none, and number of a node that a word names; None for a set."""
+    instance, _, number = word.rpartition(".")
+    return None if whole_number(number) is None else (instance, number)
+
+
+def groups_of_nodes(keyword: str, lines: Sequence[str]) -> Iterator[tuple[str, str, str]]:
     """Groups for the nodes that ``*BOUNDARY`` or ``*CLOAD`` name by their numbers, and these.
 
-    The group of a loaded node 60 is ``node 60``; held nodes are in ``BOUNDARY 1-3`` together, by
-    the degrees of freedom or the name in their line.
+    Each with the instance of the node, empty where none is named. The group of a loaded node 60 is
+    ``node 60``; held nodes are in ``BOUNDARY 1-3`` together, by the degrees of freedom or the name
+    in their line.
     """
     for line in lines:
         word, *values = words_of(line)
-        if whole_number(word) is not None:
+        if found := node_of(word):
+            instance, number = found
             ways = "-".join(dict.fromkeys(one for one in values[:2] if one))
-            yield f"node {word}" if keyword == "CLOAD" else f"BOUNDARY {ways}", word
+            yield (f"node {number}" if keyword == "CLOAD" else f"BOUNDARY {ways}", number,
+                   instance)

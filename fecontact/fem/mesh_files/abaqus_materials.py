@@ -1,7 +1,7 @@
 """Materials and orientations of Abaqus and CalculiX input files."""
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -9,7 +9,8 @@ from fecontact.core.errors import InputError, MeshError, ModelWarning, shown
 from fecontact.core.types import Array
 from fecontact.fem.material import AnisotropicMaterial, AnyMaterial, Material
 from fecontact.fem.material_axes import AnyAxes, CylindricalAxes, FieldAxes, MaterialAxes
-from fecontact.fem.mesh_files.abaqus_keywords import Options
+from fecontact.fem.mesh_files.abaqus_constraints import number_of
+from fecontact.fem.mesh_files.abaqus_keywords import Options, as_number
 
 Given = tuple[Options, list[str]]
 
@@ -17,6 +18,8 @@ Given = tuple[Options, list[str]]
 _KINDS = {"ISO": (2, 1), "ENGINEERINGCONSTANTS": (9, 2), "ORTHO": (9, 2), "ANISO": (21, 3)}
 # Rows and columns of the constants of ANISO in the order 11, 22, 33, 12, 13, 23 of Abaqus.
 _UPPER = [(row, column) for column in range(6) for row in range(column + 1)]
+# Options of *DAMPING, of which the first is read.
+_DAMPING = ("STRUCTURAL", "ALPHA", "BETA", "COMPOSITE")
 _ORDER = [0, 1, 2, 3, 5, 4]  # of 11, 22, 33, 12, 23, 13 among those of Abaqus
 
 
@@ -36,17 +39,17 @@ def material(name: str, given: Mapping[str, Given]) -> AnyMaterial | str:
         return (f"the material '{name}' has the elasticity TYPE={options['TYPE']}, which is not "
                 f"read")
     constants, most = _KINDS[kind]
-    values = [float(word or 0) for line in lines for word in line.rstrip(", ").split(",")]
+    values = _numbers("ELASTIC", lines)
     # Poisson's ratio may be left out, a temperature may follow.
     least = 1 if kind == "ISO" else constants
     if not (least <= len(values) <= constants + 1 and len(lines) <= most and len(density) == 1):
         return (f"the material '{name}' has not one set of constants of *ELASTIC and one line of "
                 f"*DENSITY")
     values = [*values, 0.0][:constants]
-    rho = float(density[0].split(",")[0] or 0)
+    rho = _numbers("DENSITY", density)[0]
     damping = given.get("DAMPING", ({}, []))[0]
-    loss = float(damping.get("STRUCTURAL") or 0)
-    if unread := [key for key in ("ALPHA", "BETA", "COMPOSITE") if float(damping.get(key) or 0)]:
+    loss, *others = _numbers("DAMPING", [damping.get(key, "") for key in _DAMPING])
+    if unread := [key for key, value in zip(_DAMPING[1:], others, strict=True) if value]:
         warnings.warn(f"The material '{name}' has *DAMPING, {', '.join(unread)}, which is not "
                       f"read; give damping to the basis.", ModelWarning, stacklevel=4)
     expansion = _expansion(name, given, kind == "ISO")
@@ -62,12 +65,18 @@ def material(name: str, given: Mapping[str, Given]) -> AnyMaterial | str:
     return AnisotropicMaterial(stiffness[np.ix_(_ORDER, _ORDER)].tolist(), rho, loss_factor=loss)
 
 
+def _numbers(keyword: str, lines: Sequence[str]) -> list[float]:
+    """Numbers of data lines; MeshError, with the keyword, for other words."""
+    return [number_of(word, f"*{keyword}") for line in lines
+            for word in line.rstrip(", ").split(",")]
+
+
 def _expansion(name: str, given: Mapping[str, Given], isotropic: bool) -> float:
     """Thermal expansion [1/K] of *EXPANSION; zero, with a warning, if it is not one number."""
     if "EXPANSION" not in given:
         return 0.0
     options, lines = given["EXPANSION"]
-    values = [float(word or 0) for line in lines for word in line.rstrip(", ").split(",")]
+    values = _numbers("EXPANSION", lines)
     # The temperature at which it holds may follow.
     if isotropic and options.get("TYPE", "ISO").upper() == "ISO" and len(values) in (1, 2):
         return values[0]
@@ -103,7 +112,7 @@ def orientation(
     directions = field(lines[0].strip(" ,")) if lines and system == "RECTANGULAR" else None
     try:
         points = lines if directions is None else ["0, 0, 0, 0, 0, 0", *lines[1:]]
-        values, turn = ([float(word or 0) for word in line.rstrip(", ").split(",")]
+        values, turn = ([as_number(word) for word in line.rstrip(", ").split(",")]
                         for line in [*points, "1, 0"][:2])
         (ax, ay, az, bx, by_, bz), rest = values[:6], values[6:]
         about, angle = int(turn[0]), (*turn[1:], 0.0)[0]

@@ -11,9 +11,15 @@ from fecontact.core.checks import whole_number
 from fecontact.core.types import Array
 from fecontact.fem.mesh_files.abaqus import local_axes
 from fecontact.fem.mesh_files.abaqus_attachments import TYPES
-from fecontact.fem.mesh_files.abaqus_constraints import READ
-from fecontact.fem.mesh_files.abaqus_keywords import Deck
-from fecontact.fem.mesh_files.abaqus_loads import KINDS, LOADS, add_loads, groups_of_nodes
+from fecontact.fem.mesh_files.abaqus_constraints import READ, number_of
+from fecontact.fem.mesh_files.abaqus_keywords import Deck, as_number
+from fecontact.fem.mesh_files.abaqus_loads import (
+    KINDS,
+    LOADS,
+    add_loads,
+    groups_of_nodes,
+    node_of,
+)
 from fecontact.fem.mesh_files.distributed_loads import DistributedLoads
 
 # Keywords of the mesh and its materials, besides those of constraints.
@@ -55,6 +61,8 @@ class DeckContents:
         Thicknesses of the sections of plane elements, each once, in units of the file.
     properties : bool
         True if properties of elements, of a file of Nastran, name materials.
+    instances : mapping of str to str
+        Part of each instance, by its name in capitals.
 
     Files of Nastran and Ansys give supports, forces and distributed loads alike.
     """
@@ -69,6 +77,7 @@ class DeckContents:
     planes: tuple[str, ...] = ()
     thicknesses: tuple[float, ...] = ()
     properties: bool = False
+    instances: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def loads(self) -> dict[str, int]:
@@ -106,6 +115,7 @@ def deck_contents(path: Path) -> DeckContents:
     single: dict[str, str] = {}
     distributed = DistributedLoads(kinds=KINDS)
     thicknesses: list[float] = []
+    instances: dict[str, str] = {}
     held_before = False  # true up to the first *BOUNDARY of a step, which OP=NEW concerns
     for keyword, options, lines in deck.blocks():
         rows = [[word.strip() for word in line.split(",")] for line in lines] if (
@@ -120,6 +130,8 @@ def deck_contents(path: Path) -> DeckContents:
             # A name is that of another set, which this one holds.
             if len(words) == 1 and whole_number(words[0]) is not None:
                 single.setdefault(words[0], options["NSET"])
+        elif keyword == "INSTANCE":
+            instances[options.get("NAME", "").upper()] = options.get("PART", "")
         elif keyword == "CONTACT PAIR":
             pairs += [(row[0], row[1]) for row in rows if len(row) > 1]
         elif keyword == "STEP":
@@ -128,11 +140,11 @@ def deck_contents(path: Path) -> DeckContents:
             if held_before and options.get("OP", "").upper() == "NEW":
                 supports.clear()
             held_before = False
-            if any(len(row) > 3 and float(row[3] or 0.0) for row in rows):
+            if any(len(row) > 3 and number_of(row[3], "*BOUNDARY") for row in rows):
                 distributed.unread.append("*BOUNDARY with displacements other than zero")
             distributed.unread += _of_time(keyword, options)
-            groups = [[name, *rows[k][1:]] for k, (name, _) in zip(
-                [k for k, row in enumerate(rows) if whole_number(row[0]) is not None],
+            groups = [[name, *rows[k][1:]] for k, (name, *_) in zip(
+                [k for k, row in enumerate(rows) if node_of(row[0])],
                 groups_of_nodes(keyword, lines), strict=True)]
             for name, *held in (*rows, *groups):
                 known = next((one for one in supports if one.upper() == name.upper()), name)
@@ -143,16 +155,18 @@ def deck_contents(path: Path) -> DeckContents:
             add_loads(distributed, keyword, options, lines)
         elif keyword == "CLOAD" and not deck.keywords["END STEP"]:
             distributed.unread += _of_time(keyword, options)
-            forces += [(name, COMPONENTS[dof - 1], float(value)) for name, word, value, *_ in (
+            forces += [(name, COMPONENTS[dof - 1], size) for name, word, value, *_ in (
                 (*row, "", "")[: max(len(row), 3)] for row in rows)
-                if (dof := whole_number(word) or 0) in range(1, 7) and float(value or 0.0)]
+                if (dof := whole_number(word) or 0) in range(1, 7)
+                and (size := number_of(value, "*CLOAD"))]
     found = DeckContents(
         deck.keywords, elements, tuple(pairs),
         tuple((name, " ".join(COMPONENTS[dof - 1] for dof in sorted(held)))
               for name, held in supports.items() if held), tuple(forces), single,
         distributed,
         tuple(sorted({"stress" if name.startswith("CPS") else "strain" for name in elements
-                      if name.startswith(("CPS", "CPE"))})), tuple(dict.fromkeys(thicknesses)))
+                      if name.startswith(("CPS", "CPE"))})), tuple(dict.fromkeys(thicknesses)),
+        instances=instances)
     if not deck.keywords["TRANSFORM"]:
         return found
     axes_of = local_axes(path)
@@ -226,7 +240,7 @@ def _of_time(keyword: str, options: Mapping[str, str]) -> list[str]:
 def _thickness(lines: list[str]) -> float:
     """Thickness of a section of plane elements; one where its data say nothing."""
     try:
-        return float(lines[0].split(",")[0]) if lines else 1.0
+        return as_number(lines[0].split(",")[0]) or 1.0 if lines else 1.0
     except ValueError:
         return 1.0
 
@@ -244,6 +258,7 @@ def _held(words: list[str]) -> Iterable[int]:
         return _NAMED[words[0].upper()]
     first = whole_number(words[0]) if words else None
     last = whole_number(words[1]) if len(words) > 1 and words[1] else first
-    if first is None or last is None or (len(words) > 2 and float(words[2] or 0.0)):
+    if first is None or last is None or (
+            len(words) > 2 and number_of(words[2], "*BOUNDARY")):
         return ()
     return range(max(first, 1), min(last, 6) + 1)
