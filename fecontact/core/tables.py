@@ -169,6 +169,10 @@ def _hints(cls: Any) -> dict[str, Any]:
     return get_type_hints(cls)
 
 
+class Unset(float):
+    """Default number of a field that has to differ from the same number where it is given."""
+
+
 def to_table(instance: Any, *, defaults: bool = True) -> dict[str, Any]:
     """The fields of a dataclass as a table for TOML.
 
@@ -185,7 +189,8 @@ def to_table(instance: Any, *, defaults: bool = True) -> dict[str, Any]:
     for entry in fields(instance):
         value = getattr(instance, entry.name)
         default = entry.default_factory() if callable(entry.default_factory) else entry.default
-        if value is not None and (defaults or default is MISSING or value != default):
+        given = value != default or isinstance(value, Unset) != isinstance(default, Unset)
+        if value is not None and (defaults or default is MISSING or given):
             table[entry.name] = plain(value, defaults=defaults)
     return table
 

@@ -15,6 +15,7 @@ from fecontact.core.errors import (
     require_finite,
     require_not_negative,
 )
+from fecontact.core.tables import Unset
 from fecontact.core.types import Array, Coordinates
 from fecontact.core.units import Brief, Unit
 from fecontact.laws.signals.harmonic import Constant, Harmonic, Signal
@@ -25,6 +26,7 @@ _BASE = tuple(f"base_acceleration_{axis}" for axis in AXES)
 _SUPPORTS = tuple(f"{part}_{axis}" for part in ("stiffness", "damping") for axis in AXES)
 _MOTIONS = tuple((f"motion_{axis}", f"amplitude_{axis}") for axis in AXES)
 _COMPONENTS = ("x", "y", "z", "phi", "phi_x", "phi_y", "phi_z")
+_NO_STRESS = Unset()
 
 
 @dataclass(frozen=True, repr=False)
@@ -234,13 +236,13 @@ class BoundaryLoad(Brief):
     Raises
     ------
     InputError
-        For values that are neither finite numbers nor signals, or without a load.
+        For values that are neither finite numbers nor signals, or if none is given; zero may be.
     """
 
     boundary: str
-    pressure: Annotated[float | Signal, Unit("Pa")] = 0.0
-    shear: Annotated[float | Signal, Unit("Pa")] = 0.0
-    shear_across: Annotated[float | Signal, Unit("Pa")] = field(default=0.0, kw_only=True)
+    pressure: Annotated[float | Signal, Unit("Pa")] = _NO_STRESS
+    shear: Annotated[float | Signal, Unit("Pa")] = _NO_STRESS
+    shear_across: Annotated[float | Signal, Unit("Pa")] = field(default=_NO_STRESS, kw_only=True)
 
     def __post_init__(self) -> None:
         require_kind("BoundaryLoad", str, boundary=self.boundary)
@@ -248,7 +250,7 @@ class BoundaryLoad(Brief):
         for name, value in given.items():
             if not isinstance(value, Signal):
                 require_finite("BoundaryLoad", **{name: value})
-        if not any(isinstance(value, Signal) or value for value in given.values()):
+        if all(isinstance(value, Unset) for value in given.values()):
             raise InputError(f"BoundaryLoad: pressure and shear on '{self.boundary}' are zero; "
                              f"give one of them, or leave the load out.")
 

@@ -502,6 +502,8 @@ def test_loads_of_a_study(tmp_path):
     moon = study.with_(**{"load.gravity": [0.0, -1.6], "load.boundaries.0.pressure": 1e4})
     assert moon.load.gravity == (0.0, -1.6)
     assert moon.load.boundaries[0].pressure == 1e4
+    unloaded = study.with_(**{"load.boundaries.0": {"boundary": "top", "pressure": 0}})
+    assert Study.from_toml(with_given_keys(unloaded.to_toml())) == unloaded
 
 
 @pytest.mark.parametrize(("changes", "message"), [

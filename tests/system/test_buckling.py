@@ -77,6 +77,10 @@ def test_tension_makes_nothing_buckle():
         found = buckling_loads(body, pulled, 3)
         assert not len(found.load_factors)
         assert "none" in str(found)
+    for body in (column(8), column(200)):  # by the dense and by the iterative solver
+        found = buckling_loads(body, Load(boundaries=(BoundaryLoad("right", pressure=0.0),)), 3)
+        assert not len(found.load_factors)
+        assert not found.state.stress.any()
     free = ElasticBody(rectangle(L, H, 8, 1), SOFT)
     with pytest.raises(InputError, match="supports hold"):
         buckling_loads(free, Load())

@@ -10,7 +10,7 @@ from systems import TURN
 import fecontact as fc
 from fecontact import BoundaryLoad, Load, PointLoad
 from fecontact.core.errors import InputError
-from fecontact.core.tables import from_table
+from fecontact.core.tables import from_table, to_table
 from fecontact.integrate import SetValued
 from fecontact.laws import (
     Constant,
@@ -380,6 +380,17 @@ def test_gravity_does_not_deform_a_free_body():
 def test_bad_loads_are_refused(make, message):
     with pytest.raises(fc.InputError, match=message):
         make()
+
+
+def test_a_boundary_load_of_zero_is_none():
+    """The first case of a sweep over a pressure."""
+    still, none = (beam(Load(5.0, boundaries=boundaries), B=(0.2, 0.01)) for boundaries in (
+        [BoundaryLoad("top", pressure=0.0)], ()))
+    np.testing.assert_array_equal(still.arrays.constant_load, none.arrays.constant_load)
+    for defaults in (False, True):
+        table = to_table(BoundaryLoad("top", shear=0.0), defaults=defaults)
+        assert from_table(BoundaryLoad, table, "load").shear == 0.0
+    assert "pressure" not in to_table(BoundaryLoad("top", shear=0.0), defaults=False)
 
 
 def test_a_number_is_a_constant_signal():

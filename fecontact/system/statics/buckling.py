@@ -120,6 +120,8 @@ def _lowest_factors(system: FreeSystem, stress: Any, count: int) -> tuple[Array,
     from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
     K, size = system.stiffness, system.stiffness.shape[0]
+    if not stress.count_nonzero():
+        return np.zeros(0), np.zeros((size, 0))
     options = {"M": K, "v0": np.random.default_rng(0).standard_normal(size),
                "Minv": LinearOperator(K.shape, system.factors.solve, dtype=float)}
     try:
