@@ -13,6 +13,7 @@ import numpy as np
 
 from fecontact.core.checks import as_path
 from fecontact.core.errors import FecontactError, ModelWarning
+from fecontact.core.ties import first_largest
 from fecontact.core.types import Array, Integers
 from fecontact.core.units import count, listed, quantity
 from fecontact.fem.attachments import counted_attachments
@@ -129,6 +130,8 @@ class Imported:
                       "body": self._body(name),
                       "basis": {"modes": 20, "contact": [],
                                 **_loaded(loads.named[name], self.meshes[name])}}
+            if "points" not in tables["basis"]:
+                tables["basis"]["B"] = self._far_point(name)
         else:
             tables = {"bodies": {_name(name): {
                 "geometry": self._geometry(file, name), "body": self._body(name),
@@ -153,7 +156,9 @@ class Imported:
                     *(["Replace the contact laws: they are placeholders, a stiff normal contact "
                        "and a friction coefficient of 0.3."] if bodies else
                       ["No contact: set contact in [basis] to a boundary, and add [normal] and "
-                       "[friction]."])]
+                       "[friction]."]),
+                    *(["B in [basis], whose motion is observed, is the node farthest from the "
+                       "supports."] if "B" in tables.get("basis", {}) else [])]
         head = "".join(f"# {line}\n" for text in comments for line in text.splitlines())
         return f"{head}\n{tomli_w.dumps(tables)}"
 
@@ -218,6 +223,20 @@ class Imported:
             return {"plane": "strain"}
         return {"plane": min(found.planes, key=("stress", "strain").index),
                 "thickness": self.scale * (found.thicknesses or (1.0,))[0]}
+
+    def _far_point(self, body: str) -> list[float]:
+        """Place of the node that is farthest from the supports of a body, or from its middle."""
+        from scipy.spatial import KDTree
+
+        mesh, fixed = self.meshes[body], self._body(body).get("fixed", {})
+        held = [mesh.boundaries.get(name, mesh.points.get(name, np.empty(0, np.int64))).ravel()
+                for name in (fixed if isinstance(fixed, dict) else ())]
+        nodes = np.unique(np.concatenate([np.empty(0, np.int64), *held]))
+        start = mesh.nodes[nodes] if len(nodes) else mesh.nodes.mean(axis=0, keepdims=True)
+        away, _ = KDTree(start).query(mesh.nodes)
+        # Of nodes at equal distances, up to rounding, the first.
+        place: list[float] = mesh.nodes[first_largest(away)].tolist()
+        return place
 
     def _loads(self, bodies: Sequence[str]) -> "_Loads":
         """Forces and moments at points, pressure and gravity of the first step."""

@@ -1,10 +1,14 @@
 """``fecontact diameters``: the wheel of a study's sector, files, messages."""
 
 import numpy as np
+import pytest
 from sectors import ring_sector
 
-from fecontact import write_mesh
+from fecontact import ElasticBody, write_mesh
 from fecontact.cli import execute
+from fecontact.fem import CyclicSymmetry, Rotation
+from fecontact.plot import plot_diameters
+from fecontact.reduction import sector_modes
 
 SECTOR = """
 geometry = { file = "sector.msh" }
@@ -28,6 +32,13 @@ def test_diameters_of_a_ring(tmp_path, capsys):
     assert execute(["diameters", str(path), "--modes", "3", "-o", str(tmp_path), "--set",
                     "body.rotation.speed=50.0"]) == 0
     assert "backwards at 50 rad/s" in capsys.readouterr().out
+    turning = np.genfromtxt(tmp_path / "ring-diameters.csv", delimiter=",", names=True)
+    assert turning["frequency_hz_3"] == pytest.approx(table["frequency_hz_3"], rel=1e-9)
+    forwards, backwards = sector_modes(
+        ElasticBody(ring_sector(5), thickness=0.1), CyclicSymmetry("bottom", "top", 5), 3,
+        rotation=Rotation(50.0)).rotation.frequencies_hz(50.0)
+    assert turning["forwards_hz_2"] == pytest.approx(forwards[:, 1], rel=1e-6)
+    assert turning["backwards_hz_3"] == pytest.approx(backwards[:, 2], rel=1e-6, nan_ok=True)
     for kind in ("diameters", "wheel"):
         assert (tmp_path / f"ring-{kind}.png").stat().st_size > 10_000
 
@@ -45,3 +56,16 @@ def test_sectors_that_do_not_close_the_circle(tmp_path, capsys):
     path.write_text(SECTOR.replace("symmetry", "# symmetry"))
     assert execute(["diameters", str(path)]) != 0
     assert "one sector of a wheel" in capsys.readouterr().err
+
+
+def test_the_picture_of_a_wheel_at_speed_shows_its_frequencies_there():
+    ring = ElasticBody(ring_sector(5), thickness=0.1)
+    found = sector_modes(ring, CyclicSymmetry("bottom", "top", 5), 3, rotation=Rotation(300.0))
+    axis, = plot_diameters(found, speed=300.0).axes
+    at_speed = np.hstack(found.rotation.frequencies_hz(300.0)).T
+    assert len(axis.lines) == len(at_speed) + 1
+    drawn = [line.get_ydata() for line in axis.lines[: len(at_speed)]]
+    assert np.array(drawn) == pytest.approx(at_speed, nan_ok=True)
+    axis, = plot_diameters(found).axes
+    drawn = [line.get_ydata() for line in axis.lines[:3]]
+    assert np.array(drawn) == pytest.approx(found.frequencies_hz.T, nan_ok=True)

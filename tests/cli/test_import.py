@@ -165,6 +165,17 @@ def test_gravity_of_the_whole_model_and_of_a_part(place, weight, gravity, note):
     assert study.load.gravity == gravity
 
 
+def test_a_body_without_points_is_observed_far_from_its_supports(cli, place):
+    (place / "square.inp").write_text(SQUARE + WEIGHT.format("").replace(", , -1.", " 1., , 0."))
+    assert cli("import", "square.inp", "-o", "square.toml")[0] == 0
+    study = Study.read("square.toml")
+    assert study.basis.B == (1.0, 0.0)
+    brief = ("--set", "simulation.t_end=1e-4", "--set", "basis.modes=5")
+    code, out, _ = cli("run", "square.toml", *brief)
+    assert code == 0
+    assert "amplitude x at B" in out
+
+
 def test_exponents_of_fortran_and_words_in_place_of_numbers(cli, place):
     double = SQUARE.replace("7850.", "7.85D+03").replace("2.1e11", "2.1d11").replace(
         "2, 1, 0\n", "2, 1.0D0, 0\n")

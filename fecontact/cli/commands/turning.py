@@ -110,15 +110,17 @@ def diameters(
     *,
     modes: Annotated[int, Parameter(help="Number of modes of each nodal diameter.")] = 6,
     speed: Annotated[float | None, Parameter(help=(
-        "Speed of rotation [rad/s], for the line of excitation by engine orders."))] = None,
+        "Speed of rotation [rad/s], for the line of excitation by engine orders; by default that "
+        "of [body.rotation]."))] = None,
     set_: Changes = None,
     output: Folder = None,
 ) -> None:
     """Frequencies of a wheel over its nodal diameters, from the sector of [symmetry].
 
-    Writes NAME-diameters.png and .csv with the frequencies at rest, and draws the lowest elastic
-    mode of each diameter over the whole wheel to NAME-wheel.png. With [body.rotation] it prints the
-    frequencies of waves that run forwards and backwards at this speed.
+    Prints the frequencies at rest and with [body.rotation] those at its speed, of waves that travel
+    forwards and backwards; writes them to NAME-diameters.csv, and draws them at the speed, or at
+    rest without one, to NAME-diameters.png. NAME-wheel.png shows the lowest elastic mode of each
+    diameter over the whole wheel.
     """
     import numpy as np
 
@@ -142,11 +144,15 @@ def diameters(
                                                  "CyclicSymmetry"):
             turning = rotation
             found = sector_modes(body, described.symmetry, modes, rotation=turning)
+        columns = {"frequency": found.frequencies_hz}
         seen = {"frequencies [Hz]": found.frequencies_hz}
         if turning is not None and found.rotation is not None:
             at_speed = found.rotation.frequencies_hz(turning.speed)
-            seen = dict(zip((f"{way} at {turning.speed:g} rad/s [Hz]" for way in (
-                "forwards", "backwards")), at_speed, strict=True))
+            columns |= zip(("forwards", "backwards"), at_speed, strict=True)
+            seen = {"at rest [Hz]": found.frequencies_hz, **dict(zip((
+                f"{way} at {turning.speed:g} rad/s [Hz]" for way in ("forwards", "backwards")),
+                at_speed, strict=True))}
+            speed = turning.speed if speed is None else speed
         show(table("diameter", *seen, left=1 + len(seen), rows=(
             (str(k), *(", ".join(f"{value:.5g}" for value in values[row][np.isfinite(values[row])])
                        for values in seen.values()))
@@ -155,9 +161,10 @@ def diameters(
         files = [name.with_name(f"{described.name}-{kind}") for kind in (
             "diameters.csv", "diameters.png", "wheel.png")]
         write_text(files[0], csv_text([
-            ("diameter", *(f"frequency_hz_{k}" for k in range(1, modes + 1))),
+            ("diameter", *(f"{way}_hz_{k}" for way, values in columns.items()
+                           for k in range(1, values.shape[1] + 1))),
             *((k, *(repr(float(value)) for value in row)) for k, row in zip(
-                found.diameters, found.frequencies_hz, strict=True))]))
+                found.diameters, np.hstack([*columns.values()]), strict=True))]))
         plot_diameters(found, speed=speed, path=files[1])
         elastic = [(k, int(np.argmax(row > 0.0))) for k, row in zip(
             found.diameters, found.frequencies_hz, strict=True) if row.any()]

@@ -24,7 +24,8 @@ def plot_diameters(
 
     With a speed, a zigzag line shows excitation by forces at rest in space: engine order m has the
     frequency m times the speed, and acts on the diameter to which m folds, m or N - m up to N, and
-    so on. Modes near its corners resonate.
+    so on. Modes near its corners resonate. Of modes with rotation the frequencies are those at this
+    speed, of waves that travel forwards and backwards in the rotating frame.
 
     Parameters
     ----------
@@ -43,9 +44,14 @@ def plot_diameters(
     require_kind("plot_diameters", SectorModes, found=found)
     if speed is not None:
         require_positive("plot_diameters", speed=speed)
-    hertz = found.frequencies_hz
-    top = 1.05 * float(hertz.max(initial=0.0)) or 1.0
-    curves = [Curve("", colour, np.array(found.diameters), hertz[:, column], 0.9, 6.0)
+    ways = {"": found.frequencies_hz}
+    if speed is not None and found.rotation is not None:
+        ways = dict(zip(("forwards", "backwards"), found.rotation.frequencies_hz(speed),
+                        strict=True))
+    top = 1.05 * max(float(np.nanmax(hertz, initial=0.0)) for hertz in ways.values()) or 1.0
+    curves = [Curve(way * (column == 0), colour, np.array(found.diameters), hertz[:, column], 0.9,
+                    6.0, dashed=way == "backwards")
+              for way, hertz in ways.items()
               for column, colour in enumerate(distinct_colours(hertz.shape[1]))]
     if speed is not None:
         N = found.symmetry.sectors
