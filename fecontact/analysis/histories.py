@@ -65,7 +65,8 @@ def history(
     ------
     InputError
         For a quantity, point or component that does not exist, and for a contact quantity at a
-        point that is not a contact node; for the pressure, if the basis has no thickness.
+        point that is not a contact node; for the pressure, if the basis has no thickness. Without
+        a point, if no point of the basis moves.
     """
     require_kind("history", Trajectory, trajectory=trajectory)
     unit = quantity_unit(quantity, component)
@@ -111,12 +112,30 @@ def usual_point(basis: ModalBasis, *others: ModalBasis) -> str | int:
     """Default point: the first that moves of B, the middle contact node, C, other named points.
 
     It moves in all bases if there is such a point.
+
+    Raises
+    ------
+    InputError
+        If the first basis observes no motion.
     """
+    if not observes_motion(basis):
+        raise InputError(f"No moving point of the body is observed; {how_to_observe(basis)}.")
     middle = [basis.contact_nodes // 2] if basis.contact_nodes else []
     points: tuple[str | int, ...] = ("B", *middle, "C", *basis.extra)
     moving = [one for one in points if is_displaced(one, basis)]
     return next((one for one in moving if all(is_displaced(one, other) for other in others)),
                 moving[0] if moving else "B")
+
+
+def observes_motion(basis: ModalBasis) -> bool:
+    """Return True if some mode moves or turns a point of a basis."""
+    return bool(basis.T.any())
+
+
+def how_to_observe(basis: ModalBasis) -> str:
+    """How a study observes a point, as the end of a sentence."""
+    place = ", ".join("xyz"[: basis.dimension])
+    return f"name one by points = {{ tip = [{place}] }} of [basis], with its coordinates in m"
 
 
 def is_displaced(point: str | int, basis: ModalBasis) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fecontact.analysis.histories import point_name, usual_point
+from fecontact.analysis.histories import observes_motion, point_name, usual_point
 from fecontact.analysis.periodicity import Steadiness, drive_period, steadiness
 from fecontact.analysis.sampling import alias_message
 from fecontact.analysis.spectra import FEWEST_PERIODS
@@ -91,7 +91,7 @@ def key_numbers(
     points in each direction, mean and peak of the total normal and friction forces, of several
     interfaces of each, mean power lost by friction. Without friction its numbers are left out.
     Frequencies need even output times and five periods; without them, and of points that do not
-    move, they are left out.
+    move, they are left out. Without points that move, frequencies and amplitudes are left out.
 
     Parameters
     ----------
@@ -134,7 +134,9 @@ def key_numbers(
 
     found = steadiness(trajectory)
     require_kind("key_numbers", Sequence, points=points)
-    chosen = tuple(points) or (usual_point(trajectory.basis),)
+    chosen = tuple(points)
+    if not chosen and observes_motion(basis):
+        chosen = (usual_point(basis),)
     for point in chosen:
         # Outputs too far apart show frequencies that the motion does not have.
         if found.kind != "at rest" and not alias_message(late):

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from fecontact.analysis.histories import how_to_observe, observes_motion
 from fecontact.core.units import quantity
 from fecontact.integrate.event_table import Events
 from fecontact.integrate.trajectory import Status, Trajectory
@@ -93,6 +94,9 @@ def notes(trajectory: Trajectory) -> list[str]:
     if trajectory.status is not Status.FINISHED:
         message = trajectory.statistics.get("message")
         found.append(trajectory.status.value + (f" {message}" if message else ""))
+    if not observes_motion(trajectory.basis):
+        found.append(f"No moving point of the body is observed: amplitudes and plots of motions "
+                     f"are left out; {how_to_observe(trajectory.basis)}.")
     ground = trajectory.system.ground
     slope = ground.steepest_slope
     if slope > ROUGH_SLOPE:

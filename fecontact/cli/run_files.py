@@ -120,22 +120,28 @@ def write_results_of_run(
 
 
 def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Path]:
-    """Plot histories, phase plane, contact and energies of a run into a folder; the files."""
-    from fecontact.analysis.histories import component_of, usual_point
+    """Plot histories, phase plane, contact and energies of a run into a folder; the files.
+
+    Without points that move there are no histories and no phase plane.
+    """
+    from fecontact.analysis.histories import component_of, observes_motion, usual_point
     from fecontact.output.plots import run as plots
     from fecontact.output.plots.contact_map import plot_contact_map
 
-    system, points = trajectory.system, study.output.points
-    point = points[0] if points else usual_point(system.basis)
-    touching = (~system.basis.spring_nodes).any()
-    kinds = ["history", "phase", "energies", *(["contact_map"] if touching else [])]
-    history, phase, energies, *contact_map = files = [
-        folder / f"{study.name}-{kind}.png" for kind in kinds]
-    plots.plot_history(trajectory, points, path=history)
-    plots.plot_phase(trajectory, point, component_of(trajectory), path=phase)
-    plots.plot_energies(trajectory, path=energies)
-    for file in contact_map:
-        plot_contact_map(trajectory, path=file)
+    basis, points = trajectory.basis, study.output.points
+    files: list[Path] = []
+
+    def file_of(kind: str) -> Path:
+        files.append(folder / f"{study.name}-{kind}.png")
+        return files[-1]
+
+    if observes_motion(basis):
+        point = points[0] if points else usual_point(basis)
+        plots.plot_history(trajectory, points, path=file_of("history"))
+        plots.plot_phase(trajectory, point, component_of(trajectory), path=file_of("phase"))
+    plots.plot_energies(trajectory, path=file_of("energies"))
+    if (~basis.spring_nodes).any():
+        plot_contact_map(trajectory, path=file_of("contact_map"))
     return files
 
 

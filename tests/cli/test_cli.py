@@ -8,10 +8,11 @@ import sys
 import time
 import tomllib
 
+import numpy as np
 import pytest
 from tiny_study import TINY
 
-from fecontact import Status, Study, read_case, read_mesh
+from fecontact import Mesh, Status, Study, read_case, read_mesh, write_mesh
 from fecontact.cli import doctor as examination
 from fecontact.cli import execute
 from fecontact.core import system_libraries
@@ -115,6 +116,28 @@ def test_from_a_new_study_to_a_movie(cli, tmp_path, monkeypatch):
              ("modes", "history", "phase", "contact_map", "energies")}
     assert plots <= files_below(tmp_path)
     assert not [name for name in files_below(tmp_path) if ".part" in name]
+
+
+def test_a_run_without_observed_points_says_so(cli, tmp_path):
+    """No amplitude of a point B that does not exist, and no plots of its motion."""
+    write_mesh(Mesh.grid(np.linspace(0.0, 0.2, 11), [0.0, 0.01]), tmp_path / "bar.msh")
+    (tmp_path / "bar.toml").write_text("""
+geometry = { file = "bar.msh" }
+body = { thickness = 0.01, fixed = { left = "xy" } }
+basis = { modes = 4, contact = [], reduction = "residual", loads = ["gravity"] }
+load = { gravity = [0.0, -9.81] }
+simulation = { t_end = 1e-3, outputs = 21, initial = { displacement = [0, 0, 0] } }
+""")
+    code, out, err = cli("run", tmp_path / "bar.toml", "-o", tmp_path / "out")
+    assert code == 0, err
+    assert "amplitude x at" not in out
+    assert "note: No moving point of the body is observed" in out
+    assert {path.name for path in (tmp_path / "out").glob("bar*")} == {
+        "bar.vtkhdf", "bar-energies.png"}
+    code, out, err = cli("report", tmp_path / "out" / "bar.vtkhdf")
+    assert (code, "No moving point" in out) == (0, True), err
+    code, _, err = cli("plot", tmp_path / "out" / "bar.vtkhdf", "history")
+    assert (code, "points = { tip = [x, y] } of [basis]" in " ".join(err.split())) == (1, True)
 
 
 def test_results_go_to_the_folder_asked_for(cli, study, tmp_path):

@@ -14,6 +14,7 @@ from fecontact.integrate import Rodas5P
 from fecontact.integrate.rodas5p import driver
 from fecontact.laws import Harmonic
 from fecontact.output.plots import analysis
+from fecontact.plot import plot_history, plot_phase
 
 
 @pytest.fixture(scope="module")
@@ -185,6 +186,12 @@ def test_the_default_point_is_one_that_is_displaced(trajectory):
     assert plot_kinds.redraw(clamped, "phase").axes[0].get_title() == "contact node 2"
     T[4] = 0.0
     assert usual_point(replace(body, T=T)) == "C"
+    blind = replace(trajectory, system=replace(
+        trajectory.system, basis=replace(body, T=np.zeros_like(T))))
+    for draw in (plot_phase, history):
+        with pytest.raises(InputError, match=r"No moving point .* points = { tip = \[x, y\] }"):
+            draw(blind)
+    assert plot_history(blind, [(0.2, 0.02)]).axes[0].lines
 
 
 def test_a_force_alone_gives_the_default_component(trajectory):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fecontact.analysis.histories import Point
+from fecontact.analysis.histories import Point, observes_motion
 from fecontact.analysis.spectra import amplitude_spectrum, spectrogram
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
@@ -119,7 +119,7 @@ def chart_tables(
     Curves that stay zero are left out, and so are charts without curves.
     """
     shown = [(key, one) for key, one in motion_diagrams(
-        run, tuple(points) or usual_points(run)).items() if one.curves]
+        run, tuple(points) or _usual_points(run)).items() if one.curves]
     charts = [diagram_table(one, payload, over_time=True) for _, one in shown]
     place = {(*key, curve.name): (chart, row) for chart, (key, one) in enumerate(shown)
              for row, curve in enumerate(one.curves)}
@@ -129,6 +129,11 @@ def chart_tables(
     charts += [diagram_table(one, payload, over_time=True)
                for one in force_diagrams(run) if one.largest > 0.0]
     return charts, phases
+
+
+def _usual_points(run: Trajectory) -> tuple[Point, ...]:
+    """Default points of a page; none where the run observes no motion."""
+    return usual_points(run) if observes_motion(run.basis) else ()
 
 
 def energy_charts(run: Trajectory, payload: Payload) -> list[dict[str, Any]]:
@@ -142,7 +147,7 @@ def spectrum_tables(
 ) -> list[dict[str, Any]]:
     """Charts of the velocity spectra of points, one for each direction in which they move."""
     d = run.basis.dimension
-    points = tuple(points) or usual_points(run)
+    points = tuple(points) or _usual_points(run)
     motions = [run.velocity(point)[:, :d] for point in points]
     largest = max((float(np.abs(one).max()) for one in motions), default=0.0)
     charts = []
