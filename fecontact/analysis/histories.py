@@ -118,8 +118,7 @@ def usual_point(basis: ModalBasis, *others: ModalBasis) -> str | int:
     InputError
         If the first basis observes no motion.
     """
-    if not observes_motion(basis):
-        raise InputError(f"No moving point of the body is observed; {how_to_observe(basis)}.")
+    require_observed_motion(basis)
     middle = [basis.contact_nodes // 2] if basis.contact_nodes else []
     points: tuple[str | int, ...] = ("B", *middle, "C", *basis.extra)
     moving = [one for one in points if is_displaced(one, basis)]
@@ -130,6 +129,12 @@ def usual_point(basis: ModalBasis, *others: ModalBasis) -> str | int:
 def observes_motion(basis: ModalBasis) -> bool:
     """Return True if some mode moves or turns a point of a basis."""
     return bool(basis.T.any())
+
+
+def require_observed_motion(basis: ModalBasis) -> None:
+    """Raise InputError if no mode moves or turns a point of a basis."""
+    if not observes_motion(basis):
+        raise InputError(f"No moving point of the body is observed; {how_to_observe(basis)}.")
 
 
 def how_to_observe(basis: ModalBasis) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fecontact.analysis.histories import usual_point
+from fecontact.analysis.histories import require_observed_motion, usual_point
 from fecontact.analysis.resolved import resolved
 from fecontact.analysis.sampling import warn_of_aliases
 from fecontact.core.docstrings import summary
@@ -78,6 +78,7 @@ def _part(trajectory: Trajectory, state: ContactState) -> float:
 def largest_displacement(trajectory: Trajectory) -> float:
     """Largest displacement of B, C, the contact nodes and other named points at any time."""
     basis = trajectory.basis
+    require_observed_motion(basis)
     rows = basis.T[basis.moving_points, : basis.dimension]
     moved = np.einsum("pkm,tm->tpk", rows, _fine(trajectory).modal_coordinates)
     if basis.dimension == 3:

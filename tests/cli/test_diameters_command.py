@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from sectors import ring_sector
 
-from fecontact import ElasticBody, write_mesh
+from fecontact import ElasticBody, InputError, write_mesh
 from fecontact.cli import execute
 from fecontact.fem import CyclicSymmetry, Rotation
 from fecontact.plot import plot_diameters
@@ -39,6 +39,9 @@ def test_diameters_of_a_ring(tmp_path, capsys):
         rotation=Rotation(50.0)).rotation.frequencies_hz(50.0)
     assert turning["forwards_hz_2"] == pytest.approx(forwards[:, 1], rel=1e-6)
     assert turning["backwards_hz_3"] == pytest.approx(backwards[:, 2], rel=1e-6, nan_ok=True)
+    for speed in ("0.0", "-50.0"):
+        assert execute(["diameters", str(path), "--modes", "3", "-o", str(tmp_path), "--set",
+                        f"body.rotation.speed={speed}"]) == 0
     for kind in ("diameters", "wheel"):
         assert (tmp_path / f"ring-{kind}.png").stat().st_size > 10_000
 
@@ -66,6 +69,13 @@ def test_the_picture_of_a_wheel_at_speed_shows_its_frequencies_there():
     assert len(axis.lines) == len(at_speed) + 1
     drawn = [line.get_ydata() for line in axis.lines[: len(at_speed)]]
     assert np.array(drawn) == pytest.approx(at_speed, nan_ok=True)
+    axis, = plot_diameters(found, speed=-300.0).axes
+    other_way = np.hstack(found.rotation.frequencies_hz(300.0)[::-1]).T
+    drawn = [line.get_ydata() for line in axis.lines[: len(other_way)]]
+    assert np.array(drawn) == pytest.approx(other_way, nan_ok=True)
+    assert axis.lines[-1].get_ydata().min() == 0.0
     axis, = plot_diameters(found).axes
     drawn = [line.get_ydata() for line in axis.lines[:3]]
     assert np.array(drawn) == pytest.approx(found.frequencies_hz.T, nan_ok=True)
+    with pytest.raises(InputError, match="leave it out for the frequencies at rest"):
+        plot_diameters(found, speed=0.0)

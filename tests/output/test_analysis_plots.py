@@ -9,6 +9,7 @@ from synthetic import basis, run
 from fecontact import Drive, InputError, Load, PointLoad, simulate, write_case
 from fecontact.analysis import history, receptance
 from fecontact.analysis.histories import usual_component, usual_point
+from fecontact.analysis.summaries import largest_displacement
 from fecontact.cli import execute, plot_kinds
 from fecontact.integrate import Rodas5P
 from fecontact.integrate.rodas5p import driver
@@ -188,7 +189,7 @@ def test_the_default_point_is_one_that_is_displaced(trajectory):
     assert usual_point(replace(body, T=T)) == "C"
     blind = replace(trajectory, system=replace(
         trajectory.system, basis=replace(body, T=np.zeros_like(T))))
-    for draw in (plot_phase, history):
+    for draw in (plot_phase, history, largest_displacement):
         with pytest.raises(InputError, match=r"No moving point .* points = { tip = \[x, y\] }"):
             draw(blind)
     assert plot_history(blind, [(0.2, 0.02)]).axes[0].lines

@@ -152,7 +152,7 @@ def diameters(
             seen = {"at rest [Hz]": found.frequencies_hz, **dict(zip((
                 f"{way} at {turning.speed:g} rad/s [Hz]" for way in ("forwards", "backwards")),
                 at_speed, strict=True))}
-            speed = turning.speed if speed is None else speed
+            speed = (turning.speed or None) if speed is None else speed
         show(table("diameter", *seen, left=1 + len(seen), rows=(
             (str(k), *(", ".join(f"{value:.5g}" for value in values[row][np.isfinite(values[row])])
                        for values in seen.values()))

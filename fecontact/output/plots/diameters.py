@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fecontact.core.checks import require_kind
-from fecontact.core.errors import require_positive
+from fecontact.core.errors import InputError, require_finite
 from fecontact.output.diagrams.colours import COLOURS, distinct_colours
 from fecontact.output.diagrams.diagram import Curve, Diagram
 from fecontact.output.plots.drawing import draw
@@ -32,18 +32,21 @@ def plot_diameters(
     found : SectorModes
         Result of :func:`fecontact.reduction.sector_modes`.
     speed : float, optional
-        Speed of rotation, positive [rad/s].
+        Speed of rotation other than zero [rad/s]; positive from sector s to s + 1.
     path : str or Path, optional
         A .png, .pdf or .svg file to write too; it is replaced if it exists.
 
     Raises
     ------
     InputError
-        For a speed that is not positive, another suffix, or a file that cannot be written.
+        For a speed of zero or none that is finite, another suffix, or a file that cannot be written.
     """
     require_kind("plot_diameters", SectorModes, found=found)
     if speed is not None:
-        require_positive("plot_diameters", speed=speed)
+        require_finite("plot_diameters", speed=speed)
+        if speed == 0.0:
+            raise InputError("plot_diameters: speed = 0 has no engine orders; leave it out for the "
+                             "frequencies at rest.")
     ways = {"": found.frequencies_hz}
     if speed is not None and found.rotation is not None:
         ways = dict(zip(("forwards", "backwards"), found.rotation.frequencies_hz(speed),
@@ -55,10 +58,10 @@ def plot_diameters(
               for column, colour in enumerate(distinct_colours(hertz.shape[1]))]
     if speed is not None:
         N = found.symmetry.sectors
-        orders = np.arange(int(2.0 * np.pi * top / speed) + 2)
+        orders = np.arange(int(2.0 * np.pi * top / abs(speed)) + 2)
         folded = np.abs((orders + N // 2) % N - N // 2)
         curves.append(Curve(f"engine orders at {speed:g} rad/s", COLOURS[6], folded,
-                            np.asarray(orders * speed / (2.0 * np.pi)), 0.9, 2.0,
+                            np.asarray(orders * abs(speed) / (2.0 * np.pi)), 0.9, 2.0,
                             dashed=True))
     diagram = Diagram("nodal diameter", "frequency [Hz]", tuple(curves), y_limits=(0.0, top))
     with new_figure(7.0, 5.0, path) as figure:
