@@ -39,7 +39,7 @@ def plot_diameters(
     Raises
     ------
     InputError
-        For a speed of zero or none that is finite, another suffix, or a file that cannot be written.
+        For a speed that is zero or not finite, another suffix, or a file that cannot be written.
     """
     require_kind("plot_diameters", SectorModes, found=found)
     if speed is not None:
