@@ -15,7 +15,8 @@ from fecontact.core.tables import located
 from fecontact.core.units import quantity
 from fecontact.integrate.trajectory import Trajectory
 
-_NOT_COMPARED = ("render", "output")  # sections of a study without influence on the motion
+# Sections of a study without influence on the motion.
+_NOT_COMPARED = ("render", "output", "sweep", "fit")
 _LONGEST = 60  # letters of a value in a table
 
 

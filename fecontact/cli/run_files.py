@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from glob import escape
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 
 from fecontact.cli.console import echo, loading, note
@@ -111,12 +112,33 @@ def tell_replaced(study: "Study", file: Path, changes: Iterable[str] | None) -> 
 def write_results_of_run(
     study: "Study", trajectory: "Trajectory", folder: Path
 ) -> list[Path]:
-    """Write a run and its plots into a folder; returns the files."""
+    """Write a run and its plots into a folder; returns the files.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written. A run that cannot be written there goes to a temporary folder;
+        the message says where it is.
+    """
     from fecontact.output.files.case import write_case
 
-    case = write_case(folder / f"{study.name}.vtkhdf", trajectory, frames=study.output.frames,
-                      study=study.to_toml(), root=study.folder)
-    return [case, *write_plots(study, trajectory, folder)]
+    def write(path: Path) -> Path:
+        return write_case(path, trajectory, frames=study.output.frames, study=study.to_toml(),
+                          root=study.folder)
+
+    path = folder / f"{study.name}.vtkhdf"
+    try:
+        write(path)
+    except InputError as error:
+        try:
+            kept = write(Path(mkdtemp(prefix="fecontact-")) / path.name)
+        except (InputError, OSError):
+            raise error from None
+        raise InputError(f"{str(error).removesuffix('.')}; the run is kept in {kept}.") from None
+    try:
+        return [path, *write_plots(study, trajectory, folder)]
+    except InputError as error:
+        raise InputError(f"{str(error).removesuffix('.')}; the run is in {path}.") from None
 
 
 def write_plots(study: "Study", trajectory: "Trajectory", folder: Path) -> list[Path]:
@@ -287,6 +309,7 @@ def stored_run(
         from fecontact.system.model_limits import warn_of_limits
 
         warn_of_limits(exceeded, "In this run")
+    _warn_of_gaps(path, case.trajectory)
     current = study is None or _same_run(study, case.study, trust)
     if current:
         warn_of_changed_files(path)
@@ -324,9 +347,21 @@ def stored_or_computed_run(
     if found is not None:
         case = read_case(path, trust=known)
         if _same_run(study, case.study, trust) and not _changed_since(study, case.study):
+            _warn_of_gaps(path, case.trajectory)
             return StoredRun(path, case.trajectory, study.render, True, case.study, case.versions)
     _ = study.t_end
     return StoredRun(path, study.run(True), study.render, True, study.to_toml())
+
+
+def _warn_of_gaps(file: Path, run: "Trajectory") -> None:
+    """Print one line if some output times of a stored run have no numbers."""
+    import numpy as np
+
+    bad = np.flatnonzero(~np.isfinite(run.states).all(axis=1))
+    if len(bad):
+        note(f"warning: {file} has a motion that is not finite at {len(bad)} of {len(run.time)} "
+             f"output times, first at {run.time[bad[0]]:.6g} s; plots and exported data have gaps "
+             f"there.")
 
 
 def _same_run(study: "Study", stored: str | None, trust: bool) -> bool:

@@ -49,15 +49,18 @@ class RecordedContact:
     def merged(self, kept: KeptSteps, order: Integers) -> "RecordedContact | None":
         """Forces and states of these outputs and of what was kept between them, in this order.
 
-        None if forces were not kept.
+        None if forces were not kept, or not recorded at the outputs.
         """
         normal, friction, state = kept.normal_force, kept.friction_force, kept.contact_state
         if normal is None or friction is None:
             return None
         along = {columns.FRICTION_FORCE: friction} if friction.ndim == 2 else {
             columns.FRICTION_FORCE: friction[..., 0], columns.FRICTION_ACROSS: friction[..., 1]}
+        between = {columns.NORMAL_FORCE: normal} | along
+        if not between.keys() <= self.contact.keys():
+            return None
         return RecordedContact(
             {column: np.concatenate([self.contact[column], values])[order]
-             for column, values in ({columns.NORMAL_FORCE: normal} | along).items()},
+             for column, values in between.items()},
             None if state is None or self.contact_state is None else
             np.concatenate([self.contact_state, state])[order])

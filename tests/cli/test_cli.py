@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from tiny_study import TINY
 
-from fecontact import Mesh, Status, Study, read_case, read_mesh, write_mesh
+from fecontact import InputError, Mesh, Status, Study, read_case, read_mesh, write_mesh
 from fecontact.cli import doctor as examination
 from fecontact.cli import execute
 from fecontact.core import system_libraries
@@ -466,9 +466,10 @@ def test_an_interrupted_run_is_resumed(cli, study, monkeypatch, tmp_path):
     assert (code, err) == (1, f"error: {checkpoint} holds an interrupted run; go on with --resume, "
                               f"start again with --overwrite, or choose another folder with -o.\n")
     assert cli("run", study, "--resume", "--overwrite")[0] == 1
-    code, _, err = cli("run", study, "--resume")
+    code, _, err = cli("run", study, "--resume", "--set", "ground.speed=0.3")
     assert code == 1
     assert "another run" in err
+    assert "will be replaced" not in err
     assert "repeat the values of that run, remove the file or name another one" in err
     assert checkpoint.read_bytes() == kept
     assert cli("run", study, *longer, "--resume")[0] == 0
@@ -479,6 +480,33 @@ def test_an_interrupted_run_is_resumed(cli, study, monkeypatch, tmp_path):
     checkpoint.write_bytes(kept)
     assert cli("run", study, *longer, "--overwrite")[0] == 0
     assert not checkpoint.exists()
+
+
+def test_a_run_that_cannot_be_written_is_kept_elsewhere(cli, study, monkeypatch, tmp_path):
+    from fecontact.output.files import case
+    from fecontact.output.plots import run as plots
+
+    def full(path, *_, **__):
+        raise InputError(f"{path} cannot be written (no space left on device).")
+
+    write, other = case.write_case, tmp_path / "other"
+    other.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(other))
+    monkeypatch.setattr(case, "write_case", lambda path, *rest, **options: (
+        write if other in path.parents else full)(path, *rest, **options))
+    code, out, err = cli("run", study)
+    kept, = other.rglob("tiny.vtkhdf")
+    assert (code, out) == (1, "")
+    assert err == (f"error: {tmp_path}/results/tiny.vtkhdf cannot be written (no space left on "
+                   f"device); the run is kept in {kept}.\n")
+    assert read_case(kept).trajectory.status is Status.FINISHED
+    monkeypatch.setattr(case, "write_case", full)
+    assert cli("run", study)[2].endswith("(no space left on device).\n")
+    monkeypatch.setattr(case, "write_case", write)
+    monkeypatch.setattr(plots, "plot_energies", lambda run, path: full(path))
+    err = cli("run", study)[2]
+    assert err.endswith(f"device); the run is in {tmp_path}/results/tiny.vtkhdf.\n")
+    assert read_case(tmp_path / "results" / "tiny.vtkhdf").trajectory.status is Status.FINISHED
 
 
 def test_help_comes_at_once_and_version_is_said():

@@ -547,6 +547,25 @@ def test_a_checkpoint_goes_on_bit_for_bit(tmp_path):
         simulate(oscillator(), 10.0, outputs=21, solver=Rodas5P(path))
 
 
+def test_a_checkpoint_that_cannot_be_written_does_not_end_a_run(tmp_path, monkeypatch):
+    from fecontact.integrate.rodas5p import checkpoint
+
+    def full(path):
+        raise InputError(f"{path} cannot be written (no space left on device).")
+
+    def stop(time):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(checkpoint, "replaced", full)
+    monkeypatch.setattr(checkpoint.Checkpoint, "period", -1.0)
+    solver = Rodas5P(tmp_path / "run.checkpoint")
+    whole = simulate(oscillator(), 10.0, outputs=21)
+    assert (simulate(oscillator(), 10.0, outputs=21, solver=solver).states == whole.states).all()
+    part = simulate(oscillator(), 10.0, outputs=21, progress=stop, solver=solver)
+    assert part.status is Status.INTERRUPTED
+    assert part.statistics["message"].endswith("cannot be written (no space left on device).")
+
+
 def test_other_errors_in_progress_are_passed_on():
     def fail(_):
         raise ZeroDivisionError

@@ -24,6 +24,7 @@ from fecontact.system.columns import POWERS
 TURN = 2.0 * np.pi
 STUDIES = ("[ground]\nspeed = 0.1\n[output]\nframes = 3\n",
            "[ground]\nspeed = 0.2\n[output]\nframes = 5\n"
+           "[sweep]\nkeep = 'histories'\n[sweep.axes]\n'ground.speed' = [0.1]\n"
            "[friction]\nlaw = 'constant'\nfriction_coefficient = 0.55\n")
 
 
@@ -81,13 +82,18 @@ def test_the_page_of_a_comparison(runs, tmp_path):
         assert frequency[height.argmax()] == pytest.approx(hertz, abs=0.3)
 
 
-def test_what_cannot_be_compared(runs):
+def test_what_cannot_be_compared(runs, tmp_path):
     with pytest.raises(InputError, match="1 run cannot be compared; give two or more"):
         compare_runs({"slow": runs["slow"]})
     with pytest.raises(InputError, match="1 studies do not match 2 runs"):
         compare_runs(runs, studies=[None])
     with pytest.raises(InputError, match="slow: Contact node 9 does not exist; there are 5"):
         compare_runs(runs, [9])
+    q = runs["fast"].modal_coordinates.copy()
+    q[80] = np.nan
+    gap = replace(runs["fast"], modal_coordinates=q)
+    with pytest.raises(InputError, match=r"fast has a motion that is not finite at t = 0\.1 s"):
+        report_runs({**runs, "fast": gap}, tmp_path / "a.html")
 
 
 def clamped(run, *points):

@@ -12,6 +12,7 @@ from systems import friction_oscillator, impact_oscillator
 
 import fecontact as fc
 from fecontact.analysis.resolved import resolved
+from fecontact.cli import execute
 from fecontact.integrate import SetValued
 from fecontact.integrate.trajectory import StoredSystem
 from fecontact.output.files.case import stored_case
@@ -84,6 +85,26 @@ def test_a_file_whose_laws_are_damaged_is_drawn_and_refused_by_read_case(stored,
     assert fc.plot.plot_history(stored_case(broken).trajectory).axes
     with pytest.raises(fc.InputError, match="no_such_key"):
         fc.read_case(broken)
+
+
+def test_runs_without_a_recorded_quantity_or_with_gaps_are_drawn(stored, tmp_path, capsys):
+    """Files changed by other programs: forces follow from the laws, gaps are told."""
+    import h5py
+
+    run, file = stored
+    changed = tmp_path / "changed.vtkhdf"
+    changed.write_bytes(file.read_bytes())
+    with h5py.File(changed, "r+") as content:
+        del content["trajectory/normal_force"]
+    drawn = [fc.plot.plot_history(one).axes for one in (stored_case(changed).trajectory, run)]
+    for panels in zip(*drawn, strict=True):
+        for lines in zip(*(axis.lines for axis in panels), strict=True):
+            one, other = (line.get_ydata() for line in lines)
+            np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-6 * np.abs(other).max())
+    with h5py.File(changed, "r+") as content:
+        content["trajectory/modal_coordinates"][2] = np.nan
+    assert execute(["plot", str(changed), "phase", "-o", str(tmp_path / "phase.png")]) == 0
+    assert "not finite at 1 of" in capsys.readouterr().err
 
 
 def test_forces_of_set_valued_contact_keep_all_digits(tmp_path):

@@ -322,7 +322,8 @@ def run(
         elif resume and not checkpoint.exists():
             raise InputError(f"There is no interrupted run to go on with: {checkpoint} does not "
                              f"exist; run the study without --resume.")
-        tell_replaced(described, folder / f"{described.name}.vtkhdf", set_)
+        if not resume:  # which goes on with equal values only
+            tell_replaced(described, folder / f"{described.name}.vtkhdf", set_)
         trajectory = described.run(True, checkpoint)
         from fecontact.analysis.run_facts import notes
 
@@ -337,7 +338,7 @@ def run(
         for note in notes(trajectory):
             echo(f"note: {note}")
         echo_written(*files)
-    if ended == "INTERRUPTED":
+    if ended == "INTERRUPTED" and checkpoint.exists():
         changes = [part for change in set_ or () for part in ("--set", change)]
         place = [] if output is None else ["-o", str(output)]
         again = shlex.join(["fecontact", "run", str(study), *changes, *place, "--resume"])

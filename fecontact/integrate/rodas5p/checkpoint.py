@@ -2,6 +2,7 @@
 
 import hashlib
 import time as clock
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -110,9 +111,14 @@ class Checkpoint:
         return [] if self.run.series is None else [self.run.series.states]
 
     def keep(self) -> None:
-        """Write the file if the last time was some while ago."""
+        """Write the file if the last time was some while ago, and if it can be written.
+
+        A full disk does not end the run.
+        """
         if clock.monotonic() - self._written > self.period:
-            self.write()
+            self._written = clock.monotonic()
+            with suppress(InputError):
+                self.write()
 
     def write(self) -> None:
         """Write the file, whole or not at all."""

@@ -307,12 +307,15 @@ def integrate(task: Task, method: str, checkpoint: Path | None) -> Solution:
     if stored is not None:
         stored.read()
     ended = complete(run, task.progress, None if stored is None else stored.keep)
-    if stored is not None and ended is Status.INTERRUPTED:
-        stored.write()
     statistics: dict[str, Any] = {"method": run.method, **run.statistics,
                                   "seconds": clock.perf_counter() - begin}
     if ended not in (Status.FINISHED, Status.EVENT):
         statistics["message"] = f"{_place(run, ended)}"
+    if stored is not None and ended is Status.INTERRUPTED:
+        try:
+            stored.write()
+        except InputError as error:
+            statistics["message"] += f" {error}"
     times, states, work = until_end(
         run, (run.states, run.progress.state), (run.work, run.progress.work))
     begun, counts = (float(times[0]), run.states[0]), run.problem.control.slider_counts

@@ -51,10 +51,10 @@ def frame_indices(
     first = 0 if t_start is None else int(np.searchsorted(time, t_start, side="left"))
     last = len(time) if t_end is None else int(np.searchsorted(time, t_end, side="right"))
     if first >= last:
-        begin, end = (f"{time[k] if given is None else given:g} s"
+        begin, end = (f"{time[k]:g}" if given is None else given
                       for k, given in ((0, t_start), (-1, t_end)))
-        raise InputError(f"There is no output time from {begin} to {end}; the run has times from "
-                         f"{time[0]:g} s to {time[-1]:g} s.")
+        raise InputError(f"There is no output time from {begin} s to {end} s; the run has times "
+                         f"from {time[0]:g} s to {time[-1]:g} s.")
     chosen = np.arange(first, last)
     if frames >= len(chosen):
         return chosen

@@ -9,6 +9,7 @@ import numpy as np
 
 from fecontact.analysis.comparison import compare_runs, compared_points
 from fecontact.analysis.histories import Point, component_of, history
+from fecontact.core.errors import InputError
 from fecontact.integrate.trajectory import Status, Trajectory
 from fecontact.output.diagrams.colours import distinct_colours
 from fecontact.output.diagrams.diagram import Curve, Diagram
@@ -52,11 +53,17 @@ def report_runs(
     Raises
     ------
     InputError
-        As in :func:`fecontact.analysis.compare_runs`, for another suffix, or a file that cannot be
-        written.
+        As in :func:`fecontact.analysis.compare_runs`, for motions that are not finite, another
+        suffix, or a file that cannot be written.
     """
     path = require_page(path)
     found = compare_runs(runs, points, studies=studies)
+    for name, run in runs.items():
+        bad = np.flatnonzero(~np.isfinite(run.states).all(axis=1))
+        if len(bad):
+            raise InputError(f"{name} has a motion that is not finite at t = "
+                             f"{run.time[bad[0]]:.6g} s; run it again, or compare a part without "
+                             f"this time, in Python by its method between.")
     first = next(iter(runs.values()))
     component = component_of(first) if component is None else component
     chosen: Sequence[Point] = compared_points(runs, points)
