@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from fecontact.study.study import Study
 
 _FREQUENCIES = 801  # of a measured wheel
+_FAR = 2.0  # distance of the bound from the largest amplification, as a multiple of their range
 
 
 @dataclass(frozen=True)
@@ -122,10 +123,15 @@ def measured_wheel(study: "Study", folder: Path) -> list[Path]:
 
 
 def _draw_random(found: MistuningSweep, path: Path) -> None:
-    """Histogram of the amplifications with Whitehead's bound."""
+    """Histogram of the amplifications with Whitehead's bound, as a line if it is not far off."""
+    known, bound = found.amplifications, f"Whitehead's bound {found.bound:.4g}"
+    range_of_wheels = float(np.ptp(known))
     with new_figure(6.4, 4.0, path) as figure:
         axes = figure.subplots()
-        axes.hist(found.amplifications, bins="auto", color=COLOURS[0])
-        axes.axvline(found.bound, color=COLOURS[1], linestyle="--", label="Whitehead's bound")
+        axes.hist(known, bins="auto", color=COLOURS[0])
         axes.set(xlabel="amplification", ylabel="wheels")
-        axes.legend()
+        if 0.0 < _FAR * range_of_wheels < found.bound - known.max():
+            axes.set_title(bound, loc="right", fontsize=9)
+        else:
+            axes.axvline(found.bound, color=COLOURS[1], linestyle="--", label=bound)
+            axes.legend()

@@ -29,6 +29,7 @@ _FAILED = "#c8c4bc"
 _LEAST_OF_MAP = 3  # values of each parameter
 _LEAST_OF_DOTS = 200  # cases up to which ascending ones are joined by a line
 _AXES: tuple[Literal["x", "y"], ...] = ("x", "y")
+_LETTERS = 9.0  # of names along an axis, per inch
 _MOST_TICKS, _SHORT = 8, 4  # named cells along an axis of a map, and digits of their values
 
 
@@ -286,10 +287,21 @@ def _draw_over(
     draw(axes, diagram)
     _mark_failed(axes, table, x)
     if labels is not None:
-        axes.set_xticks(range(len(labels)), labels)
+        _name_places(axes, labels)
     elif logarithmic:
         _logarithmic(axes, "x")
         name_axis(axes, "x", diagram.x_label, x)
+    elif all(isinstance(value, int) for value in table.parameters[parameter]):
+        axes.locator_params(axis="x", integer=True)
+
+
+def _name_places(axes: "Axes", labels: list[str]) -> None:
+    """Name the places 0, 1, ... along x, each with equal space; long names are turned."""
+    axes.set_xticks(range(len(labels)), labels)
+    axes.set_xlim(-0.5, len(labels) - 0.5)
+    inches = axes.get_window_extent().width / axes.figure.dpi
+    if max(map(len, labels)) * len(labels) > _LETTERS * inches:
+        axes.set_xticks(range(len(labels)), labels, rotation=30, ha="right", rotation_mode="anchor")
 
 
 def _places(values: Sequence[Any]) -> tuple[Array, list[str] | None]:

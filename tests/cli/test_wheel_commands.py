@@ -1,7 +1,9 @@
 """One sector of a wheel as a study: responses, waves, mistuning by their commands, messages."""
 
 import shutil
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import platform_damper as example
@@ -10,8 +12,9 @@ import pytest
 import fecontact as fc
 from fecontact import InputError, Study
 from fecontact.analysis import mistuned_response
-from fecontact.cli import execute
+from fecontact.cli import execute, mistuning_results
 from fecontact.output.files.branches import read_mode, read_response
+from fecontact.output.plots.figure import new_figure
 from fecontact.reduction import WholeWheel
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -118,6 +121,27 @@ def test_random_wheels_are_kept(tmp_path, capsys):
     assert "--resume" in capsys.readouterr().err
     assert execute([*command, "--resume"]) == 0
     assert (tmp_path / "wheel-mistuning.csv").read_text() == first
+
+
+def test_a_bound_far_off_leaves_space_for_the_histogram(tmp_path, monkeypatch):
+    seen = []
+
+    @contextmanager
+    def kept(*given):
+        with new_figure(*given) as figure:
+            yield figure
+        seen.append(figure.axes[0])
+
+    monkeypatch.setattr(mistuning_results, "new_figure", kept)
+    for largest, lines in ((1.02, 0), (1.5, 1)):
+        wheels = SimpleNamespace(amplifications=np.linspace(1.0, largest, 50), bound=1.725)
+        mistuning_results._draw_random(wheels, tmp_path / "wheels.png")
+        axes = seen[-1]
+        assert len(axes.lines) == lines
+        low, high = axes.get_xlim()
+        assert largest - 1.0 > 0.3 * (high - low)
+        said = axes.get_title("right") if not lines else axes.get_legend().texts[0].get_text()
+        assert said == "Whitehead's bound 1.725"
 
 
 def test_dampers_of_a_study_are_those_of_the_example(tmp_path):

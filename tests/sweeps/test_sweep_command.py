@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -316,6 +317,21 @@ def test_curves_scatter_and_names_on_axes():
     assert [axes.get_xlabel() for axes in figure.axes] == [
         "ground speed [m/s]", "load normal [N]", "cases"]
     assert figure.axes[2].patches
+
+
+def test_names_on_axes_stay_apart_and_numbers_of_modes_are_whole():
+    laws = ("exponential", "aluminium") * 4
+    table = SweepTable(
+        {"basis.modes": (3, 4) * 4, "friction.law": laws, "basis.reduction": laws,
+         "body.material": tuple(f"materials/measured-{law}.csv" for law in laws)},
+        {"amplitude_x": np.arange(8.0)}, [f"{k}" for k in range(8)], [""] * 8)
+    figure = plots.plot_sweep(table, "amplitude_x")
+    figure.canvas.draw()
+    modes, law, other, material = figure.axes[:4]
+    assert all(label.get_text().isdecimal() for label in modes.get_xticklabels())
+    names = [label.get_window_extent() for axes in (law, other) for label in axes.get_xticklabels()]
+    assert all(left.x1 < right.x0 for left, right in pairwise(names))
+    assert [label.get_rotation() for label in material.get_xticklabels()] == [30.0, 30.0]
 
 
 def test_plots_of_sweeps_as_files(tmp_path):
