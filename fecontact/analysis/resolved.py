@@ -92,50 +92,55 @@ def _coarse(run: Trajectory, error: float) -> Flags:
     moved, rates = _motion(run)
     sizes, rate_sizes = _ranges(moved, rates, float(np.diff(run.time).max()))
     normal, friction = run.normal_force, run.friction_forces
-    forces = np.column_stack([normal.sum(axis=1), friction.sum(axis=1)])
-    large = np.abs(forces).max(axis=0)
-    spread = np.maximum(np.ptp(forces, axis=0), _SMALL_FORCE * large)
-    each = max(float(np.ptp(normal, axis=0).max(initial=0.0)), _SMALL_FORCE * float(large[0]))
+    forces = np.vstack([normal.sum(axis=1), friction.sum(axis=1).T])
+    large = np.abs(forces).max(axis=1)
+    spread = np.maximum(np.ptp(forces, axis=1), _SMALL_FORCE * large)
+    each_node = np.ascontiguousarray(normal.T)
+    each = max(float(np.ptp(each_node, axis=1).max(initial=0.0)), _SMALL_FORCE * float(large[0]))
     flags = np.zeros(len(run.time) - 1, dtype=bool)
     for values, scale in ((moved, sizes), (rates, rate_sizes), (forces, spread),
-                          (normal, np.full(normal.shape[1], each))):
-        flags |= _bent(run.time, values[:, scale > 0.0] / scale[scale > 0.0], error)
+                          (each_node, np.full(len(each_node), each))):
+        flags |= _bent(run.time, values[scale > 0.0] / scale[scale > 0.0, None], error)
     # Outputs once per period look like rest; only their velocities reveal motion.
-    h = np.diff(run.time)[:, None]
+    h = np.diff(run.time)
     used = sizes > 0.0
-    gone = np.diff(moved, axis=0) - 0.5 * h * (rates[1:] + rates[:-1])
-    flags |= (np.abs(gone[:, used]) > error * sizes[used]).any(axis=1)
+    gone = np.diff(moved, axis=1) - 0.5 * h * (rates[:, 1:] + rates[:, :-1])
+    flags |= (np.abs(gone[used]) > error * sizes[used, None]).any(axis=0)
     return np.asarray(flags)
 
 
 def _bent(time: Array, values: Array, error: float) -> Flags:
-    """Intervals in which values (N, k), scaled by their ranges, deviate too far from the chord.
+    """Intervals in which values (k, N), scaled by their ranges, deviate too far from the chord.
 
     The curvature of an interval is the smaller of those at its ends: that at one end may be of a
     jump in the interval next to it.
     """
-    if len(time) < 3 or not values.shape[1]:
-        return np.zeros(len(time) - 1, dtype=bool)
+    flags = np.zeros(len(time) - 1, dtype=bool)
+    if len(time) < 3 or not len(values):
+        return flags
     h = np.diff(time)
-    part = (h[:-1] / (h[:-1] + h[1:]))[:, None]
-    middle = (1.0 - part) * values[:-2] + part * values[2:]
+    part = h[:-1] / (h[:-1] + h[1:])
+    middle = (1.0 - part) * values[:, :-2] + part * values[:, 2:]
     # A parabola deviates from the chord of half an interval by a quarter of its deviation from
     # the chord of the whole interval.
-    off = 0.25 * np.abs(values[1:-1] - middle)
-    at_end, at_begin = np.full((2, len(h), values.shape[1]), np.inf)
-    at_end[:-1] = off * np.minimum(h[:-1] / h[1:], 1.0)[:, None]
-    at_begin[1:] = off * np.minimum(h[1:] / h[:-1], 1.0)[:, None]
-    return np.asarray((np.minimum(at_end, at_begin) > error).any(axis=1))
+    off = 0.25 * np.abs(values[:, 1:-1] - middle)
+    at_end = off * np.minimum(h[:-1] / h[1:], 1.0) > error
+    at_begin = off * np.minimum(h[1:] / h[:-1], 1.0) > error
+    flags[0], flags[-1] = at_end[:, 0].any(), at_begin[:, -1].any()
+    flags[1:-1] = (at_end[:, 1:] & at_begin[:, :-1]).any(axis=0)
+    return flags
 
 
 def _motion(run: Trajectory) -> tuple[Array, Array]:
-    """Displacements and velocities (N, k) of the named points and selected contact nodes."""
+    """Displacements and velocities (k, N) of the named points and selected contact nodes."""
     basis = run.basis
     n = basis.contact_nodes
     nodes = 2 + np.unique(np.linspace(0, n - 1, min(n, _NODES)).astype(int))
     points = np.concatenate([[0, 1], nodes, np.arange(2 + n, len(basis.T))])
     rows = basis.T[points, : basis.dimension].reshape(-1, basis.modes)
-    return run.modal_coordinates @ rows.T, run.modal_velocities @ rows.T
+    # Ranges and curvatures over time are faster along rows.
+    moved, rates = run.modal_coordinates @ rows.T, run.modal_velocities @ rows.T
+    return np.ascontiguousarray(moved.T), np.ascontiguousarray(rates.T)
 
 
 def _ranges(moved: Array, rates: Array, spacing: float) -> tuple[Array, Array]:
@@ -144,7 +149,7 @@ def _ranges(moved: Array, rates: Array, spacing: float) -> tuple[Array, Array]:
     At rest, displacements change by rounding only, also by the velocities over the ``spacing`` of
     outputs.
     """
-    ranges, speeds = np.ptp(moved, axis=0), np.ptp(rates, axis=0)
+    ranges, speeds = np.ptp(moved, axis=1), np.ptp(rates, axis=1)
     change = max(ranges.max(initial=0.0), spacing * np.abs(rates).max(initial=0.0))
     if change <= _ROUNDING * np.abs(moved).max(initial=0.0):
         return np.full_like(ranges, np.inf), np.full_like(speeds, np.inf)
