@@ -79,7 +79,7 @@ def _resolved(run: Trajectory) -> Resolved:
         between = np.searchsorted(run.time, kept.time) - 1
         rows = flags[np.clip(between, 0, len(flags) - 1)]
         if rows.any():
-            run = run.joined(kept.part(rows))
+            run = run.joined(kept if rows.all() else kept.part(rows))
         reason = "it was too long to keep more between them; give it more outputs"
     if flags.any():
         flags = _coarse(run, _TOLD_ERROR)
