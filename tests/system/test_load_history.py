@@ -51,21 +51,6 @@ def chain(k=1e4, friction=None, forces=0.0):
                          load=Load(forces=(PointLoad(1, "x", signal=Constant(forces)),)))
 
 
-def test_increments_without_work_are_not_cut():
-    """A spring turns a block on one node about it: all works are rounding, and none is friction."""
-    body = fc.ElasticBody(fc.Mesh.grid(np.linspace(-0.02, 0.02, 9), np.linspace(0.0, 0.03, 5)),
-                          fc.Material(7e10, 0.3, 2700.0), 0.01)
-    basis = fc.modal_basis(body, 20, contact="bottom", contact_nodes=1, C="top", B="left")
-    for stiffness in (3e8, 3e9):
-        system = ContactSystem(
-            basis, normal=LinearContact(stiffness), friction=ConstantFriction(0.4),
-            load=Load(2000.0), drive=Drive(stiffness_x=5e8))
-        history = load_history(system, LoadPath(motion_x=(0.0, 1e-6), steps=2))
-        assert history.status == "finished"
-        assert history.statistics["solved"] < 10
-        assert history.friction_force[-1].sum() == pytest.approx(0.0, abs=1e-6)
-
-
 def test_loop_of_a_jenkins_element():
     """The loss is 4 mu F (X - mu F / k) for any number of increments."""
     k, mu, F, X = 2e4, 0.4, 10.0, 5e-4

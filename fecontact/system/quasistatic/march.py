@@ -49,7 +49,7 @@ SOLVED, CUT, JUMPS = range(COUNTS)
 # Shortest increments, as parts of the one asked for: at a jump, and where none is in equilibrium.
 _SHORTEST, _LEAST = 2.0**-40, 2.0**-20
 # Energies that are noise beside all works of an increment: forces balance to 1e-13 at best.
-_UNRESOLVED, _BALANCED = 1e-11, 1e-13
+_UNRESOLVED = 1e-11
 # Entries of the turnover of an increment.
 ERROR, TURNED, GAP, PRESSED = range(4)
 # Abscissae and weights of Gauss on [0, 1].
@@ -237,22 +237,6 @@ def _measure(
 
 
 @helper
-def _unbalanced(pose, s):
-    """Energy that is rounding: errors of contact forces, on displacements summed over the modes."""
-    total = 0.0
-    for j in range(len(pose.node)):
-        for axis in range(s.rows.shape[1]):
-            # Rows are those of the first tangent, the normal and, in space, the second tangent.
-            force = pose.node[j, FORCE] if axis == 1 else pose.node[
-                j, AGAINST + PER_TANGENT * (axis // 2)]
-            moved = 0.0
-            for i in range(len(pose.q)):
-                moved += abs(s.rows[j, axis, i] * pose.q[i])
-            total += _BALANCED * abs(force) * moved
-    return total
-
-
-@helper
 def _copy(source, target):
     """Copy a pose."""
     put(source.q, target.q)
@@ -304,7 +288,7 @@ def march(
             floor = rubbed + pressed
             for i in range(len(WORKS)):
                 floor += abs(part[i])
-            floor = min(_UNRESOLVED, 0.01 * rtol) * floor + _unbalanced(new, s) + 1e-300
+            floor = min(_UNRESOLVED, 0.01 * rtol) * floor + 1e-300
             excess = max(turnover[ERROR] / (rtol * max(rubbed, rubbing + turned) + floor),
                          turnover[GAP] / (rtol * max(pressed, pressing + heaved) + floor))
         if not solved and (row == 0 or length <= _LEAST):
