@@ -10,7 +10,7 @@ import numpy as np
 
 _Owner = TypeVar("_Owner", bound=type)
 _PLAIN = (int, float, bool, str)
-# Kinds of values that hold no array; those met most often are told by their type alone.
+# Types of values that hold no array.
 _WITHOUT_ARRAYS = frozenset({*_PLAIN, type(None), np.float64, np.bool_})
 
 
