@@ -245,3 +245,48 @@ def test_forces_by_name_are_those_of_the_system_or_further_ones():
     for name, said in (("D.x", "no point 'D'"), ("C.u", "component 'u'"), ("C", "a point and a")):
         with pytest.raises(InputError, match=said):
             load_history(there, LoadPath(forces={name: turn}))
+
+
+def elastic_block(nodes, stiffness, fixed=None, modes=20):
+    """A block of aluminium on a flat ground, held at its top, or free and drawn by a spring."""
+    body = fc.ElasticBody(
+        fc.Mesh.grid(np.linspace(-0.02, 0.02, 17), np.linspace(0.0, 0.03, 9)),
+        fc.Material(70e9, 0.3, 2700.0), 0.01, fixed=fixed or {})
+    if fixed:
+        return ContactSystem(fc.modal_basis(body, modes, contact="bottom", contact_nodes=nodes),
+                             normal=LinearContact(stiffness, preload=2000.0),
+                             friction=ConstantFriction(0.4))
+    basis = fc.modal_basis(body, modes, contact="bottom", contact_nodes=nodes, C="top", B="left")
+    return ContactSystem(basis, normal=LinearContact(stiffness), friction=ConstantFriction(0.4),
+                         load=Load(2000.0), drive=Drive(stiffness_x=5e8))
+
+
+def test_rigid_sticking_of_more_nodes_than_modes_tell_apart():
+    """Forces and losses of runs by EventDriven at 20 Hz with rtol = 1e-5; a stiff spring."""
+    system = elastic_block(8, 3e9)
+    for amplitude, force, loss in ((1e-6, 243.13768, 7.05566e-6), (3e-6, 630.38091, 1.9982662e-4)):
+        path = LoadPath(motion_x=(0.0, amplitude, -amplitude, amplitude), steps=20)
+        rigid = load_history(system, path, tangential_ratio=np.inf)
+        assert rigid.status == "finished"
+        assert rigid.friction_force[20].sum() == pytest.approx(force, rel=1e-5)
+        assert rigid.loop(1, 3).loss == pytest.approx(loss, rel=1e-3)
+        stiff = load_history(system, path, tangential_ratio=1e6)
+        assert stiff.friction_force.sum(axis=1) == pytest.approx(
+            rigid.friction_force.sum(axis=1), abs=1e-3)
+
+
+def test_stiff_springs_do_not_cut_increments_without_end():
+    """Newton's method goes from one change of state to the next."""
+    system = elastic_block(4, 3e9, {"top": "xy"})
+    path = LoadPath(travel=(0.0, 1e-6, -1e-6, 1e-6), steps=10)
+    stiff, rigid = (load_history(system, path, tangential_ratio=ratio) for ratio in (1e5, np.inf))
+    assert stiff.loss[-1] == pytest.approx(rigid.loss[-1], rel=1e-4)
+    assert max(stiff.statistics["solved"], rigid.statistics["solved"]) < 250
+
+
+@pytest.mark.parametrize("stiffness", [1e8, 3e9])
+def test_works_that_are_rounding_do_not_cut_increments(stiffness):
+    """A block on one node turns about it: neither friction nor any work but rounding."""
+    history = load_history(elastic_block(1, stiffness), LoadPath(motion_x=(0.0, 1e-6), steps=2))
+    assert history.statistics == {"solved": 3, "cut": 0, "jumps": 0}
+    assert np.abs(history.friction_force).max() < 1e-9

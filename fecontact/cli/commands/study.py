@@ -270,7 +270,7 @@ def preload(
             echo(f"note: {what} {history.statistics['jumps']} times along the path.")
         echo_written(*files)
     if history.status != "finished":
-        return fail("the path of loads has no equilibrium beyond the points that are written; "
+        return fail("no equilibrium was found beyond the points of the path that are written; "
                     "lower the loads of [preload], or add a support.", 1)
     return 0
 

@@ -9,6 +9,9 @@ where a slider was left,
 
 lambda is zero for a spring c, and the force so far of a slider that sticks rigidly; c is then the
 penalty of an augmented Lagrangian, which is repeated until g = z wherever R stays below its limit.
+Where R as the next lambda leads there slowly, because modes hardly tell forces of neighbours apart,
+lambda takes the Newton step with the matrix S = T M^-1 T^T of the sliders that stick, up to the
+first one that reaches its limit.
 
 In space g, z and R have two components, along the tangents of the node: R* returns to the disc of
 radius phi F along its own direction a = R* / |R*|, with
@@ -59,10 +62,22 @@ _WRONG = 1e-6
 _SPRINGS = 1e-2
 # Newton steps in full, steps that must lead closer to balance, and shifts tried in each of these.
 _HASTY, _TRIES, _SHIFTS = 12, 60, 15
+# Changes of state that are followed, by sliders, and beside these; bisections for the place of one.
+_PIECES, _FEW_PIECES, _BISECTIONS = 2, 20, 100
+# Part of the out-of-balance force, at most, that a step across changes of state may leave.
+_LEFT = 0.5
+# States of sliders.
+_STICKS, _SLIDING, _OPEN = 0.0, 1.0, 2.0
 # Part of the typical stiffness of a mode below which rounding alone resists its motion.
 _LOOSE = 1e-13
 # Repetitions of the augmented Lagrangian, and the part of the force that may change in the last.
 _REPEATS, _SETTLED = 100, 1e-11
+# Repetitions with the force itself as the next multiplier, and then at least before rounding of the
+# forces is accepted; largest such change, as parts of the forces and of those that cancel.
+_PLAIN, _PATIENT, _ROUGHLY, _NOISY = 4, 20, 1e-9, 1e-13
+# Distance from the limit, as a part of it, below which a slider is held in Newton steps of the
+# multipliers, and a shift of their matrix, for motions that no mode resolves.
+_NEAR, _REGULAR = 1e-9, 1e-8
 # Rounding of a displacement.
 _ROUNDING = 1e-15
 # Relative distance from its limit, by rounding, at which a slider slides.
@@ -103,6 +118,8 @@ def _friction(j, tangents, pressing, sliders, pose, workspace, total, out):
             R[k] = workspace.multiplier[j, first + k] + stiffness * (g - pose.left[j, first + k])
             size = math.hypot(size, R[k])
         sticks = size <= limit * pressing
+        workspace.state[j, e] = _OPEN if pressing == 0.0 else _STICKS if sticks else (
+            _SLIDING if tangents > 1 or R[0] > 0.0 else -_SLIDING)
         turn = 0.0 if sticks or tangents == 1 else limit * pressing * stiffness / size
         for k in range(tangents):
             a = 0.0 if sticks else R[k] / size
@@ -159,6 +176,15 @@ def _size(force, scale):
     for i in range(len(scale)):
         total += force[i] ** 2 / scale[i]
     return np.sqrt(total)
+
+
+@helper
+def energy_of_forces(workspace):
+    """Energy that all forces which cancel would store in the modes [J], one by one."""
+    total = 0.0
+    for i in range(len(workspace.scale)):
+        total += workspace.acting[i] ** 2 / workspace.scale[i]
+    return total
 
 
 @kernel
@@ -307,6 +333,152 @@ def _newton(load, moved, sliders, s, pose, workspace):
     return False
 
 
+@helper
+def _same_states(workspace):
+    """Whether all sliders are in the states kept before."""
+    for j in range(workspace.state.shape[0]):
+        for e in range(workspace.state.shape[1]):
+            if workspace.state[j, e] != workspace.state_before[j, e]:
+                return False
+    return True
+
+
+@helper
+def _go(part, q, workspace):
+    """Go a part of the step from its begin."""
+    for i in range(len(q)):
+        q[i] = workspace.base[i] + part * workspace.step[i]
+
+
+@routine
+def _across_states(load, moved, sliders, s, pose, workspace):
+    """Newton's method from one change of state to the next; whether it succeeded.
+
+    The part t of a Newton step leaves 1 - t of the out-of-balance force as long as forces are
+    linear. A step ends just behind the place where the first node opens or closes, or the first
+    slider begins or ceases to slide; the next has the matrix found there. The first step is taken
+    in full, away from where many sliders are at their limits.
+
+    J. Katzenelson, An algorithm for solving nonlinear resistor networks, Bell System Technical
+    Journal 44 (1965), 1605-1620.
+    """
+    q, last = pose.q, np.inf
+    put(q, workspace.start)
+    for piece in range(_PIECES * workspace.state.size + _FEW_PIECES):
+        terms = evaluate(load, moved, sliders, s, pose, workspace, 1)
+        size = _size(workspace.residual, workspace.scale)
+        if _balanced(size, terms, _FINE, workspace) or (
+                _balanced(size, terms, _ROUGH, workspace) and size >= 0.5 * last):
+            return True
+        put(q, workspace.base)
+        put_rows(workspace.state, workspace.state_before)
+        if not np.isfinite(size) or not _step(q, workspace):
+            break
+        last = np.inf
+        if piece == 0:
+            continue
+        evaluate(load, moved, sliders, s, pose, workspace, 0)
+        if _same_states(workspace) or _size(workspace.residual, workspace.scale) <= _LEFT * size:
+            last = size
+            continue
+        before, behind = 0.0, 1.0
+        for _ in range(_BISECTIONS):
+            if behind - before <= _ROUNDING * behind:
+                break
+            part = 0.5 * (before + behind)
+            _go(part, q, workspace)
+            evaluate(load, moved, sliders, s, pose, workspace, 0)
+            if _same_states(workspace):
+                before = part
+            else:
+                behind = part
+        _go(behind, q, workspace)
+    put(workspace.start, q)
+    return False
+
+
+@routine
+def _solved(load, moved, sliders, s, pose, workspace):
+    """Whether one of the forms of Newton's method succeeded."""
+    return _newton(load, moved, sliders, s, pose, workspace) or _across_states(
+        load, moved, sliders, s, pose, workspace)
+
+
+@helper
+def _slides(j, e, near, sliders, pose):
+    """Whether slider e of node j is at its limit, up to a part of it."""
+    tangents = pose.force.shape[1] // sliders.stiffness.shape[1]
+    size = 0.0
+    for k in range(tangents):
+        size = math.hypot(size, pose.force[j, tangents * e + k])
+    return size >= (1.0 - near) * sliders.limit[j, e] * pose.node[j, PRESSING]
+
+
+@helper
+def _room(j, e, change, sliders, pose):
+    """Part of a change (k,) of the force of slider e of node j with which it reaches its limit."""
+    tangents = len(change)
+    second, first, below = 0.0, 0.0, -(sliders.limit[j, e] * pose.node[j, PRESSING]) ** 2
+    for k in range(tangents):
+        R = pose.force[j, tangents * e + k]
+        second += change[k] * change[k]
+        first += R * change[k]
+        below += R * R
+    root = np.sqrt(max(first * first - second * below, 0.0))
+    return (root - first) / second if second > 0.0 else np.inf
+
+
+@routine
+def _improve_multipliers(load, moved, sliders, s, pose, workspace):
+    """Take the Newton step of the multipliers of rigid sliders that stick, from their forces on."""
+    n, elements = sliders.stiffness.shape
+    tangents, m = pose.force.shape[1] // elements, len(pose.q)
+    rows = np.zeros((n * elements * tangents, m))
+    places = np.zeros((n * elements * tangents, 3), dtype=np.int64)
+    root, misplaced = np.zeros(len(rows)), np.zeros(len(rows))
+    count = 0
+    for j in range(n):
+        for e in range(elements):
+            if sliders.rigid[j, e] != 0.0 and not _slides(j, e, _NEAR, sliders, pose):
+                for k in range(tangents):
+                    at = tangents * e + k
+                    places[count, 0], places[count, 1], places[count, 2] = j, e, at
+                    root[count] = np.sqrt(sliders.stiffness[j, e])
+                    misplaced[count] = root[count] * (
+                        pose.node[j, PLACE + PER_TANGENT * k] - pose.left[j, at])
+                    put(s.rows[j, 2 * k], rows[count])
+                    count += 1
+    if count == 0:
+        return
+    found = np.zeros((n, elements * tangents))
+    answer, matrix = np.empty(m), np.empty((count, count))
+    pivots = np.zeros(count, dtype=np.int64)
+    evaluate(load, moved, sliders, s, pose, workspace, 1)
+    factorise(workspace.matrix, m, workspace.pivots)
+    for c in range(count):
+        put(rows[c], answer)
+        solve(workspace.matrix, workspace.pivots, answer)
+        for r in range(count):
+            total = _REGULAR if r == c else 0.0
+            for i in range(m):
+                total += root[r] * rows[r, i] * answer[i] * root[c]
+            matrix[r, c] = total
+    step = misplaced[:count].copy()
+    factorise(matrix, count, pivots)
+    solve(matrix, pivots, step)
+    part = 1.0
+    for c in range(count):
+        # The force has made the step c (g - z) already.
+        found[places[c, 0], places[c, 2]] = root[c] * (step[c] - misplaced[c])
+    for c in range(0, count, tangents):
+        j, e = places[c, 0], places[c, 1]
+        part = min(part, _room(j, e, found[j, tangents * e : tangents * (e + 1)], sliders, pose))
+    if np.isfinite(part):
+        for c in range(count):
+            workspace.multiplier[places[c, 0], places[c, 2]] += (
+                part * found[places[c, 0], places[c, 2]])
+
+
 @kernel
 def find_equilibrium(
     load: Vector, moved: GroundMotion, sliders: Sliders, s: SystemArrays,
@@ -325,9 +497,9 @@ def find_equilibrium(
             rigid = sliders.rigid[j, k // tangents] != 0.0
             held |= rigid
             workspace.multiplier[j, k] = pose.force[j, k] if rigid else 0.0
-    solved = False
-    for _ in range(_REPEATS if held else 1):
-        solved = _newton(load, moved, sliders, s, pose, workspace)
+    solved, before = False, np.inf
+    for repeat in range(_REPEATS if held else 1):
+        solved = _solved(load, moved, sliders, s, pose, workspace)
         if not solved or not held:
             break
         changed, largest, noise = 0.0, 0.0, 0.0
@@ -342,15 +514,17 @@ def find_equilibrium(
                     workspace.multiplier[j, k] = pose.force[j, k]
         if changed <= _SETTLED * largest + _ROUNDING * noise:
             break
-        solved = False
+        if repeat >= _PATIENT and changed > 0.5 * before and (
+                changed <= _ROUGHLY * largest + _NOISY * noise):
+            break
+        solved, before = False, changed
+        if repeat >= _PLAIN:
+            _improve_multipliers(load, moved, sliders, s, pose, workspace)
     if not solved:
         return False
     for j in range(n):
         for e in range(elements):
-            limit, size = sliders.limit[j, e] * pose.node[j, PRESSING], 0.0
-            for k in range(tangents):
-                size = math.hypot(size, pose.force[j, tangents * e + k])
-            if size >= (1.0 - _SLIDES) * limit:
+            if _slides(j, e, _SLIDES, sliders, pose):
                 for k in range(tangents):
                     at = tangents * e + k
                     give = (0.0 if sliders.rigid[j, e] != 0.0

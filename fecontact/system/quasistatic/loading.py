@@ -133,8 +133,9 @@ def _loaded(
     if not complete:
         warnings.warn(
             f"The path of loads ends at point {len(history) - 1} of {len(given) - 1 - skipped}: "
-            f"there is no equilibrium beyond, as friction or supports do not hold the body; lower "
-            f"the loads, or add a support.", ModelWarning, stacklevel=3)
+            f"no equilibrium beyond was found; where friction or supports do not hold the body, "
+            f"lower the loads, or add a support, else give other steps or another "
+            f"tangential_ratio.", ModelWarning, stacklevel=3)
     if counts[JUMPS]:
         warnings.warn(
             f"Along the path of loads the body jumps {count(int(counts[JUMPS]), 'time')} to "

@@ -24,7 +24,7 @@ from fecontact.system.polynomial_forces import (
     has_polynomial,
     polynomial_potential,
 )
-from fecontact.system.quasistatic.increment import find_equilibrium
+from fecontact.system.quasistatic.increment import energy_of_forces, find_equilibrium
 from fecontact.system.quasistatic.pose import (
     AGAINST,
     ALONG_SURFACE,
@@ -48,8 +48,9 @@ COUNTS = 3
 SOLVED, CUT, JUMPS = range(COUNTS)
 # Shortest increments, as parts of the one asked for: at a jump, and where none is in equilibrium.
 _SHORTEST, _LEAST = 2.0**-40, 2.0**-20
-# Energies that are noise beside all works of an increment: forces balance to 1e-13 at best.
-_UNRESOLVED = 1e-11
+# Energies that are noise beside all works of an increment: forces balance to 1e-13 at best; and
+# beside the energy of all forces that cancel.
+_UNRESOLVED, _ROUNDING = 1e-11, 2e-16
 # Entries of the turnover of an increment.
 ERROR, TURNED, GAP, PRESSED = range(4)
 # Abscissae and weights of Gauss on [0, 1].
@@ -288,7 +289,8 @@ def march(
             floor = rubbed + pressed
             for i in range(len(WORKS)):
                 floor += abs(part[i])
-            floor = min(_UNRESOLVED, 0.01 * rtol) * floor + 1e-300
+            cancelling = energy_of_forces(workspace)
+            floor = min(_UNRESOLVED, 0.01 * rtol) * floor + _ROUNDING * cancelling + 1e-300
             excess = max(turnover[ERROR] / (rtol * max(rubbed, rubbing + turned) + floor),
                          turnover[GAP] / (rtol * max(pressed, pressing + heaved) + floor))
         if not solved and (row == 0 or length <= _LEAST):

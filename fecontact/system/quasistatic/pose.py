@@ -46,7 +46,8 @@ class Workspace(NamedTuple):
     ``acting`` sums the magnitudes of the forces on each mode; ``flexibility`` are minus the forces
     on the nodes along their axes by the modes, ``partial`` the derivatives of T, F, T across and
     the pressing force of a node to its displacements and velocities, and ``total`` the forces of
-    its sliders.
+    its sliders. ``state`` says of each slider whether its node is open (2), it sticks (0), or it
+    slides (1, in the plane with the sign of its force); ``state_before`` holds another such set.
     """
 
     scale: Annotated[Array, MODES]
@@ -55,7 +56,10 @@ class Workspace(NamedTuple):
     residual: Annotated[Array, MODES]
     step: Annotated[Array, MODES]
     before: Annotated[Array, MODES]
+    base: Annotated[Array, MODES]
     multiplier: Annotated[Array, NODES, FORCES]
+    state: Annotated[Array, NODES, SLIDERS]
+    state_before: Annotated[Array, NODES, SLIDERS]
     flexibility: Annotated[Array, NODES, AXES, MODES]
     matrix: Annotated[Array, MODES, MODES]
     partial: Annotated[Array, AXES + 1, 2 * AXES]

@@ -16,8 +16,8 @@ from fecontact.system.arrays import LawGroup
 from fecontact.system.contact_system import ContactSystem
 from fecontact.system.quasistatic.pose import Sliders
 
-# Penalty of rigid sticking, in stiffnesses of the contact or the body.
-_PENALTY = 1e3
+# Penalty of rigid sticking, in stiffnesses of the contact or the body: forces round off with it.
+_PENALTY = 1e2
 
 
 def springs_of(law: FrictionLaw, share: Array) -> tuple[Array, Array]:
