@@ -15,13 +15,14 @@ from fecontact import (
     Ground,
     Load,
     Material,
+    Mesh,
     ModelWarning,
     basis_from_matrices,
     equilibrium,
     modal_basis,
 )
 from fecontact.integrate import initial_state
-from fecontact.laws import ExponentialFriction, RoughSurface
+from fecontact.laws import ExponentialContact, ExponentialFriction, RoughSurface
 
 STIFFNESS, R = 10e6, 10e-6
 NORMAL = RoughSurface(STIFFNESS, R, 40.0)
@@ -501,3 +502,32 @@ def test_pressed_deeper_than_a_hundred_roughness_heights():
     equilibrium(mass_point(normal=RoughSurface(14.0 / (98.6 * 1e-5), 1e-5, 0.0)))
     with pytest.warns(ModelWarning, match="101 times|1e.02 times"):
         equilibrium(mass_point(normal=RoughSurface(14.0 / (100.6 * 1e-5), 1e-5, 0.0)))
+
+
+def test_block_on_rough_ground_with_an_exponential_law():
+    """Least potential by a trust region; forces are e^12 times those of touching nodes."""
+    n, depth, load = 40, 1e-7, 1e4
+    mesh = Mesh.grid(np.linspace(-0.02, 0.02, n + 1), np.linspace(0.0, 0.02, 9))
+    basis = modal_basis(ElasticBody(mesh, Material(210e9, 0.3, 7800.0), 0.01), 6,
+                        contact="bottom", contact_nodes=n, C="top", reduction="residual",
+                        tolerance=0.0)
+    gap = np.random.default_rng(1).uniform(0.0, 3e-6, n)
+    found = equilibrium(ContactSystem(
+        basis, normal=ExponentialContact(1.0, depth), friction=ExponentialFriction(0.8, 0.55, 1e3),
+        load=Load(load), gap=tuple(gap)))
+    rows, pushed = basis.contact_T[:, 1], load * basis.point_row("C", "y")
+    stiffness = np.diag(basis.angular_frequencies**2)
+    held = 1e8 * np.outer(basis.point_row("C", "x"), basis.point_row("C", "x"))
+
+    def forces(q):
+        return np.exp(np.minimum((-rows @ q - gap) / depth, 50.0)) / n
+
+    q = np.zeros(basis.modes)
+    for _ in range(200):
+        gradient = (stiffness + held) @ q - rows.T @ forces(q) + pushed
+        curvature = stiffness + held + (rows.T * forces(q) / depth) @ rows
+        step = np.linalg.solve(curvature, -gradient)
+        # Penetrations change by one depth at most, over which the law grows by e.
+        q += step * min(1.0, depth / np.abs(rows @ step).max())
+    assert forces(q).sum() == pytest.approx(load, rel=1e-9)
+    assert found.normal_force == pytest.approx(forces(q), rel=1e-6, abs=1e-6 * load)

@@ -16,6 +16,9 @@ from fecontact.system.polynomial_forces import polynomial_energy, polynomial_sti
 _UNBALANCED = 1e-6
 # Part of a motion at the contacts, and of the loads along it, that counts as rounding.
 _ROUNDING = 1e-9
+# Forces at twice the depth that carries the load, in parts of those there, beyond which laws are
+# steeper than powers: the stiffness is that at this depth.
+_STEEP = 10.0
 # Largest number of steps down the slopes of waves.
 _SLIDES = 3000
 
@@ -40,7 +43,11 @@ class Balance:
         self._rate, self._matrix = np.empty(size), np.empty((size, size))
         self._state = np.zeros(size)
         # Stiffness of the fully closed contact, and its force at zero displacement.
-        far = np.full(n, max(10.0 * scale, 2.0 * self._depth_under_load(scale)))
+        depth = self._depth_under_load(scale)
+        far = np.full(n, max(10.0 * scale, 2.0 * depth))
+        if self.normal(np.full(n, 2.0 * depth))[0].sum() > _STEEP * self.normal(
+                np.full(n, depth))[0].sum():
+            far[:] = depth
         values, self.face_stiffness = self.normal(far)
         undisplaced = kernels.contact_at(time, self._state, arrays)
         self.face_force = values + self.face_stiffness * (
