@@ -8,6 +8,7 @@ import difflib
 import sys
 from collections.abc import Iterable
 from numbers import Real
+from typing import Any
 
 
 class FecontactError(Exception):
@@ -55,10 +56,11 @@ _LEAST, LARGEST = 1e-60, 1e60
 def require_positive(owner: str, **values: float) -> None:
     """Raise :class:`InputError` unless every value is a number from 1e-60 to 1e60."""
     for name, value in values.items():
-        if not (_is_number(value) and 0.0 < value <= sys.float_info.max):
+        number = _of_python(value)
+        if not (_is_number(number) and 0.0 < number <= sys.float_info.max):
             raise InputError(f"{owner}: {name} = {shown(value)} must be a finite number above "
                              f"zero.")
-        if not _LEAST <= value <= LARGEST:
+        if not _LEAST <= number <= LARGEST:
             raise InputError(f"{owner}: {name} = {shown(value)} must be a number from {_LEAST:g} "
                              f"to {LARGEST:g}.")
 
@@ -66,10 +68,11 @@ def require_positive(owner: str, **values: float) -> None:
 def require_not_negative(owner: str, **values: float) -> None:
     """Raise :class:`InputError` unless every value is a number from zero to 1e60."""
     for name, value in values.items():
-        if not (_is_number(value) and 0.0 <= value <= sys.float_info.max):
+        number = _of_python(value)
+        if not (_is_number(number) and 0.0 <= number <= sys.float_info.max):
             raise InputError(f"{owner}: {name} = {shown(value)} must be a finite number, zero or "
                              f"above.")
-        if value > LARGEST:
+        if number > LARGEST:
             raise InputError(f"{owner}: {name} = {shown(value)} must be a number from zero to "
                              f"{LARGEST:g}.")
 
@@ -77,12 +80,13 @@ def require_not_negative(owner: str, **values: float) -> None:
 def require_finite(owner: str, **values: float) -> None:
     """Raise :class:`InputError` unless every value is a number from -1e60 to 1e60."""
     for name, value in values.items():
-        if not _is_number(value):
+        number = _of_python(value)
+        if not _is_number(number):
             raise InputError(f"{owner}: {name} = {shown(value)} must be a number.")
         # Whole numbers may be larger than any other.
-        if not abs(value) <= sys.float_info.max:
+        if not abs(number) <= sys.float_info.max:
             raise InputError(f"{owner}: {name} = {shown(value)} must be finite.")
-        if abs(value) > LARGEST:
+        if abs(number) > LARGEST:
             raise InputError(f"{owner}: {name} = {shown(value)} must be a number from "
                              f"{-LARGEST:g} to {LARGEST:g}.")
 
@@ -98,6 +102,13 @@ def require_choice(owner: str, name: str, value: object, names: Iterable[str]) -
 def _is_number(value: object) -> bool:
     # Asking an abstract class takes long.
     return type(value) is float or (isinstance(value, Real) and not isinstance(value, bool))
+
+
+def _of_python(value: Any) -> Any:
+    """A number of numpy as one of Python, since numpy casts the limits to its own kinds."""
+    if type(value) is not float and isinstance(value, Real) and hasattr(value, "item"):
+        return value.item()
+    return value
 
 
 def shown(value: object) -> str:

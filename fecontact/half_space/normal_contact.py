@@ -1,7 +1,9 @@
 """Pressures between two half-spaces whose surfaces have a gap, without friction."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,7 @@ from fecontact.core.checks import as_count, as_floats, as_pair, require_flags
 from fecontact.core.errors import (
     AnalysisError,
     InputError,
+    ModelWarning,
     require_finite,
     require_positive,
 )
@@ -128,6 +131,11 @@ def half_space_contact(
         For values out of range, both or none of force and approach.
     AnalysisError
         If the steps do not suffice.
+
+    Warns
+    -----
+    ModelWarning
+        If a surface that is not flat and not periodic touches at the edge of the grid.
     """
     owner = "half_space_contact"
     g, sides = checked_grid(gap, spacing, owner)
@@ -147,6 +155,11 @@ def half_space_contact(
     convolution = Convolution([(compliance.direct / np.pi, DIRECT)], g.shape, sides, periodic)
     forces, displacement, delta, steps = _conjugate_gradients(
         convolution, g, force, approach, rtol, max_iterations)
+    if not periodic and _touches_at_edge(forces, g):
+        warnings.warn(
+            f"{owner}: the contact reaches the edge of the grid of {g.shape[0]} x {g.shape[1]} "
+            f"pixels, beyond which there is none; give a larger grid, or periodic = True if it is "
+            f"one period of the surface.", ModelWarning, stacklevel=2)
     return HalfSpaceContact(forces / (sides[0] * sides[1]), displacement,
                             g + displacement - delta, delta, sides, compliance, periodic, steps)
 
@@ -159,11 +172,19 @@ def checked_grid(
     if g.ndim != 2 or min(g.shape) < 1 or not np.isfinite(g).all():
         raise InputError(f"{owner}: gap of shape {g.shape} must be a grid (N, M) of finite "
                          f"numbers [m]; fill missing heights first.")
-    sides = (spacing, spacing) if isinstance(spacing, int | float) else as_pair(
+    sides = (spacing, spacing) if isinstance(spacing, Real) else as_pair(
         spacing, f"{owner}: spacing")
     require_positive(owner, spacing=sides[0])
     require_positive(owner, spacing=sides[1])
     return g, (float(sides[0]), float(sides[1]))
+
+
+def _touches_at_edge(forces: Array, g: Array) -> bool:
+    """Whether pixels at the edge of the grid touch above the lowest one, unlike flat punches."""
+    inside = np.zeros(g.shape, dtype=bool)
+    inside[1:-1, 1:-1] = True
+    above = g > float(g.min()) + 1e-12 * float(np.abs(g).max())
+    return bool((above & ~inside & (forces > 0.0)).any())
 
 
 def _conjugate_gradients(

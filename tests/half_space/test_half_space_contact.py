@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fecontact import AnalysisError, Material
-from fecontact.core.errors import InputError
+from fecontact.core.errors import InputError, ModelWarning
 from fecontact.half_space import half_space_contact, half_space_friction
 from fecontact.half_space.influence import (
     ACROSS,
@@ -258,6 +258,20 @@ def test_rough_surface_beside_tamaas():
     assert 0.02 < found.touching.mean() < 0.5
     assert found.pressure == pytest.approx(pressure, abs=1e-5 * pressure.max())
     assert (found.touching == (pressure > 0.0)).mean() > 0.999
+
+
+def test_contact_at_the_edge_of_the_grid_is_a_warning():
+    whole, load = sphere(16, STEEL)
+    assert not whole.touching[0].any()
+    with pytest.warns(ModelWarning, match="reaches the edge of the grid of 16 x 16 pixels"):
+        sphere(16, STEEL, extent=1.5, force=load)
+
+
+@pytest.mark.parametrize("one", [np.int64, np.float32])
+def test_spacing_may_be_a_number_of_numpy(one):
+    gap = np.zeros((4, 4))
+    assert half_space_contact(gap, one(1), STEEL, force=1e3).approach == half_space_contact(
+        gap, 1.0, STEEL, force=1e3).approach
 
 
 @pytest.mark.parametrize(("call", "words"), [
