@@ -1,5 +1,7 @@
 """Runs that start at rest under friction, where a path of loads ended."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -123,6 +125,16 @@ def test_springs_of_solids_hold_what_they_held(friction):
     assert np.abs(run.modal_coordinates - history.modal_coordinates[-1]).max() < 1e-9
     assert run.friction_forces[-1] == pytest.approx(history.friction_forces[-1], rel=1e-6,
                                                     abs=1e-9)
+
+
+def test_rounding_of_sliders_at_their_limits_does_not_matter():
+    """Sliders that rounding puts beyond their limits would slide, in many thousands of steps."""
+    history = loaded_solid(IwanFriction(6e4, 0.5))
+    rest = history.state()
+    for part in (-2.0, 0.0, 1.0, 4.0):
+        start = replace(rest, slider_force=rest.slider_force * (1.0 + part * 1.1e-16))
+        run = simulate(history.system, 1e-2, initial=start, outputs=21)
+        assert run.statistics["steps"] < 100
 
 
 @pytest.mark.parametrize("ratio", [0.82, np.inf])

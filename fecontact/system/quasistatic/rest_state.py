@@ -26,6 +26,8 @@ OPEN, STICK, SLIP = range(len(STATES))
 _KINDS = ("plane bodies", "solids")
 # Relative distance from its limit at which a slider counts as sliding.
 _AT_LIMIT = 1e-9
+# Part of its limit by which a slider starts a run inside: at it, rounding would let it slide on.
+_INSIDE = 1e-13
 
 
 @read_only_arrays
@@ -171,7 +173,10 @@ class RestState(ContactPoses, Summarised):
                     raise InputError(f"{type(law).__name__} cannot go on from this state at rest, "
                                      f"whose friction is that of other springs; use the friction "
                                      f"law with which it was loaded.")
+                sliding = self.at_limit[nodes, : law.memory]
                 force = self.slider_force[nodes, : law.memory]
+                inside = np.where(sliding, 1.0 - _INSIDE, 1.0)
+                force = force * inside.reshape(*inside.shape, *([1] * (force.ndim - 2)))
                 stiffness = springs[0].reshape(*springs[0].shape, *([1] * (force.ndim - 2)))
                 out[nodes, : force[0].size] = (force / stiffness).reshape(len(force), -1)
         return out
