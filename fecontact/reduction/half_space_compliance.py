@@ -91,6 +91,9 @@ def with_half_space(
     require_kind(_OWNER, Sequence, pairings=pairings)
     require_kind(_OWNER, str, name=name)
     require_not_negative(_OWNER, tolerance=tolerance, damping=damping)
+    if tolerance >= 1.0:
+        raise InputError(f"{_OWNER}: tolerance = {tolerance!r} must be zero or above, and below "
+                         f"one.")
     if frequency is not None:
         require_positive(_OWNER, frequency=frequency)
     if body.dimension == 2:

@@ -16,6 +16,7 @@ from fecontact import (
     load_history,
     simulate,
 )
+from fecontact.analysis import prestressed_modes
 from fecontact.integrate import EventDriven, SetValued, TimeStepping
 from fecontact.laws import (
     Constant,
@@ -95,6 +96,16 @@ def test_other_friction_and_other_ground_are_refused():
     moved = load_history(wavy, path)
     with pytest.raises(InputError, match="has travelled 0"):
         simulate(wavy, 0.1, initial=moved)
+
+
+def test_other_normal_laws_are_refused():
+    history = loaded(JenkinsFriction(6e4, 0.5))
+    other = history.system.with_(normal=LinearContact(1e6))
+    for call in (lambda: simulate(other, 0.1, initial=history),
+                 lambda: load_history(other, LoadPath(travel=(0.0, 1e-5)), start=history),
+                 lambda: prestressed_modes(other, history)):
+        with pytest.raises(InputError, match="where the normal law of the system has"):
+            call()
 
 
 def solid(friction, force, **parts):

@@ -116,6 +116,8 @@ def test_tolerance_leaves_coordinates_out():
     assert counts[0] > counts[1] > counts[2]
     found = uniform(with_half_space(basis, body, tolerance=0.05))
     assert found == pytest.approx(SQUARE, rel=0.02)
+    with pytest.raises(fc.InputError, match="zero or above, and below one"):
+        with_half_space(basis, body, tolerance=1.0)
 
 
 def test_rows_are_those_of_the_shapes():

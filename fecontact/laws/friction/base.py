@@ -5,6 +5,7 @@ from typing import ClassVar, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from fecontact.core.checks import as_floats
 from fecontact.core.errors import InputError
 from fecontact.core.types import Array
 from fecontact.laws import base, friction_curve
@@ -119,7 +120,8 @@ class LimitedFriction(MemoryFriction):
 
     def steady_coefficient(self, velocity: Array | float) -> Array:
         """Mu with the sign of the slip velocity; see :class:`MemoryFriction`."""
-        return np.asarray(np.where(np.less(velocity, 0.0), -1.0, 1.0) * self.friction_coefficient)
+        v = as_floats(velocity, f"{type(self).__name__}: velocity")
+        return np.asarray(np.where(v < 0.0, -1.0, 1.0) * self.friction_coefficient)
 
 
 def require_at_least(law: NodeLaw, larger: str, smaller: str) -> None:

@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
+from fecontact.core.checks import as_floats
 from fecontact.core.compiled import helper
 from fecontact.core.simd.vectors import select, somewhere
 from fecontact.core.types import Array
@@ -304,7 +305,7 @@ class LuGreFriction(MemoryFriction):
 
     def steady_coefficient(self, velocity: Array | float) -> Array:
         """g(v) sgn(v) + sigma_2 v; see :class:`MemoryFriction`."""
-        v = np.asarray(velocity, dtype=float)
+        v = as_floats(velocity, f"{type(self).__name__}: velocity")
         kinetic = np.asarray(self.kinetic_coefficient)
         x = (np.abs(v) / self.stribeck_velocity) ** self.stribeck_exponent
         g = kinetic + (np.asarray(self.static_coefficient) - kinetic) * np.exp(-x)

@@ -6,7 +6,13 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from fecontact.core.errors import InputError, require_positive, shown
+from fecontact.core.errors import (
+    InputError,
+    require_finite,
+    require_not_negative,
+    require_positive,
+    shown,
+)
 from fecontact.core.simd.vectors import select
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
@@ -356,8 +362,8 @@ class FourParameterIwanFriction(_MaxwellSlip):
         above. InputError for other values.
         """
         require_positive(cls.__name__, phi_max=phi_max, R=R, normal_force=normal_force)
-        if not S >= 0.0:
-            raise InputError(f"{cls.__name__}: S = {S!r} must be zero or above [N/m].")
+        require_not_negative(cls.__name__, S=S)
+        require_finite(cls.__name__, chi=chi)
         if not -1.0 < chi <= 0.0:
             raise InputError(f"{cls.__name__}: chi = {chi!r} must be above -1 and at most 0.")
         power = R * phi_max ** (chi + 1.0) / (chi + 1.0)

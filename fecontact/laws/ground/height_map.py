@@ -216,7 +216,12 @@ class HeightMap:
 
     def shape(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Height, z_x, z_y, z_xx, z_xy and z_yy (..., 6) at places (...,) of its own frame [m]."""
-        places = np.broadcast_arrays(as_floats(x, "HeightMap: x"), as_floats(y, "HeightMap: y"))
+        along, across = as_floats(x, "HeightMap: x"), as_floats(y, "HeightMap: y")
+        try:
+            places = np.broadcast_arrays(along, across)
+        except ValueError:
+            raise InputError(f"HeightMap: x has the shape {along.shape}, y {across.shape}; give "
+                             f"both for each place.") from None
         out = np.empty((places[0].size, 6))
         _shape(self.kernel.address, places[0].ravel(), places[1].ravel(), self.parameters(), out)
         return out.reshape(*places[0].shape, 6)

@@ -6,7 +6,8 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 
-from fecontact.core.errors import InputError, require_not_negative
+from fecontact.core.checks import as_count, as_floats
+from fecontact.core.errors import InputError, require_not_negative, shown
 from fecontact.core.types import Array
 from fecontact.core.units import Unit
 from fecontact.laws.base import (
@@ -213,7 +214,8 @@ class AsperityContact(NormalLaw):
 
     def flattened(self, penetration: PerNode | Array) -> "AsperityContact":
         """The law after the face, or each node, has been pressed in so far [m]."""
-        given = np.maximum(np.asarray(penetration, dtype=float), 0.0)
+        found = as_floats(penetration, "AsperityContact.flattened: penetration")
+        given = np.maximum(found, 0.0)
         return replace(self, deepest=tuple(given.tolist()) if given.ndim else float(given))
 
     def friction(
@@ -241,8 +243,12 @@ class AsperityContact(NormalLaw):
         InputError
             If no node is in contact, for unequal numbers of nodes, or values out of range.
         """
-        require_not_negative("AsperityContact.friction", coefficient=coefficient)
-        u = np.asarray(penetration, dtype=float)
+        owner = "AsperityContact.friction"
+        require_not_negative(owner, coefficient=coefficient)
+        as_count(elements, f"{owner}: elements")
+        u = as_floats(penetration, f"{owner}: penetration")
+        if not np.isfinite(u).all():
+            raise InputError(f"{owner}: penetration = {shown(penetration)} must be finite [m].")
         if u.shape != np.shape(share) or not (u > 0.0).any():
             raise InputError(f"AsperityContact.friction: penetration has the shape {u.shape}, "
                              f"share {np.shape(share)}; give one for each node, and one above "

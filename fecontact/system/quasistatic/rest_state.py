@@ -11,9 +11,11 @@ from fecontact.core.types import Array, Integers
 from fecontact.core.units import Summarised, count, quantity
 from fecontact.system.contact_quantities import total_friction
 from fecontact.system.contact_system import ContactSystem
+from fecontact.system.node_forces import normal_values
 from fecontact.system.quasistatic.pose import (
     AGAINST,
     FORCE,
+    PENETRATION,
     PER_TANGENT,
     PLACE,
     PRESSING,
@@ -26,6 +28,8 @@ OPEN, STICK, SLIP = range(len(STATES))
 _KINDS = ("plane bodies", "solids")
 # Relative distance from its limit at which a slider counts as sliding.
 _AT_LIMIT = 1e-9
+# Difference from the normal forces of a system, as a part of the largest one, that is rounding.
+_SAME_FORCE = 1e-6
 # Part of its limit by which a slider starts a run inside: at it, rounding would let it slide on.
 _INSIDE = 1e-13
 
@@ -158,6 +162,15 @@ class RestState(ContactPoses, Summarised):
                              f"{len(self.node)} contact nodes of {_KINDS[rests]}, but the system "
                              f"has {m} and {n} of {_KINDS[solid]}; load that system itself with "
                              f"load_history.")
+        force, slope = np.empty(n), np.empty(n)
+        normal_values(system.arrays.normal, np.ascontiguousarray(self.node[:, PENETRATION]),
+                      np.zeros(n), system.arrays.normal_parameters, force, slope)
+        wrong = np.abs(force - self.node[:, FORCE])
+        if wrong.max(initial=0.0) > _SAME_FORCE * np.abs(self.node[:, FORCE]).max(initial=0.0):
+            j = int(np.argmax(wrong))
+            raise InputError(f"The state at rest has the normal force {self.node[j, FORCE]:g} N at "
+                             f"contact node {j}, where the normal law of the system has "
+                             f"{force[j]:g} N; load that system itself with load_history.")
 
     def memory(self, system: ContactSystem) -> Array:
         """Internal variables (n, s) of the system's friction at this state.
