@@ -24,6 +24,9 @@ def test_elastic_asperities_of_uniform_gaps():
     assert found[:, 0] == pytest.approx(exact, abs=1e-4 * exact[-1])
     assert found[:, 1] == pytest.approx(2.5 * exact / np.maximum(u, 1e-30), abs=1e-3 * (
         2.5 * exact[-1] / Z))
+    light = Z * np.array([3e-3, 1e-2, 1e-1])
+    assert forces(AsperityContact(N, R, E, Z), light)[:, 0] == pytest.approx(
+        8.0 / 15.0 * E * np.sqrt(R) * N / Z * light**2.5, rel=1e-3)
     # Half of the face has half of the force.
     assert forces(AsperityContact(N, R, E, Z), u, 0.5)[:, 0] == pytest.approx(0.5 * found[:, 0])
 

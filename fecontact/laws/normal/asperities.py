@@ -156,24 +156,27 @@ class AsperityContact(NormalLaw):
         touched = d > 0.0
         return np.where(touched, self.pair_force(d) / np.where(touched, hertz, 1.0), 1.0), d
 
-    def _quadrature(self) -> tuple[Array, Array]:
-        """Gaps (q,) and parts of all pairs (q,) that have them."""
-        gaps = (np.arange(_GAPS) + 0.5) / _GAPS * self.gap_range
-        rho = np.interp(gaps, np.linspace(0.0, self.gap_range, len(self.density)), self.density)
-        return gaps, rho / rho.sum()
+    def _quadrature(self, end: Array) -> tuple[Array, Array]:
+        """Gaps (k, q) up to ``end`` (k,), and parts of all pairs (..., q) that have them."""
+        share = np.clip(np.asarray(end)[:, None] / self.gap_range, 0.0, 1.0)
+        middles = (np.arange(_GAPS) + 0.5) / _GAPS
+        places = np.linspace(0.0, 1.0, len(self.density))
+        rho = np.interp(share * middles, places, self.density)
+        return share * middles * self.gap_range, share * rho / np.interp(
+            middles, places, self.density).sum()
 
     def curve(self, penetration: Array, deepest: float = 0.0) -> tuple[Array, Array]:
         """Force per pair of the face [N] and its derivative [N/m] at penetrations (k,)."""
-        gaps, parts = self._quadrature()
+        gaps, parts = self._quadrature(penetration)
         approach = np.asarray(penetration)[:, None] - gaps
         if deepest > 0.0:
             ratio, d_m = self._flattening(np.asarray(deepest), gaps)
             left = np.maximum(approach - d_m * (1.0 - ratio), 0.0)
             stiff = 2.0 * self.composite_modulus * np.sqrt(self.asperity_radius / ratio * left)
-            return np.asarray(2.0 / 3.0 * (stiff * left) @ parts), np.asarray(stiff @ parts)
+            return 2.0 / 3.0 * (stiff * left * parts).sum(axis=1), (stiff * parts).sum(axis=1)
         step = 1e-4 * self.gap_range / _GAPS
         slope = (self.pair_force(approach + step) - self.pair_force(approach - step)) / (2.0 * step)
-        return np.asarray(self.pair_force(approach) @ parts), np.asarray(slope @ parts)
+        return (self.pair_force(approach) * parts).sum(axis=1), (slope * parts).sum(axis=1)
 
     def table(self, share: Array) -> Array:
         """Parameters (n, 2 + 2 k): length of the table, chi, forces and slopes at its places."""
@@ -253,7 +256,7 @@ class AsperityContact(NormalLaw):
             raise InputError(f"AsperityContact.friction: penetration has the shape {u.shape}, "
                              f"share {np.shape(share)}; give one for each node, and one above "
                              f"zero at least.")
-        gaps, parts = self._quadrature()
+        gaps, parts = self._quadrature(u)
         count = super().table(np.asarray(share))[:, 0]
         nu = self.poisson_ratio
         ratio, d = self._flattening(u, gaps)

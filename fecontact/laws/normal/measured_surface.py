@@ -63,6 +63,7 @@ class MeasuredSurface(RoughSurface):
 
     h(s) is the fraction of the surface above the depth s R_Z below the highest peak, by monotone
     cubic interpolation over 64 intervals, and 1 for s > 1; f is the exact integral of that curve.
+    Forces below s = 1/64 follow from this interpolation, not from the shape of the highest peaks.
     u is the penetration [m], v its rate [m/s], F the normal force on the body [N], never tensile.
     See :meth:`from_heights` and :meth:`from_file` for profiles.
 
