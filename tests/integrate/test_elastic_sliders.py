@@ -380,7 +380,7 @@ def test_segalmans_parameters():
     assert law.stiffness == pytest.approx(power / (chi + 1.0) + S)
     assert law.friction_coefficient * F == pytest.approx(
         phi_max * (power / (chi + 2.0) + S))
-    with pytest.raises(fc.InputError, match="must be zero or above"):
+    with pytest.raises(fc.InputError, match=r"S = -1\.0 must be a finite number, zero or above"):
         FourParameterIwanFriction.from_distribution(chi, phi_max, R, -1.0, F)
 
 

@@ -45,8 +45,8 @@ class Balance:
         # Stiffness of the fully closed contact, and its force at zero displacement.
         depth = self._depth_under_load(scale)
         far = np.full(n, max(10.0 * scale, 2.0 * depth))
-        if self.normal(np.full(n, 2.0 * depth))[0].sum() > _STEEP * self.normal(
-                np.full(n, depth))[0].sum():
+        carried, beyond = (self.normal(np.full(n, at))[0].sum() for at in (depth, 2.0 * depth))
+        if 0.0 < _STEEP * carried < beyond:
             far[:] = depth
         values, self.face_stiffness = self.normal(far)
         undisplaced = kernels.contact_at(time, self._state, arrays)
